@@ -8,8 +8,7 @@ namespace {
 
 constexpr double kMostRise = 0.02;                    // m, of ground
 constexpr double kFootBegin = 0.05, kFootEnd = 0.60;  // m above the ground
-constexpr double kRise = 0.10;  // m, more than a pose that is off by 0.1 deg moves ground 50 m away
-constexpr double kColumn = 0.1;  // m
+constexpr double kColumn = 0.1;                       // m
 
 VoxelKey column_of(const Eigen::Vector3d& at, std::int64_t dx = 0, std::int64_t dy = 0) {
   // The columns of a scan are nearer to each other than the period of the mask.
@@ -25,19 +24,16 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
   removed_.clear();
   feet_.clear();
   ground_.free_far(T_world_sensor.translation());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kDynamic) continue;
-    const Eigen::Vector3d at = world_point(points, i, T_world_sensor);
-    const auto rise = ground_.rise(at);
-    if (!rise) continue;
-    if (*rise <= kMostRise && ground_.is_level(at)) removed_.push_back({i, at});
-    if (*rise >= kFootBegin && *rise <= kFootEnd) feet_.insert(column_of(at));
-  }
-}
-
-bool RestoredGround::rises(const Eigen::Vector3d& point) {
-  const auto rise = ground_.rise(point);
-  return rise && *rise >= kRise;
+  const auto is_removed = [&](std::size_t i) { return verdict.labels[i] == PointLabel::kDynamic; };
+  for_each_located(points, T_world_sensor, is_removed, [&](const LocatedPoints& located) {
+    ground_.for_each_rise(located, [&](std::size_t k, double rise) {
+      const Eigen::Vector3d at = located.at(k);
+      if (rise <= kMostRise && ground_.is_level(cell_at(at))) {
+        removed_.push_back({located.point(k), at});
+      }
+      if (rise >= kFootBegin && rise <= kFootEnd) feet_.insert(column_of(at));
+    });
+  });
 }
 
 bool RestoredGround::is_beside_foot(const Eigen::Vector3d& at) const {

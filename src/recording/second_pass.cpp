@@ -1,6 +1,7 @@
 #include "dynains/recording/second_pass.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -76,7 +77,8 @@ void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
 }
 
 void SecondPass::test(const std::function<bool()>& keep_going) {
-  ReferenceTest test_visibility{FreeSpaceConfig()};
+  std::array<ReferenceTest, 2> tests = {ReferenceTest(FreeSpaceConfig()),
+                                        ReferenceTest(FreeSpaceConfig())};
   RecordingReference reference, next;
   Background reader;
   Background* const other = config_.threads > 1 ? &reader : nullptr;
@@ -84,17 +86,20 @@ void SecondPass::test(const std::function<bool()>& keep_going) {
   for (std::size_t i = 0; i < kept_.size(); ++i) {
     if (!keep_going()) return;
     std::swap(reference, next);
-    const auto test_places = [&] {
-      const Eigen::Vector3d sensor = kept_[i].T_world_sensor.translation();
-      places_.test(kept_[i].scan, kept_[i].time, sensor,
-                   [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
-                     return test_visibility(reference, points, count,
-                                            Pose(Eigen::Translation3d(sensor)));
-                   });
+    const Pose T_world_points(Eigen::Translation3d(kept_[i].T_world_sensor.translation()));
+    places_.begin_test(kept_[i].scan, kept_[i].time, T_world_points.translation());
+    const auto test_part = [&](std::size_t part) {
+      places_.test(
+          part, [&](const PointBuffer& points, std::size_t count) -> const auto& {
+            return tests[part](reference, points, count, T_world_points);
+          });
     };
-    run_both(other, test_places, [&] {
-      if (i + 1 < kept_.size()) read(kept_[i + 1], next);
-    });
+    run_both(
+        other, [&] { test_part(0); },
+        [&] {
+          if (i + 1 < kept_.size()) read(kept_[i + 1], next);
+          test_part(1);
+        });
   }
   places_.decide();
   chains_.find_moves();
@@ -116,7 +121,7 @@ void SecondPass::list_objects() {
   places_.for_each([&](const Eigen::Vector3d& middle, const Place& place) {
     if (place.state != PlaceState::kChanged) return;
     Object& object = objects_[place.object - 1];
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * RecordingPlaces::kPlace);
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * kWorldCell);
     object.lowest = object.lowest.cwiseMin(middle - half);
     object.highest = object.highest.cwiseMax(middle + half);
     if (!place.was_passed()) return;
@@ -130,40 +135,50 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, const Pose& T_w
                         VerdictArrays& verdict) {
   check_sizes(points, verdict.labels.size(), verdict.causes.size(), verdict.instances.size());
   points_ = points;
-  place_of_.assign(points_.size(), nullptr);
+  for (const std::size_t i : placed_) place_of_[i] = nullptr;
+  placed_.clear();
+  place_of_.resize(points_.size(), nullptr);
   is_restored_.assign(points_.size(), 0);
   if (!is_decided_) return false;
   const std::uint64_t before = restored_ + removed_;
-  const auto is_taken = [&](std::size_t i) {
-    const PointLabel label = verdict.labels[i];
-    if (label == PointLabel::kGround) {
-      return ground_.rises(world_point(points_, i, T_world_sensor));
-    }
-    return RecordingPlaces::is_above_ground(label);
-  };
-  places_.for_each_place(points_, T_world_sensor, is_taken, [&](std::size_t i, const Place* place) {
-    if (verdict.labels[i] == PointLabel::kGround) {
-      place_of_[i] = changed_at_ground(i, place, T_world_sensor);
-    } else if (place == nullptr) {
-      return;
-    } else if (verdict.labels[i] == PointLabel::kDynamic) {
-      if (stands(*place, number)) restore(i, verdict);
-    } else if (place->state != PlaceState::kUnknown) {
-      place_of_[i] = place;
-    }
-  });
+  find_places(number, T_world_sensor, verdict);
   restored_ += ground_.restore(points_, T_world_sensor, verdict);
   remove_objects(number, T_world_sensor, verdict);
   return restored_ + removed_ > before;
 }
 
+// Finds the places of points that may have changed, and restores removed points that stand.
+void SecondPass::find_places(std::uint32_t number, const Pose& T_world_sensor,
+                             VerdictArrays& verdict) {
+  places_.begin_scan(points_, T_world_sensor, is_near_);
+  const auto is_near_ground = [&](std::size_t i) {
+    return is_near_[i] != 0 && verdict.labels[i] == PointLabel::kGround;
+  };
+  const auto put_ground = [&](std::size_t i, const WorldCell& cell) {
+    if (const Place* const place = changed_at_ground(cell)) put(i, *place);
+  };
+  ground_.for_each_rising(points_, T_world_sensor, is_near_ground, put_ground);
+  const auto is_near_object = [&](std::size_t i) {
+    return verdict.labels[i] == PointLabel::kDynamic ||
+           (is_near_[i] != 0 && verdict.labels[i] == PointLabel::kStatic);
+  };
+  const auto take = [&](std::size_t i, const Place* place) {
+    if (place == nullptr) return;
+    if (verdict.labels[i] == PointLabel::kDynamic) {
+      if (stands(*place, number)) restore(i, verdict);
+    } else if (place->state != PlaceState::kUnknown) {
+      put(i, *place);
+    }
+  };
+  places_.for_each_place(points_, T_world_sensor, is_near_object, take);
+}
+
 // The place that has changed of a ground point that rises, or one that touches it if nothing is
 // known of its own place; else null.
-const SecondPass::Place* SecondPass::changed_at_ground(std::size_t point, const Place* place,
-                                                       const Pose& T_world_sensor) {
-  if (place != nullptr && place->state == PlaceState::kStays) return nullptr;
-  const bool is_known = place != nullptr && place->state == PlaceState::kChanged;
-  return is_known ? place : places_.changed_beside(world_point(points_, point, T_world_sensor));
+const SecondPass::Place* SecondPass::changed_at_ground(const WorldCell& cell) {
+  const Place* const place = places_.find(cell);
+  if (place == nullptr || place->state == PlaceState::kUnknown) return places_.changed_beside(cell);
+  return place->state == PlaceState::kChanged ? place : nullptr;
 }
 
 // Whether what scan `number` measured in a place is no part of the static map.
@@ -190,29 +205,37 @@ void SecondPass::restore(std::size_t point, VerdictArrays& verdict) {
 void SecondPass::remove_objects(std::uint32_t number, const Pose& T_world_sensor,
                                 VerdictArrays& verdict) {
   find_instances(number, T_world_sensor, verdict);
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (!is_static(verdict.labels[i]) || is_restored_[i] != 0) continue;
-    const std::uint32_t instance = numbers_.find(verdict.instances[i]);
-    const bool is_free = place_of_[i] != nullptr && has_changed(*place_of_[i], number);
-    const bool leaves = instance != InstanceNumbers::kNone && instances_[instance].is_leaving;
-    if (!is_free && !leaves) continue;
-    verdict.labels[i] = PointLabel::kDynamic;
-    verdict.causes[i] = Cause::kCameOrWent;
-    if (!verdict.beliefs.empty()) verdict.beliefs[i] = std::max(verdict.beliefs[i], kBelief);
-    ++removed_;
-    if (!is_free) continue;
+  for (const std::size_t i : placed_) {
+    if (!has_changed(*place_of_[i], number)) continue;
+    remove(i, verdict);
     Object& object = objects_[place_of_[i]->object - 1];
     if (object.points++ == 0) object.first_measured = number;
     object.last_measured = number;
   }
+  const auto leaves = [](const Instance& instance) { return instance.is_leaving; };
+  if (std::none_of(instances_.begin(), instances_.end(), leaves)) return;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!is_static(verdict.labels[i]) || is_restored_[i] != 0) continue;
+    const std::uint32_t instance = numbers_.find(verdict.instances[i]);
+    if (instance != InstanceNumbers::kNone && instances_[instance].is_leaving) remove(i, verdict);
+  }
+}
+
+void SecondPass::remove(std::size_t point, VerdictArrays& verdict) {
+  verdict.labels[point] = PointLabel::kDynamic;
+  verdict.causes[point] = Cause::kCameOrWent;
+  if (!verdict.beliefs.empty()) {
+    verdict.beliefs[point] = std::max(verdict.beliefs[point], kBelief);
+  }
+  ++removed_;
 }
 
 // Numbers the instances of which places have changed, or that have moved: no other leaves.
 void SecondPass::choose_instances(std::uint32_t number, const VerdictArrays& verdict) {
   numbers_.clear();
   chains_.for_each_move(number, [&](std::uint32_t id) { numbers_.add(id); });
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kStatic || place_of_[i] == nullptr) continue;
+  for (const std::size_t i : placed_) {
+    if (verdict.labels[i] != PointLabel::kStatic) continue;
     if (verdict.instances[i] == kNoInstance || !has_changed(*place_of_[i], number)) continue;
     numbers_.add(verdict.instances[i]);
   }
@@ -222,6 +245,9 @@ void SecondPass::find_instances(std::uint32_t number, const Pose& T_world_sensor
                                 const VerdictArrays& verdict) {
   choose_instances(number, verdict);
   instances_.assign(numbers_.ids().size(), {});
+  seen_.clear();
+  if (instances_.empty()) return;
+  find_other_places(T_world_sensor, verdict);
   world_.resize(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const std::uint32_t chosen = numbers_.find(verdict.instances[i]);
@@ -243,11 +269,21 @@ void SecondPass::find_instances(std::uint32_t number, const Pose& T_world_sensor
   }
 }
 
+// Finds the places of points of instances that are not near what has changed.
+void SecondPass::find_other_places(const Pose& T_world_sensor, const VerdictArrays& verdict) {
+  const auto is_taken = [&](std::size_t i) {
+    return verdict.labels[i] == PointLabel::kStatic && is_near_[i] == 0 && is_restored_[i] == 0 &&
+           numbers_.find(verdict.instances[i]) != InstanceNumbers::kNone;
+  };
+  places_.for_each_place(points_, T_world_sensor, is_taken, [&](std::size_t i, const Place* place) {
+    if (place != nullptr && place->state != PlaceState::kUnknown) put(i, *place);
+  });
+}
+
 // Lists the places of instances. A place is low if any of its points is.
 void SecondPass::list_seen(const VerdictArrays& verdict) {
-  seen_.clear();
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (verdict.labels[i] != PointLabel::kStatic || place_of_[i] == nullptr) continue;
+  for (const std::size_t i : placed_) {
+    if (verdict.labels[i] != PointLabel::kStatic) continue;
     const std::uint32_t chosen = numbers_.find(verdict.instances[i]);
     if (chosen == InstanceNumbers::kNone) continue;
     const Instance& instance = instances_[chosen];

@@ -12,8 +12,6 @@ using namespace dynains;
 
 namespace {
 
-constexpr double kEdge = 10.0;  // m
-
 /// Counts the bytes that come and go.
 class CountingStore : public MemoryStore {
  public:
@@ -30,7 +28,7 @@ TEST_CASE("tiles hold what was put into them, for any budget") {
   for (const std::size_t budget : {std::size_t{0}, std::size_t{20000}, std::size_t{1} << 30U}) {
     CAPTURE(budget);
     CountingStore store;
-    PagedTiles<VoxelTile<int>> tiles(store, kEdge, budget);
+    PagedTiles<VoxelTile<int>> tiles(store, budget);
     std::map<std::pair<GroundTile, VoxelKey>, int> expected;
     std::mt19937 random(7);
     for (int i = 0; i < 3000; ++i) {
@@ -57,23 +55,24 @@ TEST_CASE("tiles hold what was put into them, for any budget") {
 
 TEST_CASE("tiles that are near stay in memory, and unchanged ones are stored once") {
   CountingStore store;
-  PagedTiles<VoxelTile<int>> tiles(store, kEdge, 0);
+  PagedTiles<VoxelTile<int>> tiles(store, 0);
   for (std::int64_t x = 0; x < 4; ++x) {
     auto& tile = tiles.at({x, 0});
     tile.values[tile.add(1)] = 5;
   }
   const auto* const near = &tiles.at({0, 0});
-  tiles.free_far({5.0, 5.0, 0.0}, 5.0);  // the border of the second tile is 5 m away
+  const Eigen::Vector3d sensor(kTileEdge - 5.0, 5.0, 0.0);
+  tiles.free_far(sensor, 5.1);  // the border of the second tile is 5 m away
   CHECK(near->values.size() == 1);
   CHECK(store.appended == 2);
-  tiles.free_far({5.0, 5.0, 0.0}, 4.9);
+  tiles.free_far(sensor, 4.9);
   CHECK(store.appended == 3);
   REQUIRE(tiles.find({3, 0})->find(1) != nullptr);
   CHECK(*tiles.find({3, 0})->find(1) == 5);
-  tiles.free_far({5.0, 5.0, 0.0}, 4.9);
+  tiles.free_far(sensor, 4.9);
   CHECK(store.appended == 3);
   tiles.at({3, 0}).values[0] = 6;
-  tiles.free_far({5.0, 5.0, 0.0}, 4.9);
+  tiles.free_far(sensor, 4.9);
   CHECK(store.appended == 4);
   CHECK(*tiles.find({3, 0})->find(1) == 6);
 }

@@ -61,16 +61,17 @@ class Recorder {
   void look_by(const Beam& beam, int times = 1) {
     for (int i = 0; i < times; ++i, time_ += step) {
       ++scan_;
-      places.test(scan_, time_, sensor,
-                  [&](const PointBuffer& points, std::size_t size) -> const detail::Visibility& {
-                    std::vector<BeamResult> seen(size);
-                    for (std::size_t k = 0; k < size; ++k) {
-                      const Eigen::Vector3f local(points.x[k], points.y[k], points.z[k]);
-                      seen[k] = beam(sensor + local.cast<double>());
-                    }
-                    visibility_ = test::visibility_of(seen);
-                    return visibility_;
-                  });
+      places.begin_test(scan_, time_, sensor);
+      places.test(
+          0, [&](const PointBuffer& points, std::size_t size) -> const auto& {
+            std::vector<BeamResult> seen(size);
+            for (std::size_t k = 0; k < size; ++k) {
+              const Eigen::Vector3f local(points.x[k], points.y[k], points.z[k]);
+              seen[k] = beam(sensor + local.cast<double>());
+            }
+            visibility_ = test::visibility_of(seen);
+            return visibility_;
+          });
     }
   }
   std::size_t changed() {
@@ -259,7 +260,7 @@ TEST_CASE("places that looks from any range passed are no contact, but a part of
 
 TEST_CASE("an object across the border of tiles is one object") {
   Recorder recorder;
-  const int border = RecordingPlaces::kTile;  // places
+  const int border = kTileCells;  // places
   recorder.measure(6, border - 3);
   recorder.sensor.y() = 25.0;
   recorder.look(BeamResult::kHit, 5);
@@ -418,10 +419,10 @@ TEST_CASE("a point touches what changed, if fewer places beside it stay") {
     recorder.look_by(pass_near_ones, 10);
     REQUIRE(recorder.changed() == 6);
     const Eigen::Vector3d between(10.6, 1.0, 0.2);
-    const RecordingPlace* const beside = recorder.places.changed_beside(between);
+    const RecordingPlace* const beside = recorder.places.changed_beside(cell_at(between));
     REQUIRE((beside != nullptr) == (staying == 2));
     if (beside != nullptr) CHECK(beside->state == PlaceState::kChanged);
-    CHECK(recorder.places.changed_beside({9.4, 1.0, 0.2}) == nullptr);
+    CHECK(recorder.places.changed_beside(cell_at({9.4, 1.0, 0.2})) == nullptr);
   }
 }
 

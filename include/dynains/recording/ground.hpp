@@ -3,17 +3,15 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <optional>
 #include <vector>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/paged_tiles.hpp"
-#include "dynains/recording/world_point.hpp"
+#include "dynains/recording/world_cells.hpp"
 
 namespace dynains {
 
@@ -23,20 +21,22 @@ class RecordingGround {
  public:
   /// `budget`: bytes in memory, if the cells around the sensor take less; the others wait in the
   /// store, which outlives this, and what it throws comes out of all functions.
-  RecordingGround(ByteStore& store, std::size_t budget)
-      : tiles_(store, kCell * (1 << kShift), budget) {}
+  RecordingGround(ByteStore& store, std::size_t budget) : tiles_(store, budget) {}
 
   /// Adds the ground points of a scan (m, sensor frame).
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (verdicts[i] != PointLabel::kGround) continue;
-      const Eigen::Vector3d at = world_point(points, i, T_world_sensor);
-      const Index index = index_of(at);
-      Cell& cell = tiles_.at(tile_of(index)).cells[cell_of(index)];
-      if (cell.count++ == 0) cell.origin = at.z();
-      cell.mean +=
-          (static_cast<float>(at.z() - cell.origin) - cell.mean) / static_cast<float>(cell.count);
-    }
+    const auto is_ground = [&](std::size_t i) { return verdicts[i] == PointLabel::kGround; };
+    for_each_located(points, T_world_sensor, is_ground, [&](const LocatedPoints& located) {
+      const Span<const LocatedPoints::Run> runs = located.runs();
+      std::array<Cell*, LocatedPoints::kMost> cells;
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        cells[r] = &tiles_.at(tile_of(runs[r].cell)).cells[number_of(runs[r].cell)];
+        __builtin_prefetch(cells[r], 1);
+      }
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) cells[r]->add(located.at(k).z());
+      }
+    });
     free_far(T_world_sensor.translation());
   }
 
@@ -46,44 +46,56 @@ class RecordingGround {
     tiles_.free_far(sensor, kNear);
   }
 
-  /// Height of a point (m, world frame) above the ground in its cell. Empty where the recording has
-  /// less than 20 points of the ground.
-  std::optional<double> rise(const Eigen::Vector3d& point) {
-    const std::optional<double> height = height_of(index_of(point));
-    if (!height) return std::nullopt;
-    return point.z() - *height;
+  /// Calls `visit(k, rise)` for the located points in cells where the recording has 20 points of
+  /// the ground or more. `rise`: m above the ground in the cell.
+  template <class Visitor>
+  void for_each_rise(const LocatedPoints& located, Visitor&& visit) {
+    const Span<const LocatedPoints::Run> runs = located.runs();
+    std::array<const Cell*, LocatedPoints::kMost> cells;
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+      cells[r] = find(runs[r].cell);
+      __builtin_prefetch(cells[r]);
+    }
+    for (std::size_t r = 0; r < runs.size(); ++r) {
+      if (!has_ground(cells[r])) continue;
+      const double height = cells[r]->height();
+      for (std::size_t k = runs[r].begin; k < runs[r].end; ++k)
+        visit(k, located.at(k).z() - height);
+    }
   }
 
-  /// Whether the ground in the cell of a point (m, world frame) is not a step above that of any
-  /// cell around: the underside of a vehicle can look like ground.
-  bool is_level(const Eigen::Vector3d& point) {
+  /// Whether the ground in a cell is not a step above that of any cell around: the underside of a
+  /// vehicle can look like ground.
+  bool is_level(const WorldCell& cell) {
     constexpr std::int64_t kReach = 2;  // cells
     constexpr double kStep = 0.2;       // m
-    const Index index = index_of(point);
-    const std::optional<double> height = height_of(index);
-    if (!height) return false;
+    const Cell* const own = find(cell);
+    if (!has_ground(own)) return false;
     for (std::int64_t dx = -kReach; dx <= kReach; ++dx) {
       for (std::int64_t dy = -kReach; dy <= kReach; ++dy) {
-        const std::optional<double> other = height_of({index[0] + dx, index[1] + dy});
-        if (other && *height > *other + kStep) return false;
+        const Cell* const other = find({cell[0] + dx, cell[1] + dy, 0});
+        if (has_ground(other) && own->height() > other->height() + kStep) return false;
       }
     }
     return true;
   }
 
  private:
-  static constexpr double kCell = 0.4;  // m
-  static constexpr int kShift = 6;      // cells of a tile: 64 x 64
   static constexpr std::uint32_t kFewest = 20;
 
-  using Index = std::array<std::int64_t, 2>;
   struct Cell {
     double origin = 0.0;  // m, the first height
     float mean = 0.0F;    // m, above it
     std::uint32_t count = 0;
+
+    double height() const { return origin + static_cast<double>(mean); }
+    void add(double z) {
+      if (count++ == 0) origin = z;
+      mean += (static_cast<float>(z - origin) - mean) / static_cast<float>(count);
+    }
   };
   struct Tile {
-    std::vector<Cell> cells = std::vector<Cell>(std::size_t{1} << (2 * kShift));
+    std::vector<Cell> cells = std::vector<Cell>(kTileCells * kTileCells);
 
     std::size_t size() const { return cells.size(); }
     std::size_t memory_bytes() const { return cells.size() * sizeof(Cell); }
@@ -97,23 +109,15 @@ class RecordingGround {
     }
   };
 
-  static Index index_of(const Eigen::Vector3d& at) {
-    return {static_cast<std::int64_t>(std::floor(at.x() / kCell)),
-            static_cast<std::int64_t>(std::floor(at.y() / kCell))};
+  static std::size_t number_of(const WorldCell& cell) {
+    return static_cast<std::size_t>((cell[0] & (kTileCells - 1)) << kTileShift |
+                                    (cell[1] & (kTileCells - 1)));
   }
-  static GroundTile tile_of(const Index& index) { return {index[0] >> kShift, index[1] >> kShift}; }
-  // Index of a cell in its tile.
-  static std::size_t cell_of(const Index& index) {
-    constexpr std::int64_t kMask = (std::int64_t{1} << kShift) - 1;
-    return static_cast<std::size_t>((index[0] & kMask) << kShift | (index[1] & kMask));
-  }
-  // Mean height of the ground in a cell with enough points, m.
-  std::optional<double> height_of(const Index& index) {
-    const Tile* const tile = tiles_.find(tile_of(index));
-    if (tile == nullptr) return std::nullopt;
-    const Cell& cell = tile->cells[cell_of(index)];
-    if (cell.count < kFewest) return std::nullopt;
-    return cell.origin + static_cast<double>(cell.mean);
+  static bool has_ground(const Cell* cell) { return cell != nullptr && cell->count >= kFewest; }
+  // Null: its tile has no ground.
+  const Cell* find(const WorldCell& cell) {
+    const Tile* const tile = tiles_.find(tile_of(cell));
+    return tile == nullptr ? nullptr : &tile->cells[number_of(cell)];
   }
 
   PagedTiles<Tile> tiles_;

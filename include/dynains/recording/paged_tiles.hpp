@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -14,12 +13,10 @@
 #include <vector>
 
 #include "dynains/recording/byte_store.hpp"
+#include "dynains/recording/world_cells.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
-
-/// Index of a square tile, along x and y of the world.
-using GroundTile = std::array<std::int64_t, 2>;
 
 /// Values by voxel of a tile, in the order of their insertion.
 template <class Value>
@@ -75,10 +72,9 @@ struct VoxelTile {
 template <class Tile>
 class PagedTiles {
  public:
-  /// `edge`: m, of a tile. `budget`: bytes of the tiles that stay in memory, if the others are far.
-  /// The store outlives this.
-  PagedTiles(ByteStore& store, double edge, std::size_t budget)
-      : store_(&store), edge_(edge), budget_(budget) {}
+  /// `budget`: bytes of the tiles that stay in memory, if the others are far. The store outlives
+  /// this.
+  PagedTiles(ByteStore& store, std::size_t budget) : store_(&store), budget_(budget) {}
 
   /// The tile, which is new or not, to be changed. Throws what the store throws.
   Tile& at(const GroundTile& index) {
@@ -115,12 +111,12 @@ class PagedTiles {
   /// Distance of a tile from a position (m, world frame) along the axis where it is larger, m.
   double distance(const GroundTile& index, const Eigen::Vector3d& position) const {
     const Eigen::Vector3d away = position - middle(index);
-    return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * edge_;
+    return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * kTileEdge;
   }
   /// m, world frame; z is 0.
   Eigen::Vector3d middle(const GroundTile& index) const {
-    return {edge_ * (static_cast<double>(index[0]) + 0.5),
-            edge_ * (static_cast<double>(index[1]) + 0.5), 0.0};
+    return {kTileEdge * (static_cast<double>(index[0]) + 0.5),
+            kTileEdge * (static_cast<double>(index[1]) + 0.5), 0.0};
   }
 
   /// Frees the tiles farthest from a position (m, world frame) until the others keep to the budget.
@@ -152,7 +148,7 @@ class PagedTiles {
   };
 
   bool is_recent(const GroundTile& index) const {
-    return recent_ != nullptr && recent_index_ == index;
+    return recent_ != nullptr && recent_index_[0] == index[0] && recent_index_[1] == index[1];
   }
   void take_recent(std::pair<const GroundTile, Entry>& entry) {
     recent_index_ = entry.first;
@@ -181,7 +177,6 @@ class PagedTiles {
   }
 
   ByteStore* store_;
-  double edge_;
   std::size_t budget_;
   std::map<GroundTile, Entry> entries_;  // its elements do not move
   Entry* recent_ = nullptr;

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -14,9 +15,10 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/marked_columns.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/place.hpp"
-#include "dynains/recording/world_point.hpp"
+#include "dynains/recording/world_cells.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
@@ -53,7 +55,7 @@ struct RecordingPlacesConfig {
   void validate() const { validate_parameters("RecordingPlaces", *this); }
 };
 
-/// Places are cubes of 0.4 m with points above the ground. The verdicts of the first pass on them
+/// Places are cells of 0.4 m with points above the ground. The verdicts of the first pass on them
 /// are kept by epochs. Then reference scans test the points of each place, in the order of their
 /// times. References near each other in time and in the place of the sensor repeat the same error,
 /// and are one look; an epoch is the same for scans. A look is free if beams passed the place and
@@ -72,17 +74,13 @@ struct RecordingPlacesConfig {
 /// A place takes about 170 bytes.
 class RecordingPlaces {
  public:
-  static constexpr double kPlace = 0.4;      // m
-  static constexpr std::int64_t kTile = 64;  // places
-
   using Place = RecordingPlace;
 
   /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
   /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
   /// result. Throws ConfigError.
   RecordingPlaces(const RecordingPlacesConfig& config, ByteStore& store, std::size_t budget)
-      : config_((config.validate(), config)),
-        tiles_(store, kPlace * static_cast<double>(kTile), budget) {}
+      : config_((config.validate(), config)), tiles_(store, budget) {}
 
   const RecordingPlacesConfig& config() const { return config_; }
 
@@ -95,48 +93,66 @@ class RecordingPlaces {
       return is_above_ground(verdicts[i]) &&
              (verdicts[i] != PointLabel::kDynamic || causes[i] != Cause::kUnderInstance);
     };
-    for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
-      std::array<Tile*, kBlock> tiles;
-      std::array<std::uint32_t, kBlock> numbers;
-      for (std::size_t k = 0; k < block.count; ++k) {
-        tiles[k] = &tiles_.at(block.at[k].tile);
-        tiles[k]->numbers.prefetch(block.at[k].key);
+    for_each_located(points, T_world_sensor, is_taken, [&](const LocatedPoints& located) {
+      const Span<const LocatedPoints::Run> runs = located.runs();
+      std::array<Tile*, LocatedPoints::kMost> tiles;
+      std::array<std::uint32_t, LocatedPoints::kMost> numbers;
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        tiles[r] = &tiles_.at(tile_of(runs[r].cell));
+        tiles[r]->numbers.prefetch(key_of(runs[r].cell));
       }
-      for (std::size_t k = 0; k < block.count; ++k) {
-        numbers[k] = tiles[k]->add(block.at[k].key);
-        __builtin_prefetch(&tiles[k]->values[numbers[k]], 1);
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        numbers[r] = tiles[r]->add(key_of(runs[r].cell));
+        __builtin_prefetch(&tiles[r]->values[numbers[r]], 1);
       }
-      for (std::size_t k = 0; k < block.count; ++k) {
-        const std::size_t i = block.points[k];
-        add_point(tiles[k]->values[numbers[k]], block.at[k], range_of(points, i),
-                  verdicts[i] == PointLabel::kDynamic, scan);
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        Place& place = tiles[r]->values[numbers[r]];
+        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
+          const std::size_t i = located.point(k);
+          add_point(place, range_of(points, i), verdicts[i] == PointLabel::kDynamic, scan);
+          add_sample(place, located, k);
+        }
       }
     });
     free_far(T_world_sensor.translation());
   }
 
-  /// Tests all places around the sensor by a reference scan. `sensor`: m, world frame. `scan`: its
-  /// number; ascending. `test_visibility(points, count)`: see detail::test_visibility(); points
-  /// relative to `sensor`, with the axes of the world frame.
-  template <class TestVisibility>
-  void test(std::uint32_t scan, double time, const Eigen::Vector3d& sensor,
-            TestVisibility&& test_visibility) {
+  /// Begins the test of the places around the sensor by a reference scan. `sensor`: m, world frame.
+  /// `scan`: its number; ascending.
+  void begin_test(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {
     begin_reference(scan, time, sensor);
     free_far(sensor);
-    gather(sensor);
-    if (tested_.empty()) return;
-    const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
-    for (std::size_t i = 0; i < tested_.size(); ++i) {
-      const auto count = visibility.count(begin_[i], begin_[i + 1]);
-      const int verdict =
-          detail::FreeSpaceSum::judge(count.free, count.hit, begin_[i + 1] - begin_[i]);
-      if (verdict == 0) continue;
-      Place& place = *tested_[i];
-      if (place.look_free == 0 && place.look_hit == 0) touched_.push_back(&place);
-      if (verdict < 0) place.present.add(scan);
-      std::uint8_t& number = verdict > 0 ? place.look_free : place.look_hit;
-      if (number < 255) ++number;
-      place.look_range = std::max(place.look_range, ranges_[i]);
+    sensor_ = sensor;
+    around_.clear();
+    next_around_ = 0;
+    tiles_.for_each_index([&](const GroundTile& index) {
+      if (tiles_.distance(index, sensor) > config_.place_range) return;
+      around_.emplace_back(index, &tiles_.at(index));
+    });
+  }
+
+  /// Tests places that no other call has taken, until none is left. Calls with different `part`, 0
+  /// or 1, may run at the same time. `test_visibility(points, count)`: see
+  /// detail::test_visibility(); points relative to the sensor, with the axes of the world frame.
+  template <class TestVisibility>
+  void test(std::size_t part, TestVisibility&& test_visibility) {
+    Tested& tested = tested_[part];
+    for (std::size_t next; (next = next_around_++) < around_.size();) {
+      gather(around_[next].first, *around_[next].second, tested);
+      if (tested.places.empty()) continue;
+      const auto& visibility = test_visibility(tested.samples, std::size_t{tested.begin.back()});
+      for (std::size_t i = 0; i < tested.places.size(); ++i) {
+        const std::uint32_t begin = tested.begin[i], end = tested.begin[i + 1];
+        const auto count = visibility.count(begin, end);
+        const int verdict = detail::FreeSpaceSum::judge(count.free, count.hit, end - begin);
+        if (verdict == 0) continue;
+        Place& place = *tested.places[i];
+        if (place.look_free == 0 && place.look_hit == 0) tested.touched.push_back(&place);
+        if (verdict < 0) place.present.add(look_scans_.back().second);
+        std::uint8_t& number = verdict > 0 ? place.look_free : place.look_hit;
+        if (number < 255) ++number;
+        place.look_range = std::max(place.look_range, tested.ranges[i]);
+      }
     }
   }
 
@@ -150,34 +166,49 @@ class RecordingPlaces {
     find_objects();
   }
 
+  /// Begins a scan: sets `is_near` to 0 for its points (m, sensor frame) whose places, and all that
+  /// touch them, have not changed; to 1 for others. After decide(). Places that are found then are
+  /// valid until the next scan.
+  void begin_scan(PointsView points, const Pose& T_world_sensor,
+                  std::vector<std::uint8_t>& is_near) {
+    free_far(T_world_sensor.translation());
+    changed_.find(points, T_world_sensor, is_near);
+  }
   /// Calls `visit(i, place)` for the points (m, sensor frame) of which `is_taken(i)`; null: no scan
   /// brought a place there.
   template <class IsTaken, class Visitor>
   void for_each_place(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
                       Visitor&& visit) {
-    free_far(T_world_sensor.translation());
-    for_each_block(points, T_world_sensor, is_taken, [&](const Block& block) {
-      std::array<const Tile*, kBlock> tiles;
-      std::array<const Place*, kBlock> places;
-      for (std::size_t k = 0; k < block.count; ++k) {
-        tiles[k] = tiles_.find(block.at[k].tile);
-        if (tiles[k] != nullptr) tiles[k]->numbers.prefetch(block.at[k].key);
+    for_each_located(points, T_world_sensor, is_taken, [&](const LocatedPoints& located) {
+      const Span<const LocatedPoints::Run> runs = located.runs();
+      std::array<const Tile*, LocatedPoints::kMost> tiles;
+      std::array<const Place*, LocatedPoints::kMost> places;
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        tiles[r] = tiles_.find(tile_of(runs[r].cell));
+        if (tiles[r] != nullptr) tiles[r]->numbers.prefetch(key_of(runs[r].cell));
       }
-      for (std::size_t k = 0; k < block.count; ++k) {
-        places[k] = tiles[k] == nullptr ? nullptr : tiles[k]->find(block.at[k].key);
-        __builtin_prefetch(places[k]);
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        places[r] = tiles[r] == nullptr ? nullptr : tiles[r]->find(key_of(runs[r].cell));
+        __builtin_prefetch(places[r]);
       }
-      for (std::size_t k = 0; k < block.count; ++k) visit(block.points[k], places[k]);
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k)
+          visit(located.point(k), places[r]);
+      }
     });
   }
 
-  /// A place that has changed and touches a point (m, world frame), if more such places than ones
-  /// that stay touch it; else null.
-  const Place* changed_beside(const Eigen::Vector3d& point) {
-    const Position at = position_of(point);
+  /// The place in a cell; null: no scan brought a place there.
+  const Place* find(const WorldCell& cell) {
+    const Tile* const tile = tiles_.find(tile_of(cell));
+    return tile == nullptr ? nullptr : tile->find(key_of(cell));
+  }
+  /// A place that has changed and touches a cell, if more such places than ones that stay touch it;
+  /// else null.
+  const Place* changed_beside(const WorldCell& cell) {
     const Place* found = nullptr;
     int majority = 0;
-    for_each_touching(at.tile, at.key, [&](const Member&, const Place& place) {
+    for_each_touching(cell, [&](const Member&, const Place& place) {
       if (place.state == PlaceState::kChanged) found = &place;
       majority += place.state == PlaceState::kChanged ? 1 : 0;
       majority -= place.state == PlaceState::kStays ? 1 : 0;
@@ -216,12 +247,11 @@ class RecordingPlaces {
     tiles_.for_each_index([&](const GroundTile& index) {
       const Tile& tile = *tiles_.find(index);
       for (std::size_t i = 0; i < tile.values.size(); ++i) {
+        const WorldCell cell = cell_of(index, tile.keys[i]);
         Eigen::Vector3d middle;
         for (int axis = 0; axis < 3; ++axis) {
-          const std::int64_t corner = axis < 2 ? index[static_cast<std::size_t>(axis)] : 0;
           middle[axis] =
-              kPlace *
-              (static_cast<double>(corner * kTile + voxel_index(tile.keys[i], axis)) + 0.5);
+              kWorldCell * (static_cast<double>(cell[static_cast<std::size_t>(axis)]) + 0.5);
         }
         visit(middle, tile.values[i]);
       }
@@ -235,40 +265,23 @@ class RecordingPlaces {
   static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
   using Tile = VoxelTile<Place>;
-  struct Position {
-    GroundTile tile;
-    VoxelKey key;  // of the place in the tile
-    std::size_t octant;
-    std::array<std::uint8_t, 3> within;
-  };
-  // Points that are worked on together: the memory of their places is fetched at once.
-  static constexpr std::size_t kBlock = 32;
-  struct Block {
-    std::size_t count = 0;
-    std::array<std::size_t, kBlock> points;
-    std::array<Position, kBlock> at;
+  /// What one thread tests.
+  struct Tested {
+    std::vector<Place*> touched;       // by the open look
+    std::vector<Place*> places;        // of a tile
+    std::vector<std::uint8_t> ranges;  // m, by place
+    std::vector<std::uint32_t> begin;  // by place: first sample, and the end
+    PointBuffer samples;
   };
 
   static std::uint8_t whole_metres(float metres) {
     return static_cast<std::uint8_t>(std::min(metres, 255.0F));
   }
 
-  static Position position_of(const Eigen::Vector3d& point) {
-    Position position;
-    std::array<std::int64_t, 3> index;
-    position.octant = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double places = point[axis] / kPlace;
-      const double whole = std::floor(places);
-      index[static_cast<std::size_t>(axis)] = static_cast<std::int64_t>(whole);
-      const auto part = static_cast<std::uint32_t>(std::min(255.0, 256.0 * (places - whole)));
-      position.within[static_cast<std::size_t>(axis)] = static_cast<std::uint8_t>(part);
-      position.octant |= static_cast<std::size_t>(part >> 7U) << axis;
-    }
-    // Arithmetic shifts and masks are floor division and remainder.
-    position.tile = {index[0] >> 6, index[1] >> 6};
-    position.key = voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]);
-    return position;
+  // The cell with this key in a tile.
+  static WorldCell cell_of(const GroundTile& tile, VoxelKey key) {
+    return {tile[0] * kTileCells + voxel_index(key, 0), tile[1] * kTileCells + voxel_index(key, 1),
+            voxel_index(key, 2)};
   }
 
   // Horizontal, m.
@@ -276,35 +289,25 @@ class RecordingPlaces {
     return std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
   }
 
-  // Calls `visit(block)` for the points of which `is_taken(i)`.
-  template <class IsTaken, class Visitor>
-  void for_each_block(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
-                      Visitor&& visit) const {
-    Block block;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!is_taken(i)) continue;
-      block.points[block.count] = i;
-      block.at[block.count++] = position_of(world_point(points, i, T_world_sensor));
-      if (block.count < kBlock) continue;
-      visit(block);
-      block.count = 0;
-    }
-    visit(block);
-  }
-
   // Adds a point of a scan. `range`: m. The first verdicts on points that are too far for looks say
   // little of their place.
-  void add_point(Place& place, const Position& at, float range, bool is_removed,
-                 std::uint32_t scan) const {
+  void add_point(Place& place, float range, bool is_removed, std::uint32_t scan) const {
     if (!is_removed) place.present.add(scan);
     if (range <= config_.place_range) {
       place.first.add(is_removed, epoch_, scan);
       place.farthest = std::max(place.farthest, std::max(whole_metres(range), std::uint8_t{1}));
     }
-    const auto bit = static_cast<std::uint8_t>(1U << at.octant);
+  }
+
+  // The first point of an octant is its sample.
+  static void add_sample(Place& place, const LocatedPoints& located, std::size_t k) {
+    const std::array<std::uint8_t, 3> within = {located.within(0, k), located.within(1, k),
+                                                located.within(2, k)};
+    const std::size_t octant = within[0] >> 7U | within[1] >> 7U << 1U | within[2] >> 7U << 2U;
+    const auto bit = static_cast<std::uint8_t>(1U << octant);
     if ((place.filled & bit) != 0) return;
     place.filled = static_cast<std::uint8_t>(place.filled | bit);
-    place.samples[at.octant] = at.within;
+    place.samples[octant] = within;
   }
 
   // Places of the open look stay in memory.
@@ -331,7 +334,11 @@ class RecordingPlaces {
     if (look_scans_.empty()) return;
     const auto look =
         static_cast<std::uint16_t>(std::min<std::size_t>(look_scans_.size() - 1, UINT16_MAX));
-    for (Place* const place : touched_) {
+    for (Tested& tested : tested_) end_look(tested, look);
+  }
+
+  void end_look(Tested& tested, std::uint16_t look) const {
+    for (Place* const place : tested.touched) {
       if (place->look_hit > 0) {
         const bool is_hit = place->look_hit >= place->look_free;
         if (is_hit && place->hits < 255) ++place->hits;
@@ -355,7 +362,7 @@ class RecordingPlaces {
       }
       place->look_free = place->look_hit = place->look_range = 0;
     }
-    touched_.clear();
+    tested.touched.clear();
   }
 
   // Begins an epoch unless the sensor is near that of the open one.
@@ -412,6 +419,9 @@ class RecordingPlaces {
 
   // A place of a tile.
   using Member = std::pair<GroundTile, std::uint32_t>;
+  WorldCell cell_of(const Member& member) {
+    return cell_of(member.first, tiles_.find(member.first)->keys[member.second]);
+  }
   const Place& at(const Member& member) { return tiles_.find(member.first)->values[member.second]; }
   Place& change(const Member& member) { return tiles_.at(member.first).values[member.second]; }
 
@@ -438,6 +448,7 @@ class RecordingPlaces {
           Place& place = change(member);
           place.object = number;
           place.state = PlaceState::kChanged;
+          if (is_object) changed_.mark(cell_of(member));
         }
         if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
       }
@@ -471,30 +482,21 @@ class RecordingPlaces {
            static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(passed);
   }
 
-  // Calls `visit(member, place)` for a place of a tile, if it is there, and for those that touch
-  // it.
+  // Calls `visit(member, place)` for the places in a cell and in those that touch it.
   template <class Visitor>
-  void for_each_touching(const GroundTile& tile, VoxelKey key, Visitor&& visit) {
+  void for_each_touching(const WorldCell& cell, Visitor&& visit) {
     for (int n = 0; n < 27; ++n) {
-      std::array<std::int64_t, 3> index;
-      for (int axis = 0; axis < 3; ++axis) {
-        const int step = (axis == 0 ? n : axis == 1 ? n / 3 : n / 9) % 3 - 1;
-        index[static_cast<std::size_t>(axis)] = voxel_index(key, axis) + step;
-      }
-      const GroundTile beside = {tile[0] + (index[0] >> 6), tile[1] + (index[1] >> 6)};
-      const Tile* const places = tiles_.find(beside);
-      if (places == nullptr) continue;
-      const std::uint32_t number =
-          places->numbers.find(voxel_key(index[0] & (kTile - 1), index[1] & (kTile - 1), index[2]));
-      if (number != kNone) visit(Member{beside, number}, places->values[number]);
+      const WorldCell beside = {cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 - 1};
+      const Tile* const tile = tiles_.find(tile_of(beside));
+      const std::uint32_t number = tile == nullptr ? kNone : tile->numbers.find(key_of(beside));
+      if (number != kNone) visit(Member{tile_of(beside), number}, tile->values[number]);
     }
   }
 
   // Adds the changed places that touch a member to its component, and those that stay to
   // `contacts`.
   void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
-    const VoxelKey key = tiles_.find(member.first)->keys[member.second];
-    for_each_touching(member.first, key, [&](const Member& beside, const Place& place) {
+    for_each_touching(cell_of(member), [&](const Member& beside, const Place& place) {
       const bool joins = place.first.moved() || has_changed_by_any(place);
       if (!joins && place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(beside);
       if (!joins || place.object != 0) return;
@@ -503,49 +505,47 @@ class RecordingPlaces {
     });
   }
 
-  // Collects the samples of the places that are near the sensor.
-  void gather(const Eigen::Vector3d& sensor) {
-    tested_.clear();
-    ranges_.clear();
-    begin_.assign(1, 0);
+  // Collects the samples of the places of a tile that are near the sensor.
+  void gather(const GroundTile& index, Tile& tile, Tested& tested) const {
+    tested.places.clear();
+    tested.ranges.clear();
+    tested.begin.assign(1, 0);
     const auto range = static_cast<float>(config_.place_range);
-    constexpr auto kStep = static_cast<float>(kPlace / 256.0);
-    tiles_.for_each_index([&](const GroundTile& index) {
-      if (tiles_.distance(index, sensor) > config_.place_range) return;
-      Tile& tile = tiles_.at(index);
-      const Eigen::Vector3f corner =
-          (kPlace * static_cast<double>(kTile) *
-               Eigen::Vector3d(static_cast<double>(index[0]), static_cast<double>(index[1]), 0.0) -
-           sensor)
-              .cast<float>();
-      for (std::size_t i = 0; i < tile.values.size(); ++i) {
-        const VoxelKey key = tile.keys[i];
-        const auto at = [&](int axis) {
-          return corner[axis] +
-                 static_cast<float>(kPlace) * static_cast<float>(voxel_index(key, axis));
-        };
-        const float x = at(0), y = at(1), z = at(2);
-        const float metres = std::sqrt(x * x + y * y);
-        if (metres > range) continue;
-        Place& place = tile.values[i];
-        std::uint32_t count = begin_.back();
-        samples_.grow(count + 8 + detail::kPackWidth);
-        detail::for_each_bit(place.filled, [&](std::size_t octant) {
-          const std::array<std::uint8_t, 3>& within = place.samples[octant];
-          samples_.x[count] = x + kStep * (static_cast<float>(within[0]) + 0.5F);
-          samples_.y[count] = y + kStep * (static_cast<float>(within[1]) + 0.5F);
-          samples_.z[count] = z + kStep * (static_cast<float>(within[2]) + 0.5F);
-          ++count;
-        });
-        tested_.push_back(&place);
-        ranges_.push_back(whole_metres(metres));
-        begin_.push_back(count);
-      }
-    });
+    constexpr auto kStep = static_cast<float>(kWorldCell / 256.0);
+    const Eigen::Vector3f corner =
+        (kTileEdge *
+             Eigen::Vector3d(static_cast<double>(index[0]), static_cast<double>(index[1]), 0.0) -
+         sensor_)
+            .cast<float>();
+    PointBuffer& samples = tested.samples;
+    for (std::size_t i = 0; i < tile.values.size(); ++i) {
+      const VoxelKey key = tile.keys[i];
+      const auto at = [&](int axis) {
+        return corner[axis] +
+               static_cast<float>(kWorldCell) * static_cast<float>(voxel_index(key, axis));
+      };
+      const float x = at(0), y = at(1), z = at(2);
+      const float metres = std::sqrt(x * x + y * y);
+      if (metres > range) continue;
+      Place& place = tile.values[i];
+      std::uint32_t count = tested.begin.back();
+      samples.grow(count + 8 + detail::kPackWidth);
+      detail::for_each_bit(place.filled, [&](std::size_t octant) {
+        const std::array<std::uint8_t, 3>& within = place.samples[octant];
+        samples.x[count] = x + kStep * (static_cast<float>(within[0]) + 0.5F);
+        samples.y[count] = y + kStep * (static_cast<float>(within[1]) + 0.5F);
+        samples.z[count] = z + kStep * (static_cast<float>(within[2]) + 0.5F);
+        ++count;
+      });
+      tested.places.push_back(&place);
+      tested.ranges.push_back(whole_metres(metres));
+      tested.begin.push_back(count);
+    }
   }
 
   RecordingPlacesConfig config_;
   PagedTiles<Tile> tiles_;
+  MarkedColumns changed_;
   std::uint32_t objects_ = 0;
 
   std::uint16_t epoch_ = 0;
@@ -555,12 +555,11 @@ class RecordingPlaces {
   Eigen::Vector3d look_at_ = Eigen::Vector3d::Zero();  // m, sensor at the begin of the look
   double look_time_ = 0.0;                             // s
   std::vector<std::pair<std::uint32_t, std::uint32_t>> look_scans_;  // first and last, by look
-  std::vector<Place*> touched_;                                      // by the open look
 
-  std::vector<Place*> tested_;
-  std::vector<std::uint8_t> ranges_;  // m, by tested place
-  std::vector<std::uint32_t> begin_;  // by tested place: first sample, and the end
-  PointBuffer samples_;
+  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, of the reference
+  std::vector<std::pair<GroundTile, Tile*>> around_;  // to be tested
+  std::atomic<std::size_t> next_around_{0};           // the next one
+  std::array<Tested, 2> tested_;                      // by part
 };
 
 }  // namespace dynains

@@ -9,6 +9,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/recording/ground.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
+#include "dynains/recording/world_cells.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -24,9 +25,19 @@ class RestoredGround {
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     ground_.add(points, verdicts, T_world_sensor);
   }
-  /// Whether a point (m, world frame) is 10 cm or more above the ground of the recording: a tyre or
-  /// a bumper that a scan took for ground.
-  bool rises(const Eigen::Vector3d& point);
+  /// Calls `visit(i, cell)` for the points (m, sensor frame) of which `is_taken(i)` that are 10 cm
+  /// or more above the ground of the recording: a tyre or a bumper that a scan took for ground.
+  template <class IsTaken, class Visitor>
+  void for_each_rising(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
+                       Visitor&& visit) {
+    // m, more than a pose that is off by 0.1 deg moves ground 50 m away
+    constexpr double kRise = 0.10;
+    for_each_located(points, T_world_sensor, is_taken, [&](const LocatedPoints& located) {
+      ground_.for_each_rise(located, [&](std::size_t k, double rise) {
+        if (rise >= kRise) visit(located.point(k), cell_at(located.at(k)));
+      });
+    });
+  }
   /// Restores points of a scan. Returns their number.
   std::size_t restore(PointsView points, const Pose& T_world_sensor, VerdictArrays& verdict);
 

@@ -32,7 +32,7 @@ struct SecondPassConfig {
     visitor(Parameter{"memory", self.memory, closed(0, 1e6), "MB",
                       "places and ground in memory, if those around the sensor take less"});
     visitor(Parameter{"threads", self.threads, closed(1, 2), "",
-                      "2: references are unpacked by a second thread"});
+                      "2: a second thread tests places, too"});
   }
 
   /// Throws ConfigError.
@@ -132,10 +132,17 @@ class SecondPass {
 
   void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
-  const Place* changed_at_ground(std::size_t point, const Place* place, const Pose& T_world_sensor);
+  const Place* changed_at_ground(const WorldCell& cell);
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
   void restore(std::size_t point, VerdictArrays& verdict);
+  void remove(std::size_t point, VerdictArrays& verdict);
+  void put(std::size_t point, const Place& place) {
+    place_of_[point] = &place;
+    placed_.push_back(point);
+  }
+  void find_places(std::uint32_t number, const Pose& T_world_sensor, VerdictArrays& verdict);
+  void find_other_places(const Pose& T_world_sensor, const VerdictArrays& verdict);
   void remove_objects(std::uint32_t number, const Pose& T_world_sensor, VerdictArrays& verdict);
   void choose_instances(std::uint32_t number, const VerdictArrays& verdict);
   void find_instances(std::uint32_t number, const Pose& T_world_sensor,
@@ -153,7 +160,9 @@ class SecondPass {
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
   PointsView points_;                      // of the scan that is revised
-  std::vector<const Place*> place_of_;     // by point; null: none, or nothing is known of it
+  std::vector<const Place*> place_of_;     // by point; null: none, or it does not matter
+  std::vector<std::size_t> placed_;        // points with a place
+  std::vector<std::uint8_t> is_near_;      // what has changed; by point
   std::vector<std::uint8_t> is_restored_;  // by point
   InstanceNumbers numbers_;                // of instances in the scan that may leave
   std::vector<Instance> instances_;        // by number
