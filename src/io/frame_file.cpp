@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t kLargest = 64U << 20U;  // bytes
 constexpr std::size_t kDeepest = 64;             // nested elements; libraries are slow beyond
 
-std::string read_whole(const fs::path& path) {
+[[maybe_unused]] std::string read_whole(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) fail(path, "cannot be opened");
   std::error_code error;
@@ -39,14 +39,15 @@ std::string read_whole(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-detail::Quaternion of_angles(double roll, double pitch, double yaw) {
+[[maybe_unused]] detail::Quaternion of_angles(double roll, double pitch, double yaw) {
   return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
          Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
 /// Adds a transform that a file has at `line`.
-void add(const fs::path& path, std::uint64_t line, const StampedPose& pose, TransformTree& tree) {
+[[maybe_unused]] void add(const fs::path& path, std::uint64_t line, const StampedPose& pose,
+                          TransformTree& tree) {
   if (pose.frame.empty() || pose.child.empty() || pose.frame == pose.child) {
     fail_at_line(path, line, "expected the names of two frames");
   }
