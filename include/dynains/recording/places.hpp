@@ -303,7 +303,10 @@ class RecordingPlaces {
   static void add_sample(Place& place, const LocatedPoints& located, std::size_t k) {
     const std::array<std::uint8_t, 3> within = {located.within(0, k), located.within(1, k),
                                                 located.within(2, k)};
-    const std::size_t octant = within[0] >> 7U | within[1] >> 7U << 1U | within[2] >> 7U << 2U;
+    std::size_t octant = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      octant |= static_cast<std::size_t>(within[axis] >> 7U) << axis;
+    }
     const auto bit = static_cast<std::uint8_t>(1U << octant);
     if ((place.filled & bit) != 0) return;
     place.filled = static_cast<std::uint8_t>(place.filled | bit);
