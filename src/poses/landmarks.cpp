@@ -20,11 +20,11 @@ std::int64_t floored(double value) {
   return number - (static_cast<double>(number) > value ? 1 : 0);
 }
 
-/// Number of a cell of a grid around the sensor, in the order of x, y and z.
-std::uint64_t cell_of(const Eigen::Vector3d& p, double per_metre) {
+/// Number of a cell with this edge, m, of a grid around the sensor, in the order of x, y and z.
+std::uint64_t cell_of(const Eigen::Vector3d& p, double edge) {
   std::uint64_t key = 0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    key = key << 16U | static_cast<std::uint64_t>(floored(p[axis] * per_metre) + 4096);
+    key = key << 16U | static_cast<std::uint64_t>(floored(p[axis] / edge) + 4096);
   }
   return key;
 }
@@ -41,7 +41,7 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthes
       columns_(4 * static_cast<std::size_t>(half_) * static_cast<std::size_t>(half_)) {
   constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
-  constexpr double kPerMetre = 4.0;    // voxels
+  constexpr double kVoxel = 0.25;      // m
   struct Kept {                        // the first point of each voxel
     std::uint64_t cell, voxel;
     Eigen::Vector3d point;
@@ -53,9 +53,9 @@ Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthes
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    const std::uint64_t voxel = cell_of(p, kPerMetre);
+    const std::uint64_t voxel = cell_of(p, kVoxel);
     const bool is_first = occupied.insert(voxel) + 1 > kept.size();
-    if (is_first) kept.push_back({cell_of(p, 1.0 / kCell), voxel, p});
+    if (is_first) kept.push_back({cell_of(p, kCell), voxel, p});
   }
   std::sort(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.voxel < b.voxel;

@@ -49,7 +49,7 @@ class BeamSharpness {
       : points_(std::move(points)), bins_(points_.size() + detail::kMaxPackWidth) {}
 
   double at(const Eigen::Vector3d& origin) {
-    for_rays(points_, origin, [&](auto at, auto&, auto&, auto&, auto& range, auto elevation) {
+    for_rays(points_, origin, [&](auto at, auto&, auto&, auto&, const auto& range, auto elevation) {
       static constexpr detail::PackConstant kLowest(90.5F), kPerDegree(kBinsPerDegree),
           kLeast(kNearest), kMost(kFarthest);
       const auto bin = truncate((elevation + kLowest) * kPerDegree);
