@@ -95,6 +95,7 @@ std::vector<Landmarks> landmarks_of(const Recording& recording,
                                     const std::vector<std::size_t>& scans,
                                     const Mounting& mounting) {
   std::vector<Landmarks> result;
+  result.reserve(scans.size());
   for (const std::size_t i : scans) {
     result.emplace_back(finite_points(recording.read_scan(i)), mounting);
   }
@@ -194,7 +195,7 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
   constexpr double kDistinct = 0.1;  // m at points 10 m away
   constexpr double kClearly = 0.02;  // share of a gap
   constexpr double kHopeless = 1.2;  // ratio of gaps, of a few points
-  constexpr std::size_t kFewPoints = 75;
+  constexpr std::size_t kPointsAtFirst = 75;
   const std::size_t merged = scans_to_merge(recording);
   if (recording.size() < 2) return false;
   const auto starts = starts_between(recording, 0, recording.size() - 1, merged);
@@ -220,7 +221,7 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
     const PoseConvention& convention = readings[i].convention;
     if (difference_from_given(places, recording, convention) < kDistinct) return true;
     const PoseOfScan pose_of = poses_under(recording, convention);
-    return agreement_of(places, pose_of, kFewPoints).gap > kHopeless * given.gap ||
+    return agreement_of(places, pose_of, kPointsAtFirst).gap > kHopeless * given.gap ||
            agreement_of(places, pose_of).gap > (1.0 - kClearly) * given.gap;
   });
   return std::find(are_worse.begin(), are_worse.end(), false) == are_worse.end();
