@@ -27,8 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kLargest = 64U << 20U;  // bytes
-constexpr std::size_t kDeepest = 64;             // nested elements; libraries are slow beyond
+constexpr std::uintmax_t kLargest = 64U << 20U;        // bytes
+[[maybe_unused]] constexpr std::size_t kDeepest = 64;  // nested elements; libraries are slow beyond
 
 [[maybe_unused]] std::string read_whole(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
