@@ -7,6 +7,10 @@
 
 namespace dynains {
 
+/// Ratio of the gaps of two readings by a few points from which on the larger one is not measured
+/// by all points.
+inline constexpr double kHopeless = 1.2;
+
 /// Mean of agreements, weighted by their points.
 class AgreementSum {
  public:

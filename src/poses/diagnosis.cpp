@@ -271,7 +271,6 @@ bool is_best(const Diagnosis& d) {
 /// Computes the agreement of `pairs` under the poses and under common mistakes.
 void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
              Diagnosis& d) {
-  constexpr double kHopeless = 1.2;  // ratio of gaps, of a few points
   d.stride = stride;
   d.standing = standing_agreement(pairs);
   d.as_given = agreement_under(recording.convention(), recording, pairs);

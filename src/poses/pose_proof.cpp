@@ -194,7 +194,6 @@ bool agrees_best(const Recording& recording, const std::vector<PoseReading>& rea
   constexpr std::size_t kEvenPlaces = 4;
   constexpr double kDistinct = 0.1;  // m at points 10 m away
   constexpr double kClearly = 0.02;  // share of a gap
-  constexpr double kHopeless = 1.2;  // ratio of gaps, of a few points
   constexpr std::size_t kPointsAtFirst = 75;
   const std::size_t merged = scans_to_merge(recording);
   if (recording.size() < 2) return false;

@@ -17,7 +17,7 @@ std::optional<double> rise_of(RecordingGround& ground, const std::array<float, 3
   located.add(0, at);
   located.locate(Pose::Identity());
   std::optional<double> found;
-  ground.for_each_rise(located, [&](std::size_t, double rise) { found = rise; });
+  ground.for_each_rise(located, [&](std::size_t, const WorldCell&, double rise) { found = rise; });
   return found;
 }
 

@@ -46,8 +46,8 @@ class RecordingGround {
     tiles_.free_far(sensor, kNear);
   }
 
-  /// Calls `visit(k, rise)` for the located points in cells where the recording has 20 points of
-  /// the ground or more. `rise`: m above the ground in the cell.
+  /// Calls `visit(k, cell, rise)` for the located points in cells where the recording has 20 points
+  /// of the ground or more. `rise`: m above the ground in the cell.
   template <class Visitor>
   void for_each_rise(const LocatedPoints& located, Visitor&& visit) {
     const Span<const LocatedPoints::Run> runs = located.runs();
@@ -60,7 +60,7 @@ class RecordingGround {
       if (!has_ground(cells[r])) continue;
       const double height = cells[r]->height();
       for (std::size_t k = runs[r].begin; k < runs[r].end; ++k)
-        visit(k, located.at(k).z() - height);
+        visit(k, runs[r].cell, located.at(k).z() - height);
     }
   }
 

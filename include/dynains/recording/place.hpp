@@ -63,7 +63,6 @@ struct FirstVerdicts {
   std::uint16_t kept = 0, removed = 0;          ///< points in the open epoch
   std::uint8_t removed_first = 0;               ///< epochs that only removed, before all others
   std::uint8_t removed_last = 0;                ///< the same, after all others
-  bool any_kept = false, any_removed = false;   ///< whether any epoch kept or removed points
   bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept most points
   bool all_first = false, all_last = false;     ///< the first, the last epoch kept all points
   std::uint32_t sum_kept = 0, sum_removed = 0;  ///< points in the closed epochs
@@ -71,7 +70,7 @@ struct FirstVerdicts {
 
   /// Adds a point. Epochs and scans ascend.
   void add(bool is_removed, std::uint16_t of_epoch, std::uint32_t scan) {
-    const bool is_first = kept + removed == 0 && !any_kept && !any_removed;
+    const bool is_first = kept + removed == 0 && !any_kept() && !any_removed();
     if (is_first) first_scan = scan;
     if (of_epoch != epoch) end_epoch();
     epoch = of_epoch;
@@ -85,23 +84,24 @@ struct FirstVerdicts {
     const bool only_removed = kept == 0;
     kept_last = is_mostly_kept(kept, removed);
     all_last = removed == 0;
-    if (!any_kept && !any_removed) {
+    if (!any_kept() && !any_removed()) {
       kept_first = kept_last;
       all_first = all_last;
     }
-    sum_kept += kept;
-    sum_removed += removed;
-    if (only_removed && !any_kept && removed_first < UINT8_MAX) ++removed_first;
+    if (only_removed && !any_kept() && removed_first < UINT8_MAX) ++removed_first;
     if (!only_removed) {
       removed_last = 0;
     } else if (removed_last < UINT8_MAX) {
       ++removed_last;
     }
-    any_kept = any_kept || kept > 0;
-    any_removed = any_removed || removed > 0;
+    sum_kept += kept;
+    sum_removed += removed;
     kept = removed = 0;
   }
 
+  /// Whether any closed epoch kept, removed points.
+  bool any_kept() const { return sum_kept > 0; }
+  bool any_removed() const { return sum_removed > 0; }
   /// Whether twice as many points were kept as removed.
   static bool is_mostly_kept(std::uint32_t kept, std::uint32_t removed) {
     return kept >= 2 * removed;
@@ -112,7 +112,7 @@ struct FirstVerdicts {
            ((all_first && all_last) || is_mostly_kept(sum_kept, sum_removed));
   }
   /// Whether the first or the last two epochs removed all points, and others did not.
-  bool moved() const { return any_kept && (removed_first >= 2 || removed_last >= 2); }
+  bool moved() const { return any_kept() && (removed_first >= 2 || removed_last >= 2); }
 };
 
 /// A cube of 0.4 m. What a scan of the first pass changes lies in one line of the cache.
@@ -138,12 +138,12 @@ struct alignas(64) RecordingPlace {
   bool was_passed() const { return longest.back() > 0; }
   /// Whether looks of a class of ranges passed it before the first pass saw something move into it.
   bool came(std::size_t range) const {
-    return first.any_kept && first.removed_first > 0 && (free_before >> range & 1U) != 0;
+    return first.any_kept() && first.removed_first > 0 && (free_before >> range & 1U) != 0;
   }
   /// Whether looks of a class of ranges passed it after the first pass saw something move out of
   /// it.
   bool left(std::size_t range) const {
-    return first.any_kept && first.removed_last > 0 && (free_after >> range & 1U) != 0;
+    return first.any_kept() && first.removed_last > 0 && (free_after >> range & 1U) != 0;
   }
   /// Whether what a scan measured in it is there in the end of the recording.
   bool stands_since(std::uint32_t scan) const {
@@ -153,7 +153,7 @@ struct alignas(64) RecordingPlace {
   /// at both ends, and at least twice as many looks hit the place as passed it in a row.
   bool stands() const {
     constexpr int kFewestHits = 2;
-    return first.any_removed && first.are_kept() && hits >= kFewestHits &&
+    return first.any_removed() && first.are_kept() && hits >= kFewestHits &&
            hits >= 2 * longest.back();
   }
 };

@@ -265,7 +265,7 @@ class RecordingPlaces {
   static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
   using Tile = VoxelTile<Place>;
-  /// What one thread tests.
+  /// Places of one tile that a thread tests, and those that it saw in the open look.
   struct Tested {
     std::vector<Place*> touched;       // by the open look
     std::vector<Place*> places;        // of a tile
@@ -476,9 +476,9 @@ class RecordingPlaces {
       const Place& place = at(member);
       const bool is_passed = has_changed_by_any(place);
       changed += place.state == PlaceState::kChanged ? 1 : 0;
-      kept += place.first.any_kept ? 1 : 0;
+      kept += place.first.any_kept() ? 1 : 0;
       passed += is_passed ? 1 : 0;
-      passed_kept += is_passed && place.first.any_kept ? 1 : 0;
+      passed_kept += is_passed && place.first.any_kept() ? 1 : 0;
     }
     const bool is_kept_part_passed = kept < fewest || 10 * passed_kept >= kept;
     return changed >= fewest && 3 * passed >= members.size() && is_kept_part_passed &&

@@ -33,8 +33,8 @@ class RestoredGround {
     // m, more than a pose that is off by 0.1 deg moves ground 50 m away
     constexpr double kRise = 0.10;
     for_each_located(points, T_world_sensor, is_taken, [&](const LocatedPoints& located) {
-      ground_.for_each_rise(located, [&](std::size_t k, double rise) {
-        if (rise >= kRise) visit(located.point(k), cell_at(located.at(k)));
+      ground_.for_each_rise(located, [&](std::size_t k, const WorldCell& cell, double rise) {
+        if (rise >= kRise) visit(located.point(k), cell);
       });
     });
   }
