@@ -16,7 +16,6 @@ constexpr float kChangedRatio = 0.25F;       // of the known points of an instan
 constexpr float kLowChangedRatio = 0.2F;     // of those in its lower half: panes are higher
 constexpr float kLeastChangedRatio = 0.15F;  // of all known ones
 constexpr float kLargeChangedRatio = 0.5F;   // of a larger instance
-constexpr std::uint32_t kIndependent = 30;   // scans, which the first pass looks ahead
 constexpr float kBelief = 0.95F;             // of points that the second pass removes
 constexpr float kRestoredBelief = 0.5F;      // of objects that it brings back
 constexpr double kPlaceShare = 0.75;         // of the memory; the rest is for the ground
@@ -321,7 +320,7 @@ ScanSpan SecondPass::absence(std::uint32_t number, const Seen* begin, const Seen
   const std::uint32_t newest = scans_ - 1;
   // The first pass has compared scans that are closer in time.
   const std::uint32_t scans = std::min(span.last, newest) - std::min(span.first, newest);
-  return scans >= kIndependent ? span : ScanSpan();
+  return scans >= kIndependentScans ? span : ScanSpan();
 }
 
 void SecondPass::judge(std::uint32_t number, const Seen* begin, const Seen* end) {

@@ -64,6 +64,20 @@ TEST_CASE("two looks hit a place that stands, and twice as many as passed it in 
   CHECK(stands("krk", 4, 2));
 }
 
+TEST_CASE("what is always there was measured long enough, and few looks in a row passed it") {
+  const auto is_always_there = [](const std::string& epochs, std::uint32_t scans, int passed) {
+    RecordingPlace place = judged(epochs);
+    place.first.last_scan = place.first.first_scan + scans - 1;
+    place.longest.back() = static_cast<std::uint8_t>(passed);
+    return place.is_always_there();
+  };
+  CHECK(is_always_there("rrrr", 30, 1));
+  CHECK_FALSE(is_always_there("rrr", 30, 0));
+  CHECK_FALSE(is_always_there("rrrr", 29, 1));
+  CHECK_FALSE(is_always_there("rrrr", 30, 2));
+  CHECK(is_always_there("rrrrrrrr", 30, 2));
+}
+
 TEST_CASE("two epochs that removed all points at one end tell of motion") {
   for (const char* const epochs : {"rrk", "krr", "rrbk", "kbrr", "krkrr"}) {
     CAPTURE(epochs);

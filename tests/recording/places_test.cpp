@@ -42,13 +42,13 @@ class Recorder {
     const Eigen::Vector3d at(static_cast<double>(sensor_x), 0.0, 0.0);
     places.add(points, labels, causes, Pose(Eigen::Translation3d(at)), time_, scan_);
   }
-  /// The first pass judges the points of places in each of these scans, 1 s apart, and those of as
-  /// many places beside them.
+  /// The first pass judges the points of places in each of these scans, `step_of_scans` scans and
+  /// seconds apart, and those of as many places beside them.
   void judge(std::uint32_t first, const std::vector<PointLabel>& verdicts, int count = 6,
-             const std::vector<PointLabel>& beside = {}) {
-    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+             const std::vector<PointLabel>& beside = {}, std::uint32_t step_of_scans = 1) {
+    for (std::size_t i = 0; i < verdicts.size(); ++i, first += step_of_scans) {
       scan_ = first;
-      time_ = first++;
+      time_ = first;
       measure(count, 0, 10.1F, verdicts[i]);
       if (!beside.empty()) measure(count, count, 10.1F, beside[i]);
     }
@@ -408,6 +408,39 @@ TEST_CASE("places beside those that changed join them, if enough looks passed fr
       CHECK(recorder.changed() == (joins ? 70U : 6U));
     }
   }
+}
+
+/// A row of places in which the first pass kept one epoch, and others beside it that looks passed.
+struct AlwaysThere {
+  int places = 20, beside = 6;
+  std::size_t epochs = 10;
+
+  std::size_t standing() const {
+    Recorder recorder;
+    std::vector<PointLabel> verdicts(epochs, kRemoved);
+    verdicts[1] = kKept;
+    recorder.judge(0, verdicts, places, {}, 10);
+    recorder.measure(beside, 0, 10.5F);
+    recorder.look_by([](const Eigen::Vector3d& at) {
+      return at.x() < 10.4 ? BeamResult::kHit : BeamResult::kFree;
+    });
+    CHECK(recorder.changed() == 0);
+    std::size_t count = 0;
+    recorder.places.for_each([&](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+      if (place.stands()) ++count;
+    });
+    return count;
+  }
+};
+
+TEST_CASE(
+    "what is always there stands if it is large and kept, and looks passed little beside it") {
+  CHECK(AlwaysThere{}.standing() == 20);
+  CHECK(AlwaysThere{19, 5, 10}.standing() == 0);
+  CHECK(AlwaysThere{20, 7, 10}.standing() == 0);
+  CHECK(AlwaysThere{20, 6, 11}.standing() == 0);
+  CHECK(AlwaysThere{24, 7, 4}.standing() == 24);
+  CHECK(AlwaysThere{24, 7, 3}.standing() == 0);
 }
 
 TEST_CASE("a point touches what changed, if fewer places beside it stay") {

@@ -20,6 +20,9 @@ struct ScanSpan {
   std::uint32_t first = 0, last = UINT32_MAX;
 };
 
+/// The first pass compares scans that are closer in time.
+inline constexpr std::uint32_t kIndependentScans = 30;
+
 /// Scans in which something was in a place: 64 slices of time, which double when the recording
 /// gets longer.
 class Presence {
@@ -63,6 +66,7 @@ struct FirstVerdicts {
   std::uint16_t kept = 0, removed = 0;          ///< points in the open epoch
   std::uint8_t removed_first = 0;               ///< epochs that only removed, before all others
   std::uint8_t removed_last = 0;                ///< the same, after all others
+  std::uint8_t epochs = 0;                      ///< closed ones
   bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept most points
   bool all_first = false, all_last = false;     ///< the first, the last epoch kept all points
   std::uint32_t sum_kept = 0, sum_removed = 0;  ///< points in the closed epochs
@@ -82,6 +86,7 @@ struct FirstVerdicts {
   void end_epoch() {
     if (kept + removed == 0) return;
     const bool only_removed = kept == 0;
+    if (epochs < UINT8_MAX) ++epochs;
     kept_last = is_mostly_kept(kept, removed);
     all_last = removed == 0;
     if (!any_kept() && !any_removed()) {
@@ -127,7 +132,7 @@ struct alignas(64) RecordingPlace {
   PlaceState state = PlaceState::kUnknown;
   std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look
   std::uint8_t hits = 0;                                     ///< looks
-  bool was_free = false;                                     ///< some look passed it
+  bool stands_with_others = false;                           ///< part of an object that stands
   bool is_hit_at_last = false;                   ///< by the last look that passed or hit it
   std::uint8_t free_before = 0, free_after = 0;  ///< before, after any scan measured it; by range
   std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
@@ -149,10 +154,19 @@ struct alignas(64) RecordingPlace {
   bool stands_since(std::uint32_t scan) const {
     return is_hit_at_last && first.removed_last == 0 && scan > last_free;
   }
-  /// Whether the first pass removed points of something that stands: it kept most of them or all
-  /// at both ends, and at least twice as many looks hit the place as passed it in a row.
+  /// Whether scans of several epochs, independent ones among them, measured it, and few looks in a
+  /// row passed it.
+  bool is_always_there() const {
+    constexpr int kFewestEpochs = 4;
+    return first.epochs >= kFewestEpochs && 4 * longest.back() <= first.epochs &&
+           first.last_scan - first.first_scan + 1 >= kIndependentScans;
+  }
+  /// Whether the first pass removed points of something that stands: of an object that is always
+  /// there, or it kept most of them or all at both ends, and at least twice as many looks
+  /// hit the place as passed it in a row.
   bool stands() const {
     constexpr int kFewestHits = 2;
+    if (stands_with_others) return true;
     return first.any_removed() && first.are_kept() && hits >= kFewestHits &&
            hits >= 2 * longest.back();
   }

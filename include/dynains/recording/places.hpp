@@ -164,6 +164,7 @@ class RecordingPlaces {
       tiles_.free_far(tiles_.middle(index), 0.0);
     });
     find_objects();
+    find_standing();
   }
 
   /// Begins a scan: sets `is_near` to 0 for its points (m, sensor frame) whose places, and all that
@@ -349,7 +350,6 @@ class RecordingPlaces {
         place->is_hit_at_last = true;
         place->run = {};
       } else {
-        place->was_free = true;
         place->is_hit_at_last = false;
         place->last_free = look_scans_.back().second;
         const auto [first, last] = look_scans_.back();
@@ -428,34 +428,72 @@ class RecordingPlaces {
   const Place& at(const Member& member) { return tiles_.find(member.first)->values[member.second]; }
   Place& change(const Member& member) { return tiles_.at(member.first).values[member.second]; }
 
+  // Touching places, and the places beside them that limit them.
+  struct Component {
+    std::vector<Member> members, contacts;
+  };
+
+  // Grows a component from a place over those of which `joins(place)` and no other component has.
+  // `is_contact(place)` chooses the others that touch it.
+  template <class Joins, class IsContact>
+  void grow(const Member& begin, Component& component, Joins&& joins, IsContact&& is_contact) {
+    component.members.assign(1, begin);
+    component.contacts.clear();
+    change(begin).object = kNone;
+    for (std::size_t i = 0; i < component.members.size(); ++i) {
+      for_each_touching(cell_of(component.members[i]),
+                        [&](const Member& beside, const Place& place) {
+                          if (!joins(place)) {
+                            if (is_contact(place)) component.contacts.push_back(beside);
+                          } else if (place.object == 0) {
+                            change(beside).object = kNone;
+                            component.members.push_back(beside);
+                          }
+                        });
+    }
+    std::vector<Member>& contacts = component.contacts;
+    std::sort(contacts.begin(), contacts.end());
+    contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+  }
+
+  // Calls `visit(member)` for the places of which `is_taken(place)` at that time.
+  template <class IsTaken, class Visitor>
+  void for_each_member(IsTaken&& is_taken, Visitor&& visit) {
+    tiles_.for_each_index([&](const GroundTile& index) {
+      for (std::uint32_t number = 0; number < tiles_.find(index)->values.size(); ++number) {
+        const Member member = {index, number};
+        if (is_taken(at(member))) visit(member);
+      }
+      tiles_.free_far(tiles_.middle(index), 0.0);
+    });
+  }
+
   // Numbers the components of touching changed places, and of those beside them that the first pass
   // removed early or late.
   void find_objects() {
-    std::vector<Member> members, rejected;
-    std::vector<Member> contacts;
-    tiles_.for_each_index([&](const GroundTile& index) {
-      for (std::uint32_t first = 0; first < tiles_.find(index)->values.size(); ++first) {
-        const Member begin = {index, first};
-        if (at(begin).state != PlaceState::kChanged || at(begin).object != 0) continue;
-        members.assign(1, begin);
-        change(begin).object = kNone;
-        contacts.clear();
-        for (std::size_t i = 0; i < members.size(); ++i) {
-          add_neighbours(members[i], members, contacts);
-        }
-        std::sort(contacts.begin(), contacts.end());
-        contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
-        const bool is_object = is_whole(members, contacts.size());
-        const std::uint32_t number = is_object ? ++objects_ : kNone;
-        for (const Member& member : members) {
-          Place& place = change(member);
-          place.object = number;
-          place.state = PlaceState::kChanged;
-          if (is_object) changed_.mark(cell_of(member));
-        }
-        if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
+    std::vector<Member> rejected;
+    Component component;
+    const std::vector<Member>& members = component.members;
+    const auto is_new = [](const Place& place) {
+      return place.state == PlaceState::kChanged && place.object == 0;
+    };
+    const auto joins = [&](const Place& place) {
+      return place.first.moved() || has_changed_by_any(place);
+    };
+    const auto stays = [](const Place& place) {
+      return place.state == PlaceState::kStays && place.hits > 0;
+    };
+    for_each_member(is_new, [&](const Member& begin) {
+      grow(begin, component, joins, stays);
+      const bool is_object = is_whole(members, component.contacts.size());
+      const std::uint32_t number = is_object ? ++objects_ : kNone;
+      for (const Member& member : members) {
+        Place& place = change(member);
+        place.object = number;
+        place.state = PlaceState::kChanged;
+        if (is_object) changed_.mark(cell_of(member));
       }
-      tiles_.free_far(tiles_.middle(index), 0.0);
+      if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
     });
     for (std::size_t i = 0; i < rejected.size(); ++i) {
       Place& place = change(rejected[i]);
@@ -464,6 +502,41 @@ class RecordingPlaces {
       const GroundTile& tile = rejected[i].first;
       if (i > 0 && tile != rejected[i - 1].first) tiles_.free_far(tiles_.middle(tile), 0.0);
     }
+  }
+
+  // Finds objects that are always there, of which the first pass removed points.
+  void find_standing() {
+    Component component;
+    const auto joins = [](const Place& place) {
+      return place.state != PlaceState::kChanged && place.first.any_removed() &&
+             place.is_always_there();
+    };
+    const auto is_new = [&](const Place& place) { return place.object == 0 && joins(place); };
+    const auto is_contact = [](const Place& place) {
+      return place.was_passed() && !place.is_always_there();
+    };
+    for_each_member(is_new, [&](const Member& begin) {
+      grow(begin, component, joins, is_contact);
+      if (!is_standing(component)) return;
+      for (const Member& member : component.members) change(member).stands_with_others = true;
+    });
+  }
+
+  // Whether always occupied places are something that stands. Looks pass many places beside what
+  // waits or sways, and the first pass removes all of what creeps.
+  bool is_standing(const Component& component) {
+    constexpr std::size_t kFewestPlaces = 20;
+    constexpr double kMostContact = 0.3;  // passed places beside it, ratio to its own places
+    constexpr double kLeastKept = 0.1;    // of its points
+    const auto places = static_cast<double>(component.members.size());
+    if (component.members.size() < kFewestPlaces) return false;
+    if (static_cast<double>(component.contacts.size()) > kMostContact * places) return false;
+    std::uint64_t kept = 0, removed = 0;
+    for (const Member& member : component.members) {
+      kept += at(member).first.sum_kept;
+      removed += at(member).first.sum_removed;
+    }
+    return static_cast<double>(kept) >= kLeastKept * static_cast<double>(kept + removed);
   }
 
   // An object is large enough, no part of something that stays, and looks passed a third of it. The
@@ -494,18 +567,6 @@ class RecordingPlaces {
       const std::uint32_t number = tile == nullptr ? kNone : tile->numbers.find(key_of(beside));
       if (number != kNone) visit(Member{tile_of(beside), number}, tile->values[number]);
     }
-  }
-
-  // Adds the changed places that touch a member to its component, and those that stay to
-  // `contacts`.
-  void add_neighbours(Member member, std::vector<Member>& members, std::vector<Member>& contacts) {
-    for_each_touching(cell_of(member), [&](const Member& beside, const Place& place) {
-      const bool joins = place.first.moved() || has_changed_by_any(place);
-      if (!joins && place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(beside);
-      if (!joins || place.object != 0) return;
-      change(beside).object = kNone;
-      members.push_back(beside);
-    });
   }
 
   // Collects the samples of the places of a tile that are near the sensor.
