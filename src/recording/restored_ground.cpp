@@ -26,12 +26,10 @@ void RestoredGround::find_removed(PointsView points, const Pose& T_world_sensor,
   ground_.free_far(T_world_sensor.translation());
   const auto is_removed = [&](std::size_t i) { return verdict.labels[i] == PointLabel::kDynamic; };
   for_each_located(points, T_world_sensor, is_removed, [&](const LocatedPoints& located) {
-    ground_.for_each_rise(located, [&](std::size_t k, const WorldCell& cell, double rise) {
+    ground_.for_each_rise(located, [&](std::size_t k, const WorldCell&, const Rise& rise) {
       const Eigen::Vector3d at = located.at(k);
-      if (rise <= kMostRise && ground_.is_level(cell)) {
-        removed_.push_back({located.point(k), at});
-      }
-      if (rise >= kFootBegin && rise <= kFootEnd) feet_.insert(column_of(at));
+      if (rise.is_level && rise.of_cell <= kMostRise) removed_.push_back({located.point(k), at});
+      if (rise.of_cell >= kFootBegin && rise.of_cell <= kFootEnd) feet_.insert(column_of(at));
     });
   });
 }

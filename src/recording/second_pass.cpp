@@ -102,6 +102,7 @@ void SecondPass::test(const std::function<bool()>& keep_going) {
   }
   places_.decide();
   chains_.find_moves();
+  ground_.complete();
   list_objects();
   is_decided_ = true;
 }
@@ -172,12 +173,11 @@ void SecondPass::find_places(std::uint32_t number, const Pose& T_world_sensor,
   places_.for_each_place(points_, T_world_sensor, is_near_object, take);
 }
 
-// The place that has changed of a ground point that rises, or one that touches it if nothing is
-// known of its own place; else null.
+// The place that has changed of a ground point that rises, or one that touches it; else null.
 const SecondPass::Place* SecondPass::changed_at_ground(const WorldCell& cell) {
   const Place* const place = places_.find(cell);
-  if (place == nullptr || place->state == PlaceState::kUnknown) return places_.changed_beside(cell);
-  return place->state == PlaceState::kChanged ? place : nullptr;
+  const bool has_changed = place != nullptr && place->state == PlaceState::kChanged;
+  return has_changed ? place : places_.changed_beside(cell);
 }
 
 // Whether what scan `number` measured in a place is no part of the static map.

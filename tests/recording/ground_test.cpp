@@ -1,6 +1,7 @@
 #include "dynains/recording/ground.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -11,13 +12,16 @@ using namespace dynains;
 
 namespace {
 
-/// Height of a point (m, world frame) above the ground, if it is known.
-std::optional<double> rise_of(RecordingGround& ground, const std::array<float, 3>& at) {
+using Rise = RecordingGround::Rise;
+
+/// Height of a point (m, world frame) above the ground, if its cell has any.
+std::optional<Rise> rise_of(RecordingGround& ground, const std::array<float, 3>& at) {
   LocatedPoints located;
   located.add(0, at);
   located.locate(Pose::Identity());
-  std::optional<double> found;
-  ground.for_each_rise(located, [&](std::size_t, const WorldCell&, double rise) { found = rise; });
+  std::optional<Rise> found;
+  ground.for_each_rise(located,
+                       [&](std::size_t, const WorldCell&, const Rise& rise) { found = rise; });
   return found;
 }
 
@@ -36,10 +40,43 @@ TEST_CASE("the ground of a cell is the mean of its ground points, if there are e
       const std::vector<PointLabel> labels = {PointLabel::kGround, PointLabel::kStatic};
       ground.add(points, labels, T_world_sensor);
     }
+    ground.complete();
     const auto rise = rise_of(ground, {1000.2F, -1999.8F, 498.5F});
-    CHECK(rise.has_value() == (count == 20));
-    if (rise) CHECK(*rise == Approx(0.5).margin(1e-4));
+    REQUIRE(rise);
+    CHECK(rise->is_level == (count == 20));
+    for (const double metres : {rise->of_cell, rise->around}) {
+      CHECK(std::isfinite(metres) == (count == 20));
+      if (count == 20) CHECK(metres == Approx(0.5).margin(1e-4));
+    }
     CHECK_FALSE(rise_of(ground, {1000.5F, -1999.8F, 498.5F}));
     CHECK_FALSE(rise_of(ground, {1100.2F, -1999.8F, 498.5F}));
+  }
+}
+
+TEST_CASE(
+    "a height is known above the lowest ground within two cells, across tiles and their storage") {
+  for (const int cells : {1, 2, 3}) {
+    for (const bool is_tested_first : {false, true}) {
+      CAPTURE(cells, is_tested_first);
+      MemoryStore store;
+      RecordingGround ground(store, 0);
+      const float border = static_cast<float>(kTileEdge);
+      const float tested = border + (is_tested_first ? -0.2F : 0.2F);
+      const float low = tested + (is_tested_first ? 0.4F : -0.4F) * static_cast<float>(cells);
+      PointBuffer points;
+      for (int i = 0; i < 20; ++i) {
+        points.push_back(low, 0.1F, -2.0F);
+        points.push_back(tested, 0.1F, -1.0F);
+      }
+      const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
+      ground.add(points, labels, Pose::Identity());
+      ground.free_far(Eigen::Vector3d(1000.0, 0.0, 0.0));
+      ground.complete();
+      const auto rise = rise_of(ground, {tested, 0.1F, -0.9F});
+      REQUIRE(rise);
+      CHECK(rise->of_cell == Approx(0.1).margin(1e-4));
+      CHECK(rise->around == Approx(cells <= 2 ? 1.1 : 0.1).margin(1e-4));
+      CHECK(rise->is_level == (cells > 2));
+    }
   }
 }

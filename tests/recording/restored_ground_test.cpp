@@ -16,6 +16,7 @@ bool comes_back(float rise, float foot_distance, float foot_rise, Cause cause) {
   for (int i = 0; i < 100; ++i) flat.push_back(5.0F + 0.01F * static_cast<float>(i), 5.05F, -1.7F);
   const std::vector<PointLabel> labels(flat.size(), PointLabel::kGround);
   ground.add(flat, labels, Pose::Identity());
+  ground.complete();
   PointBuffer points;
   points.push_back(5.55F, 5.05F, -1.7F + rise);
   points.push_back(5.55F + foot_distance, 5.05F, -1.7F + foot_rise);
@@ -65,6 +66,7 @@ TEST_CASE("ground that is a step above the ground around is none") {
     }
     const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
     ground.add(points, labels, Pose::Identity());
+    ground.complete();
     PointBuffer removed;
     removed.push_back(5.45F, 5.05F, -1.7F + step);
     removed.push_back(5.05F, 5.05F, -1.7F);
@@ -76,4 +78,29 @@ TEST_CASE("ground that is a step above the ground around is none") {
     CHECK((verdict.labels[0] == PointLabel::kGround) == (step < 0.2F));
     CHECK(verdict.labels[1] == PointLabel::kGround);
   }
+}
+
+TEST_CASE("points rise that are above the ground of their cell, or well above that around it") {
+  const auto rises = [](float distance, float rise) {
+    MemoryStore store;
+    RestoredGround ground(store, 0);
+    PointBuffer points;
+    for (int i = 0; i < 20; ++i) {
+      points.push_back(5.05F, 5.05F, -1.7F);
+      points.push_back(5.05F + distance, 5.05F, -1.7F + rise);  // the ground of its own cell, too
+    }
+    const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
+    ground.add(points, labels, Pose::Identity());
+    ground.complete();
+    std::vector<std::size_t> found;
+    ground.for_each_rising(
+        points, Pose::Identity(), [](std::size_t i) { return i == 1; },
+        [&](std::size_t i, const WorldCell&) { found.push_back(i); });
+    return !found.empty();
+  };
+  CHECK(rises(0.0F, 0.21F));  // half of it above their mean
+  CHECK_FALSE(rises(0.0F, 0.19F));
+  CHECK(rises(0.8F, 0.31F));
+  CHECK_FALSE(rises(0.8F, 0.29F));
+  CHECK_FALSE(rises(1.2F, 0.31F));
 }

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -28,16 +31,32 @@ class RecordingGround {
     const auto is_ground = [&](std::size_t i) { return verdicts[i] == PointLabel::kGround; };
     for_each_located(points, T_world_sensor, is_ground, [&](const LocatedPoints& located) {
       const Span<const LocatedPoints::Run> runs = located.runs();
+      std::array<Tile*, LocatedPoints::kMost> tiles;
       std::array<Cell*, LocatedPoints::kMost> cells;
       for (std::size_t r = 0; r < runs.size(); ++r) {
-        cells[r] = &tiles_.at(tile_of(runs[r].cell)).cells[number_of(runs[r].cell)];
+        tiles[r] = &tiles_.at(tile_of(runs[r].cell));
+        cells[r] = &tiles[r]->cells[number_of(runs[r].cell)];
         __builtin_prefetch(cells[r], 1);
       }
       for (std::size_t r = 0; r < runs.size(); ++r) {
-        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) cells[r]->add(located.at(k).z());
+        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
+          cells[r]->add(tiles[r]->from_origin(located.at(k).z()));
+        }
       }
     });
     free_far(T_world_sensor.translation());
+  }
+
+  /// Finds the lowest ground around all cells, after all scans.
+  void complete() {
+    tiles_.for_each_index([&](const GroundTile& index) {
+      Tile& tile = tiles_.at(index);
+      for (std::size_t i = 0; i < tile.cells.size(); ++i) {
+        if (tile.cells[i].count == 0) continue;
+        tile.cells[i].lowest = static_cast<float>(lowest_around(index, i) - tile.origin);
+      }
+      tiles_.free_far(tiles_.middle(index), 0.0);
+    });
   }
 
   /// Keeps to the budget, while cells around a sensor (m, world frame) are asked for.
@@ -46,66 +65,71 @@ class RecordingGround {
     tiles_.free_far(sensor, kNear);
   }
 
-  /// Calls `visit(k, cell, rise)` for the located points in cells where the recording has 20 points
-  /// of the ground or more. `rise`: m above the ground in the cell.
+  /// Height of a point, m; minus infinity where no ground is known.
+  struct Rise {
+    double of_cell;  ///< above the ground of its cell, if the recording has 20 points of it or more
+    double around;   ///< above the lowest such ground within 0.8 m
+    bool is_level;   ///< whether the ground of the cell is at most 0.2 m above that: no vehicle
+  };
+
+  /// Calls `visit(k, cell, rise)` for the located points in cells with ground. After complete().
   template <class Visitor>
   void for_each_rise(const LocatedPoints& located, Visitor&& visit) {
+    constexpr double kUnknown = -std::numeric_limits<double>::infinity();
     const Span<const LocatedPoints::Run> runs = located.runs();
+    std::array<const Tile*, LocatedPoints::kMost> tiles;
     std::array<const Cell*, LocatedPoints::kMost> cells;
     for (std::size_t r = 0; r < runs.size(); ++r) {
-      cells[r] = find(runs[r].cell);
+      tiles[r] = tiles_.find(tile_of(runs[r].cell));
+      cells[r] = tiles[r] == nullptr ? nullptr : &tiles[r]->cells[number_of(runs[r].cell)];
       __builtin_prefetch(cells[r]);
     }
     for (std::size_t r = 0; r < runs.size(); ++r) {
-      if (!has_ground(cells[r])) continue;
-      const double height = cells[r]->height();
-      for (std::size_t k = runs[r].begin; k < runs[r].end; ++k)
-        visit(k, runs[r].cell, located.at(k).z() - height);
-    }
-  }
-
-  /// Whether the ground in a cell is not a step above that of any cell around: the underside of a
-  /// vehicle can look like ground.
-  bool is_level(const WorldCell& cell) {
-    constexpr std::int64_t kReach = 2;  // cells
-    constexpr double kStep = 0.2;       // m
-    const Cell* const own = find(cell);
-    if (!has_ground(own)) return false;
-    for (std::int64_t dx = -kReach; dx <= kReach; ++dx) {
-      for (std::int64_t dy = -kReach; dy <= kReach; ++dy) {
-        const Cell* const other = find({cell[0] + dx, cell[1] + dy, 0});
-        if (has_ground(other) && own->height() > other->height() + kStep) return false;
+      if (cells[r] == nullptr || cells[r]->count == 0) continue;
+      const Cell& cell = *cells[r];
+      for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
+        const double z = located.at(k).z() - tiles[r]->origin;
+        visit(k, runs[r].cell,
+              Rise{cell.has_ground() ? z - static_cast<double>(cell.mean) : kUnknown,
+                   z - static_cast<double>(cell.lowest), cell.is_level()});
       }
     }
-    return true;
   }
 
  private:
-  static constexpr std::uint32_t kFewest = 20;
-
   struct Cell {
-    double origin = 0.0;  // m, the first height
-    float mean = 0.0F;    // m, above it
+    float mean = 0.0F;                                      // m, above the origin of the tile
+    float lowest = std::numeric_limits<float>::infinity();  // m, the same, of the ground around
     std::uint32_t count = 0;
 
-    double height() const { return origin + static_cast<double>(mean); }
-    void add(double z) {
-      if (count++ == 0) origin = z;
-      mean += (static_cast<float>(z - origin) - mean) / static_cast<float>(count);
+    void add(float z) { mean += (z - mean) / static_cast<float>(++count); }
+    bool has_ground() const {
+      constexpr std::uint32_t kFewest = 20;
+      return count >= kFewest;
+    }
+    bool is_level() const {
+      constexpr float kStep = 0.2F;  // m
+      return has_ground() && mean - lowest <= kStep;
     }
   };
   struct Tile {
+    double origin = std::numeric_limits<double>::quiet_NaN();  // m, the first height
     std::vector<Cell> cells = std::vector<Cell>(kTileCells * kTileCells);
 
+    float from_origin(double z) {
+      if (std::isnan(origin)) origin = z;
+      return static_cast<float>(z - origin);
+    }
     std::size_t size() const { return cells.size(); }
     std::size_t memory_bytes() const { return cells.size() * sizeof(Cell); }
     void pack(std::vector<std::uint8_t>& bytes) const {
-      bytes.resize(memory_bytes());
-      std::memcpy(bytes.data(), cells.data(), bytes.size());
+      bytes.resize(sizeof(origin) + memory_bytes());
+      std::memcpy(bytes.data(), &origin, sizeof(origin));
+      std::memcpy(bytes.data() + sizeof(origin), cells.data(), memory_bytes());
     }
     void unpack(const std::vector<std::uint8_t>& bytes) {
-      cells.resize(bytes.size() / sizeof(Cell));
-      std::memcpy(cells.data(), bytes.data(), bytes.size());
+      std::memcpy(&origin, bytes.data(), sizeof(origin));
+      std::memcpy(cells.data(), bytes.data() + sizeof(origin), memory_bytes());
     }
   };
 
@@ -113,11 +137,24 @@ class RecordingGround {
     return static_cast<std::size_t>((cell[0] & (kTileCells - 1)) << kTileShift |
                                     (cell[1] & (kTileCells - 1)));
   }
-  static bool has_ground(const Cell* cell) { return cell != nullptr && cell->count >= kFewest; }
-  // Null: its tile has no ground.
-  const Cell* find(const WorldCell& cell) {
-    const Tile* const tile = tiles_.find(tile_of(cell));
-    return tile == nullptr ? nullptr : &tile->cells[number_of(cell)];
+
+  // m, world frame; infinity: there is no ground.
+  double lowest_around(const GroundTile& index, std::size_t number) {
+    constexpr std::int64_t kReach = 2;  // cells
+    const auto x = index[0] * kTileCells + static_cast<std::int64_t>(number >> kTileShift);
+    const auto y = index[1] * kTileCells + static_cast<std::int64_t>(number % kTileCells);
+    double lowest = std::numeric_limits<double>::infinity();
+    for (std::int64_t dx = -kReach; dx <= kReach; ++dx) {
+      for (std::int64_t dy = -kReach; dy <= kReach; ++dy) {
+        const WorldCell beside = {x + dx, y + dy, 0};
+        const Tile* const tile = tiles_.find(tile_of(beside));
+        if (tile == nullptr) continue;
+        const Cell& cell = tile->cells[number_of(beside)];
+        if (!cell.has_ground()) continue;
+        lowest = std::min(lowest, tile->origin + static_cast<double>(cell.mean));
+      }
+    }
+    return lowest;
   }
 
   PagedTiles<Tile> tiles_;
