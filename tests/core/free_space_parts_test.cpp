@@ -456,6 +456,65 @@ TEST_CASE("samples along a track are summed on both sides, and fade by 0.95 a sc
   CHECK(TrackedInstances::Instance().moved(0.15F));  // nothing is decided
 }
 
+std::vector<float> random_angles(std::size_t count, double low, double high, Random& random) {
+  std::vector<float> angles(count);
+  for (float& angle : angles) angle = random.uniform_float(low, high);
+  return angles;
+}
+
+TEST_CASE("percentiles of angles in bands are those of the sorted angles") {
+  Random random(21);
+  AngleBands bands;
+  for (const double width : {0.01, 0.1, 2.0}) {
+    for (const std::size_t count : {1U, 2U, 1001U, 5000U}) {
+      std::vector<float> angles = random_angles(count, -180.0, count == 5000 ? 360.0 : 1.0, random);
+      std::fill_n(angles.begin(), count / 3, 0.25F);
+      std::vector<float> sorted = angles;
+      std::sort(sorted.begin(), sorted.end());
+      bands.assign(angles, width);
+      for (const double ratio : {0.0, 0.0005, 0.5, 0.9995, 1.0}) {
+        CAPTURE(width, count, ratio);
+        const auto rank = static_cast<std::size_t>(ratio * static_cast<double>(count - 1));
+        CHECK(bands.percentile(angles, ratio) == static_cast<double>(sorted[rank]));
+      }
+    }
+  }
+}
+
+TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter of the points") {
+  Random random(22);
+  AngleBands bands;
+  for (const std::size_t count : {1U, 600U, 20000U}) {
+    const std::vector<float> across = random_angles(count, -180.0, 180.0, random);
+    std::vector<float> along = random_angles(count, -180.0, 180.0, random);
+    std::fill_n(along.begin(), count / 5, along.back());  // some are equal
+    std::map<int, std::vector<float>> by_band;
+    for (std::size_t i = 0; i < count; ++i) {
+      by_band[static_cast<int>((static_cast<double>(across[i]) + 181.0) / 0.5)].push_back(along[i]);
+    }
+    std::vector<float> expected;
+    std::size_t seen = 0, sorted = 0;
+    for (auto& [band, angles] : by_band) {
+      seen += angles.size();
+      if (4 * sorted > seen - angles.size()) continue;
+      sorted += angles.size();
+      std::sort(angles.begin(), angles.end());
+      for (std::size_t k = 1; k < angles.size(); ++k) {
+        if (angles[k] - angles[k - 1] > 0.25F) expected.push_back(angles[k] - angles[k - 1]);
+      }
+    }
+    bands.assign(across, 0.5);
+    CHECK(bands.gaps(along, 0.25) == expected);
+  }
+}
+
+TEST_CASE("a gap between angles counts if it is larger than the smallest one") {
+  AngleBands bands;
+  bands.assign({1.0F, 1.0F, 1.0F}, 0.1);
+  CHECK(bands.gaps({0.5F, -180.0F, 180.0F}, 179.5) == std::vector<float>{180.5F});
+  CHECK(bands.gaps({0.5F, -180.0F, 180.0F}, 179.49) == std::vector<float>{180.5F, 179.5F});
+}
+
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {
   // 40 beams 0.5 deg apart, a point every 0.3 deg, at 20 m.
   PointBuffer points;

@@ -166,6 +166,21 @@ TEST_CASE("Without ground, the mounting is not known") {
   CHECK_FALSE(estimate_mounting(cloud).known);
 }
 
+TEST_CASE("Ground in 60 cells is enough, and cells left and right of zero differ") {
+  PointBuffer points;
+  for (const float y : {-1.25F, -0.75F, -0.25F, 0.25F, 0.75F, 1.25F}) {
+    for (int column = -5; column < 5; ++column) {
+      points.push_back(0.25F + 0.5F * static_cast<float>(column), y, -1.75F);
+    }
+  }
+  const Mounting mounting = estimate_mounting(points);
+  REQUIRE(mounting.known);
+  CHECK(mounting.height == Approx(1.75));
+  points.x[0] = points.x[1];  // 59 cells
+  points.y[0] = points.y[1];
+  CHECK_FALSE(estimate_mounting(points).known);
+}
+
 TEST_CASE("The lower of two planes is the ground, even if it is smaller") {
   PointBuffer points;
   for (float b = -9.0F; b < 9.0F; b += 0.23F) {

@@ -534,6 +534,33 @@ TEST_CASE("points of one beam make no plane at any depth, ground at a small angl
   CHECK(points_on_planes(level_square(-0.95)) == 100);
 }
 
+TEST_CASE("a block of points makes the planes of its single points") {
+  const std::vector<Eigen::Vector3d> points = ground_of_beams(0.5);  // with runs in one voxel
+  const auto planes_of = [&](std::size_t points_per_block) {
+    VoxelPlanes planes;
+    planes.begin_scan(Pose::Identity());
+    VoxelPlanes::Block block;
+    for (const Eigen::Vector3d& p : points) {
+      block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
+      if (block.count == points_per_block) planes.add(block);
+    }
+    planes.add(block);
+    std::vector<double> distances;
+    for (const Eigen::Vector3d& p : points) {
+      block.count = 0;
+      block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
+      planes.find(block, [&](std::size_t, const VoxelPlanes::Plane& plane) {
+        distances.push_back(plane.distance(block.points[0]));
+      });
+    }
+    return distances;
+  };
+  const std::vector<double> expected = planes_of(1);
+  REQUIRE(expected.size() > 1500);
+  CHECK(planes_of(7) == expected);
+  CHECK(planes_of(VoxelPlanes::Block::kMost) == expected);
+}
+
 TEST_CASE("a full map of planes forgets the oldest voxels") {
   VoxelPlanes planes;
   planes.reserve();

@@ -28,7 +28,7 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
   std::uint32_t random = 1;
   for (std::size_t begin = 0; begin < split.count; begin += step) {
     random = random * 1664525U + 1013904223U;
-    const std::size_t i = begin + (random >> 8) % step;
+    const std::size_t i = step == 1 ? begin : begin + (random >> 8) % step;  // division is slow
     if (i >= split.count) return;
     const double x = static_cast<double>(split.points.x[i]);
     const double y = static_cast<double>(split.points.y[i]);

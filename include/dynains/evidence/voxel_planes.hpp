@@ -83,9 +83,14 @@ class VoxelPlanes {
     VoxelKey keys[Block::kMost];
     std::uint32_t numbers[Block::kMost];
     find_keys(block, keys);
-    for (std::size_t i = 0; i < block.count; ++i) numbers[i] = number_for(keys[i]);
     for (std::size_t i = 0; i < block.count; ++i) {
-      if (numbers[i] != kNone) add(block.points[i], keys[i], numbers[i]);
+      numbers[i] = i > 0 && keys[i] == keys[i - 1] ? numbers[i - 1] : number_for(keys[i]);
+    }
+    for (std::size_t i = 0; i < block.count;) {
+      std::size_t end = i + 1;
+      while (end < block.count && numbers[end] == numbers[i]) ++end;
+      if (numbers[i] != kNone) add(&block.points[i], end - i, keys[i], numbers[i]);
+      i = end;
     }
     block.count = 0;
   }
@@ -160,10 +165,14 @@ class VoxelPlanes {
     return number;
   }
 
-  void add(const double (&p)[3], VoxelKey key, std::uint32_t number) {
-    Moments& moments = moments_[number];
-    moments.sums.add(p[0] - centre(key, 0), p[1] - centre(key, 1), p[2] - centre(key, 2), 1.0);
-    moments.last_scan = scans_;
+  // Adds consecutive points of a block to a voxel.
+  void add(const double (*points)[3], std::size_t count, VoxelKey key, std::uint32_t number) {
+    const double x = centre(key, 0), y = centre(key, 1), z = centre(key, 2);
+    PlaneMoments sums = moments_[number].sums;
+    for (std::size_t i = 0; i < count; ++i) {
+      sums.add(points[i][0] - x, points[i][1] - y, points[i][2] - z, 1.0);
+    }
+    moments_[number] = {sums, scans_};
     planes_[number].is_fitted = false;
   }
 

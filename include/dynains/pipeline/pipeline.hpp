@@ -328,7 +328,7 @@ bool Pipeline<Stages>::is_sensor_wanted() const {
 /// SensorModel::typical() until a scan has enough points.
 template <class Stages>
 void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
-  frame_.estimate(ingest_.points());
+  frame_.estimate(ingest_.points(), newest.split.points);
   if (sensor().known() && newest.scan > 0) {
     newest.epoch = scans_.start_epoch();
     newest.began_epoch = EpochReason::kSensor;

@@ -158,8 +158,10 @@ class MountingEstimator {
       const float p[3] = {points.x[i], points.y[i], points.z[i]};
       std::size_t at = 0;
       for (const float coordinate : p) {
-        const auto index =
-            static_cast<std::int32_t>(std::floor(coordinate / static_cast<float>(kCell)));
+        // Without std::floor(), which is a call in plain x86-64 code.
+        const float scaled = coordinate / static_cast<float>(kCell);
+        const auto truncated = static_cast<std::int32_t>(scaled);
+        const std::int32_t index = truncated - (static_cast<float>(truncated) > scaled ? 1 : 0);
         at = at * kWidth + static_cast<std::size_t>(index + kHalf);
       }
       if (number[at] == 0) {
@@ -189,8 +191,11 @@ class MountingEstimator {
     struct Candidate {
       GroundHypothesis ground;
       float score;
+      int trial;
     };
-    const auto is_better = [](const Candidate& a, const Candidate& b) { return a.score > b.score; };
+    const auto is_better = [](const Candidate& a, const Candidate& b) {
+      return a.score > b.score || (a.score == b.score && a.trial < b.trial);
+    };
     std::vector<Candidate> candidates;
     std::mt19937_64 random(2);
     for (int trial = 0; trial < kTrials; ++trial) {
@@ -203,10 +208,13 @@ class MountingEstimator {
       GroundHypothesis ground;
       ground.up = scaled((normal.z() * side > 0.0 ? 1.0 : -1.0) / area, normal);
       ground.height = -dot(ground.up, a);
-      if (is_possible(ground, side)) candidates.push_back({ground, score(ground, kScreened)});
+      if (is_possible(ground, side))
+        candidates.push_back({ground, score(ground, kScreened), trial});
     }
-    std::stable_sort(candidates.begin(), candidates.end(), is_better);
-    if (candidates.size() > kFinalists) candidates.resize(kFinalists);
+    const std::size_t finalists = std::min(kFinalists, candidates.size());
+    const auto end = candidates.begin() + static_cast<std::ptrdiff_t>(finalists);
+    std::partial_sort(candidates.begin(), end, candidates.end(), is_better);
+    candidates.erase(end, candidates.end());
     for (Candidate& candidate : candidates) candidate.score = score(candidate.ground, kScored);
     const auto best =
         std::max_element(candidates.begin(), candidates.end(),
@@ -345,11 +353,10 @@ class LevelFrame {
   bool rotates_scans() const { return sensor_.known() && is_enabled_; }
 
   /// Estimates the sensor model from a scan (m, sensor frame). The model is unchanged if the scan
-  /// has too few points.
-  void estimate(PointsView scan) {
+  /// has too few points. `headed`: memory for the scan.
+  void estimate(PointsView scan, PointBuffer& headed) {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_enabled_) R_headed_sensor = R_headed(estimate_heading(scan));
-    PointBuffer headed;
     const PointsView points = rotate(scan, R_headed_sensor, headed);
     SensorModel sensor = estimate_sensor_model(points);
     if (!sensor.known()) return;
