@@ -522,21 +522,28 @@ class RecordingPlaces {
     });
   }
 
-  // Whether always occupied places are something that stands. Looks pass many places beside what
-  // waits or sways, and the first pass removes all of what creeps.
+  // Whether places that are always occupied are something that stands. Looks pass many places
+  // beside what waits or sways, the first pass removes all of what creeps, and what comes or leaves
+  // was removed first or last.
   bool is_standing(const Component& component) {
     constexpr std::size_t kFewestPlaces = 20;
     constexpr double kMostContact = 0.3;  // passed places beside it, ratio to its own places
     constexpr double kLeastKept = 0.1;    // of its points
-    const auto places = static_cast<double>(component.members.size());
-    if (component.members.size() < kFewestPlaces) return false;
-    if (static_cast<double>(component.contacts.size()) > kMostContact * places) return false;
+    const std::size_t places = component.members.size();
+    if (places < kFewestPlaces) return false;
+    const auto contacts = static_cast<double>(component.contacts.size());
+    if (contacts > kMostContact * static_cast<double>(places)) return false;
     std::uint64_t kept = 0, removed = 0;
+    std::size_t moved = 0;
     for (const Member& member : component.members) {
-      kept += at(member).first.sum_kept;
-      removed += at(member).first.sum_removed;
+      const FirstVerdicts& first = at(member).first;
+      kept += first.sum_kept;
+      removed += first.sum_removed;
+      moved += first.moved() ? 1 : 0;
     }
-    return static_cast<double>(kept) >= kLeastKept * static_cast<double>(kept + removed);
+    const bool is_kept =
+        static_cast<double>(kept) >= kLeastKept * static_cast<double>(kept + removed);
+    return is_kept && 2 * moved <= places;
   }
 
   // An object is large enough, no part of something that stays, and looks passed a third of it. The
