@@ -223,6 +223,19 @@ TEST_CASE("Broken scans and labels are refused with path and size") {
   }
 }
 
+TEST_CASE("A scan is read as it was written, whatever its size") {
+  TemporaryFolder folder;
+  const fs::path file = folder / "000000.bin";
+  for (const std::size_t points : {0U, 4095U, 4096U, 4097U, 10000U}) {
+    std::vector<float> xyzi(4 * points);
+    for (std::size_t i = 0; i < xyzi.size(); ++i) xyzi[i] = static_cast<float>(i);
+    write_scan(file, xyzi);
+    std::vector<float> read(7);
+    read_scan(file, read);
+    CHECK(read == xyzi);
+  }
+}
+
 TEST_CASE("A writer that fails leaves the old file") {
   TemporaryFolder folder;
   make_sequence(folder);
