@@ -34,6 +34,28 @@ struct LayeredTruth {
   }
 };
 
+/// Runs of consecutive points of a block with one voxel and one label.
+struct PointRuns {
+  std::size_t count = 0;
+  std::array<VoxelKey, PointBlock::kMost> keys;
+  std::array<std::uint32_t, PointBlock::kMost> begins, ends;  ///< points [begin, end)
+
+  /// Finds the runs of the points that have a key. `labels`: of the points of the block.
+  void find(const PointBlock& block, const LayeredTruth* labels) {
+    std::size_t begin = 0;
+    count = 0;
+    for (std::size_t i = 0; i < block.count; ++i) {
+      keys[count] = block.key[i];
+      begins[count] = static_cast<std::uint32_t>(begin);
+      ends[count] = static_cast<std::uint32_t>(i + 1);
+      const bool is_last =
+          i + 1 == block.count || block.key[i + 1] != block.key[i] || !(labels[i + 1] == labels[i]);
+      begin = is_last ? i + 1 : begin;
+      count += is_last & (block.key[i] != kNoKey);
+    }
+  }
+};
+
 /// The points of some layers of a scan in one voxel.
 struct ScanVoxel {
   std::uint32_t number;      ///< of the voxel
@@ -55,14 +77,14 @@ class ScanVoxels {
   /// for a voxel to leave out.
   template <class Number>
   void add(const PointBlock& block, const LayeredTruth* labels, Number&& number) {
-    const std::size_t count = find_runs(block, labels);
-    number(run_keys_.data(), count, numbers_.data());
-    for (std::size_t r = 0; r < count; ++r) {
+    found_.find(block, labels);
+    number(found_.keys.data(), found_.count, numbers_.data());
+    for (std::size_t r = 0; r < found_.count; ++r) {
       if (numbers_[r] < place_of_.size()) __builtin_prefetch(&place_of_[numbers_[r]]);
     }
-    for (std::size_t r = 0; r < count; ++r) {
+    for (std::size_t r = 0; r < found_.count; ++r) {
       if (numbers_[r] == VoxelIndex::kNone) continue;
-      const std::size_t begin = begins_[r], end = ends_[r];
+      const std::size_t begin = found_.begins[r], end = found_.ends[r];
       const std::uint32_t place = place_of(numbers_[r]);
       voxels_[place].add(block, begin, end, labels[begin]);
       runs_.emplace_back(static_cast<std::uint32_t>(block.first + begin),
@@ -115,21 +137,6 @@ class ScanVoxels {
 
   static Eigen::Vector3d centroid(const Eigen::Vector3d& sum, std::uint32_t count) {
     return sum / static_cast<double>(count);
-  }
-
-  /// Finds runs of points with one voxel and one label: `run_keys_`, `begins_`, `ends_`.
-  std::size_t find_runs(const PointBlock& block, const LayeredTruth* labels) {
-    std::size_t begin = 0, count = 0;
-    for (std::size_t i = 0; i < block.count; ++i) {
-      run_keys_[count] = block.key[i];
-      begins_[count] = static_cast<std::uint32_t>(begin);
-      ends_[count] = static_cast<std::uint32_t>(i + 1);
-      const bool is_last =
-          i + 1 == block.count || block.key[i + 1] != block.key[i] || !(labels[i + 1] == labels[i]);
-      begin = is_last ? i + 1 : begin;
-      count += is_last & (block.key[i] != kNoKey);
-    }
-    return count;
   }
 
   /// Index in voxels_; adds a voxel that the scan does not have yet.
@@ -201,9 +208,8 @@ class ScanVoxels {
     LayeredTruth label;
   };
 
-  // The runs of a block.
-  std::array<VoxelKey, PointBlock::kMost> run_keys_;
-  std::array<std::uint32_t, PointBlock::kMost> begins_, ends_, numbers_;
+  PointRuns found_;  // in a block
+  std::array<std::uint32_t, PointBlock::kMost> numbers_;
 
   std::vector<Voxel> voxels_;
   std::vector<std::uint32_t> place_of_;  // by number; of an earlier scan, if voxels_ does not agree

@@ -29,7 +29,7 @@ class VoxelIndex {
   void find(const VoxelKey* keys, std::size_t count, std::uint32_t* numbers) const {
     prefetch_blocks(keys, count);
     for (std::size_t k = 0; k < count; ++k) {
-      numbers[k] = block_of(keys[k]);
+      numbers[k] = is_in_block_before(keys, k) ? numbers[k - 1] : block_of(keys[k]);
       if (numbers[k] != kNone) prefetch_number(numbers[k], keys[k]);
     }
     for (std::size_t k = 0; k < count; ++k) numbers[k] = number_in(numbers[k], keys[k]);
@@ -39,7 +39,7 @@ class VoxelIndex {
   void insert(const VoxelKey* keys, std::size_t count, std::uint32_t* numbers) {
     prefetch_blocks(keys, count);
     for (std::size_t k = 0; k < count; ++k) {
-      numbers[k] = add_block_of(keys[k]);
+      numbers[k] = is_in_block_before(keys, k) ? numbers[k - 1] : add_block_of(keys[k]);
       prefetch_number(numbers[k], keys[k]);
     }
     for (std::size_t k = 0; k < count; ++k) numbers[k] = insert_into(numbers[k], keys[k]);
@@ -76,6 +76,9 @@ class VoxelIndex {
     return number;
   }
 
+  static bool is_in_block_before(const VoxelKey* keys, std::size_t k) {
+    return k > 0 && ((keys[k] ^ keys[k - 1]) & kBlockBits) == 0;
+  }
   void prefetch_blocks(const VoxelKey* keys, std::size_t count) const {
     for (std::size_t k = 0; k < count; ++k) prefetch(keys[k]);
   }
