@@ -77,8 +77,11 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   }
   for (std::size_t index = 0; index < result.scans && source(index, scan); ++index) {
     check_lengths(scan, index);
+    others.begin([&] {
+      for (MapProtocol& map : map_protocols) map.resolve(scan);
+    });
     voxels.resolve(scan);
-    for (MapProtocol& map : map_protocols) map.resolve(scan);
+    others.wait();
   }
 
   result.rows.push_back(row_of("identity", voxels.score(VoxelProtocol::kIdentity),

@@ -1,6 +1,8 @@
 #include "dynains/evaluation/map_protocol.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -8,6 +10,7 @@
 #include <vector>
 
 #include "detail/cell_groups.hpp"
+#include "detail/located_points.hpp"
 #include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/radius_lookup.hpp"
@@ -45,18 +48,26 @@ class MapProtocol::Impl {
         lookup_(positive(settings.point_radius, "point_radius"), map) {}
 
   void add(const LabelledScan& scan) {
-    for_each_point(scan, [this](const float* xyz, const Eigen::Vector3d& p, Truth truth) {
-      if (gate_.passes(xyz)) note_truth(p, truth);
-      if (truth != Truth::kIgnored && point_gate_.passes(xyz)) count_point(p, truth);
+    for_each_block_with_runs(scan, grid_, gate_, [&](const detail::PointBlock&) {
+      measured_.insert(runs_.keys.data(), runs_.count, numbers_.data());
+      for (std::size_t r = 0; r < runs_.count; ++r) note_truth(r);
     });
+    for_each_block_with_runs(
+        scan, lookup_.grid(), point_gate_, [&](const detail::PointBlock& block) {
+          lookup_.cells().find(runs_.keys.data(), runs_.count, numbers_.data());
+          for (std::size_t r = 0; r < runs_.count; ++r) count_points(block, r);
+        });
     finished_first_pass_ = false;
   }
 
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
     if (near_mixed_.size() == 0) return;
-    for_each_point(scan, [this](const float* xyz, const Eigen::Vector3d& p, Truth truth) {
-      if (gate_.passes(xyz)) approach(p, truth);
+    for_each_block_with_runs(scan, grid_, gate_, [&](const detail::PointBlock& block) {
+      near_mixed_.find(runs_.keys.data(), runs_.count, numbers_.data());
+      for (std::size_t r = 0; r < runs_.count; ++r) {
+        if (numbers_[r] != VoxelIndex::kNone) approach(block, r);
+      }
     });
   }
 
@@ -95,32 +106,49 @@ class MapProtocol::Impl {
     Truth truth = Truth::kIgnored;
   };
 
+  /// Numbers of the voxels around one, or kNone.
+  using Around = std::array<std::uint32_t, detail::kNeighbours.size()>;
+
+  /// Calls `visit(PointBlock)` for the blocks of the scan. `runs_`: of the block.
   template <class Visit>
-  void for_each_point(const LabelledScan& scan, Visit&& visit) const {
-    const Eigen::Matrix3d R = scan.T_world_sensor.linear();
-    const Eigen::Vector3d t = scan.T_world_sensor.translation();
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      visit(scan.xyz + i * scan.stride, Eigen::Vector3d(R * scan.point(i) + t),
-            settings_.truth(scan.truth[i]));
-    }
+  void for_each_block_with_runs(const LabelledScan& scan, const detail::VoxelGrid& grid,
+                                const detail::RangeGate& gate, Visit&& visit) {
+    std::uint32_t last_label = 0;
+    Truth truth = settings_.truth(last_label);
+    detail::LocatedPoints(scan, grid, gate).for_each_block([&](const detail::PointBlock& block) {
+      for (std::size_t k = 0; k < block.count; ++k) {
+        const std::uint32_t label = scan.truth[block.first + k];
+        if (label != last_label) truth = settings_.truth(label);
+        last_label = label;
+        labels_[k] = {truth, 0};
+      }
+      runs_.find(block, labels_.data());
+      visit(block);
+    });
   }
 
-  void note_truth(const Eigen::Vector3d& p, Truth truth) {
-    const VoxelKey key = grid_.key(p);
-    if (key == detail::kNoKey) return;
-    const std::uint32_t number = measured_.insert(key);
+  Truth truth_of_run(std::size_t run) const { return labels_[runs_.begins[run]].truth; }
+
+  void note_truth(std::size_t run) {
+    const std::uint32_t number = numbers_[run];
     if (number == measured_truths_.size()) measured_truths_.push_back(0);
-    measured_truths_[number] |= truth_bit(truth);
+    measured_truths_[number] |= truth_bit(truth_of_run(run));
   }
 
-  void count_point(const Eigen::Vector3d& p, Truth truth) {
-    const bool kept = lookup_.contains(p);
+  void count_points(const detail::PointBlock& block, std::size_t run) {
+    const Truth truth = truth_of_run(run);
+    if (truth == Truth::kIgnored) return;
+    const std::size_t begin = runs_.begins[run], end = runs_.ends[run];
+    std::size_t kept = 0;
+    for (std::size_t i = begin; i < end && numbers_[run] != VoxelIndex::kNone; ++i) {
+      kept += lookup_.contains(block.p_world(i), numbers_[run]);
+    }
     if (truth == Truth::kStatic) {
-      ++point_score_.static_total;
+      point_score_.static_total += end - begin;
       point_score_.static_kept += kept;
     } else {
-      ++point_score_.dynamic_total;
-      point_score_.dynamic_removed += !kept;
+      point_score_.dynamic_total += end - begin;
+      point_score_.dynamic_removed += end - begin - kept;
     }
   }
 
@@ -134,8 +162,7 @@ class MapProtocol::Impl {
     mixed_.assign(groups_.grouped_points(), {});
     near_mixed_ = {};
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
-      for (const VoxelKey offset : detail::kNeighbours) {
-        const std::uint32_t number = measured_.find(groups_.key(cell) + offset);
+      for (const std::uint32_t number : around(groups_.key(cell), measured_)) {
         if (number != VoxelIndex::kNone) truths_[cell] |= measured_truths_[number];
       }
       if (!is_mixed(cell)) continue;
@@ -145,29 +172,51 @@ class MapProtocol::Impl {
     }
   }
 
+  static Around around(VoxelKey key, const VoxelIndex& index) {
+    std::array<VoxelKey, detail::kNeighbours.size()> keys = detail::kNeighbours;
+    for (VoxelKey& near : keys) near += key;
+    Around numbers;
+    index.find(keys.data(), keys.size(), numbers.data());
+    return numbers;
+  }
+
   bool is_mixed(std::size_t cell) const {
     return (truths_[cell] & (truths_[cell] - 1)) != 0;  // more than one bit
   }
 
-  /// Updates the nearest measured point of the map points in mixed voxels around `p`.
-  void approach(const Eigen::Vector3d& p, Truth truth) {
-    const VoxelKey key = grid_.key(p);
-    if (key == detail::kNoKey || near_mixed_.find(key) == VoxelIndex::kNone) return;
-    for (const VoxelKey offset : detail::kNeighbours) {
-      const std::uint32_t cell = groups_.index().find(key + offset);
+  /// Updates the nearest measured point of the map points in mixed voxels around a run.
+  void approach(const detail::PointBlock& block, std::size_t run) {
+    Eigen::AlignedBox3d box;
+    for (std::size_t i = runs_.begins[run]; i < runs_.ends[run]; ++i) box.extend(block.p_world(i));
+    for (const std::uint32_t cell : around(runs_.keys[run], groups_.index())) {
       if (cell == VoxelIndex::kNone || !is_mixed(cell)) continue;
-      // Skips voxels whose points all have a nearer measured point already: most, in dense maps.
-      if (grid_.squared_distance(p, key + offset) >= farthest_[cell]) continue;
-      Mixed* mixed = &mixed_[groups_.first(cell)];
+      const Eigen::Vector3d corner = grid_.corner(groups_.key(cell));
+      // Skips voxels and map points that have nearer measured points already: most, in dense maps.
+      if (squared_gap(box, corner, corner.array() + grid_.edge()) >= farthest_[cell]) continue;
       double farthest = 0;
-      for (const std::uint32_t i : groups_.points(cell)) {
-        const double distance = (map_[i] - p).squaredNorm();
-        if (distance < mixed->nearest) *mixed = {distance, truth};
-        farthest = std::max(farthest, mixed->nearest);
-        ++mixed;
+      for (std::size_t rank = 0; rank < groups_.points(cell).size(); ++rank) {
+        const Eigen::Vector3d& p = map_[groups_.points(cell)[rank]];
+        Mixed& mixed = mixed_[groups_.first(cell) + rank];
+        if (squared_gap(box, p, p) < mixed.nearest) approach(block, run, p, mixed);
+        farthest = std::max(farthest, mixed.nearest);
       }
       farthest_[cell] = farthest;
     }
+  }
+
+  static double squared_gap(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& lower,
+                            const Eigen::Vector3d& upper) {
+    return (box.min() - upper).cwiseMax(lower - box.max()).cwiseMax(0.0).squaredNorm();
+  }
+
+  void approach(const detail::PointBlock& block, std::size_t run, const Eigen::Vector3d& p,
+                Mixed& mixed) {
+    double nearest = mixed.nearest;
+    for (std::size_t i = runs_.begins[run]; i < runs_.ends[run]; ++i) {
+      const double squared = (p - block.p_world(i)).squaredNorm();
+      nearest = squared < nearest ? squared : nearest;
+    }
+    if (nearest < mixed.nearest) mixed = {nearest, truth_of_run(run)};
   }
 
   Truth truth_of(std::size_t cell, std::size_t rank) const {
@@ -206,6 +255,11 @@ class MapProtocol::Impl {
   detail::CellGroups groups_;
   detail::RadiusLookup lookup_;
   PointScore point_score_;
+
+  // Of a block.
+  std::array<detail::LayeredTruth, detail::PointBlock::kMost> labels_;
+  detail::PointRuns runs_;
+  std::array<std::uint32_t, detail::PointBlock::kMost> numbers_;  // by run
 
   VoxelIndex measured_;  // voxels that contain measured points
   std::vector<TruthMask> measured_truths_;

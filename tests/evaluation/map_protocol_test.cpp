@@ -83,6 +83,24 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   CHECK(score.harmonic_accuracy() == Approx(50.0));
 }
 
+TEST_CASE("A map point is found in every direction and at every place of a cell") {
+  Random random(4);
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d p(random.uniform(5, 6), random.uniform(-1, 1), random.uniform(-1, 1));
+    const Eigen::Vector3d direction =
+        Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1))
+            .normalized();
+    for (const double distance : {0.0499, 0.0501}) {
+      const Eigen::Vector3f measured = (p + distance * direction).cast<float>();
+      OwnedScan scan;
+      scan.add(measured.x(), measured.y(), measured.z(), kRoad);
+      // Cells count from the first point.
+      const std::vector<Eigen::Vector3d> map = {{20, 20, 0}, p};
+      REQUIRE(run({scan}, map, map_settings(0.2, 0.05)).points.static_kept == (distance < 0.05));
+    }
+  }
+}
+
 TEST_CASE("Map files get the score of the simple reference implementation", "[reference]") {
   for (const std::uint64_t seed : {21U, 22U, 23U}) {
     const auto scans = mixed_scans(seed, 4, 700);

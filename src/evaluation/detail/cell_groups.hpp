@@ -1,4 +1,4 @@
-// Points grouped by the voxel they lie in.
+// Points grouped by the voxels they belong to.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,22 +12,31 @@
 
 namespace dynains::evaluation::detail {
 
-/// Numbers the occupied voxels of a point set and lists the points of each, in input order.
-/// Points outside of the grid are left out.
+/// Numbers voxels in the order of their first points and lists the points of each, in input order.
 class CellGroups {
  public:
-  CellGroups(const VoxelGrid& grid, Span<const Eigen::Vector3d> points) {
-    std::vector<std::uint32_t> cell_of_point(points.size(), VoxelIndex::kNone);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const VoxelKey key = grid.key(points[i]);
-      if (key == kNoKey) continue;
-      const std::uint32_t cell = index_.insert(key);
-      if (cell == keys_.size()) {
-        keys_.push_back(key);
-        first_.push_back(0);
-      }
-      ++first_[cell];
-      cell_of_point[i] = cell;
+  /// Every point belongs to the voxel it lies in; points outside of the grid are left out.
+  CellGroups(const VoxelGrid& grid, Span<const Eigen::Vector3d> points)
+      : CellGroups(points.size(), [&](std::size_t i, auto&& add) {
+          const VoxelKey key = grid.key(points[i]);
+          if (key != kNoKey) add(key);
+        }) {}
+
+  /// `for_each_cell(i, add)` calls `add(key)` for the voxels that point i of `count` belongs to.
+  template <class ForEachCell>
+  CellGroups(std::size_t count, ForEachCell&& for_each_cell) {
+    std::vector<std::uint32_t> cells, members;  // by pair of both
+    for (std::size_t i = 0; i < count; ++i) {
+      for_each_cell(i, [&](VoxelKey key) {
+        const std::uint32_t cell = index_.insert(key);
+        if (cell == keys_.size()) {
+          keys_.push_back(key);
+          first_.push_back(0);
+        }
+        ++first_[cell];
+        cells.push_back(cell);
+        members.push_back(static_cast<std::uint32_t>(i));
+      });
     }
     std::uint32_t end = 0;
     for (std::uint32_t& first : first_) {
@@ -37,11 +46,7 @@ class CellGroups {
     first_.push_back(end);
     // Filled from the back, so that every `first_` moves from its group's end to its start.
     points_.resize(end);
-    for (std::size_t i = points.size(); i-- > 0;) {
-      if (cell_of_point[i] != VoxelIndex::kNone) {
-        points_[--first_[cell_of_point[i]]] = static_cast<std::uint32_t>(i);
-      }
-    }
+    for (std::size_t k = end; k-- > 0;) points_[--first_[cells[k]]] = members[k];
   }
 
   const VoxelIndex& index() const { return index_; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 
 #include "dynains/points.hpp"
@@ -21,30 +22,26 @@ inline Eigen::Vector3d anchor_of(Span<const Eigen::Vector3d> points) {
 /// Whether some map point lies within a radius.
 class RadiusLookup {
  public:
-  /// Cells are two radii wide: the eight cells around the nearest corner of a point contain all
-  /// points within the radius.
   RadiusLookup(double radius, Span<const Eigen::Vector3d> points)
       : squared_radius_(radius * radius),
         points_(points),
-        grid_(2 * radius, anchor_of(points)),
-        groups_(grid_, points) {}
+        grid_(4 * radius, anchor_of(points)),
+        cells_(points.size(), [&](std::size_t i, auto&& add) {
+          const VoxelKey key = grid_.key(points[i]);
+          for (const VoxelKey offset : kNeighbours) {
+            const double squared =
+                key == kNoKey ? 1e300 : grid_.squared_distance(points[i], key + offset);
+            if (squared <= 1.001 * squared_radius_) add(key + offset);  // more than rounding
+          }
+        }) {}
 
-  bool contains(const Eigen::Vector3d& p) const {
-    const VoxelKey key = grid_.key(p);
-    if (key == kNoKey) return false;
-    const Eigen::Vector3d center =
-        grid_.corner(key) + Eigen::Vector3d::Constant(0.5 * grid_.edge());
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      const auto step = [&](int axis) {
-        if ((corner >> axis & 1U) == 0) return 0;
-        return p[axis] < center[axis] ? -1 : 1;
-      };
-      const VoxelKey neighbour = key + voxel_key_step(step(0), step(1), step(2));
-      const std::uint32_t cell = groups_.index().find(neighbour);
-      if (cell == VoxelIndex::kNone) continue;
-      for (const std::uint32_t i : groups_.points(cell)) {
-        if ((points_[i] - p).squaredNorm() <= squared_radius_) return true;
-      }
+  const VoxelGrid& grid() const { return grid_; }
+  /// Numbers of the cells of grid() with a position near a map point.
+  const VoxelIndex& cells() const { return cells_.index(); }
+  /// `cell`: number of the cell that contains `p`.
+  bool contains(const Eigen::Vector3d& p, std::uint32_t cell) const {
+    for (const std::uint32_t i : cells_.points(cell)) {
+      if ((points_[i] - p).squaredNorm() <= squared_radius_) return true;
     }
     return false;
   }
@@ -53,7 +50,7 @@ class RadiusLookup {
   double squared_radius_;
   Span<const Eigen::Vector3d> points_;
   VoxelGrid grid_;
-  CellGroups groups_;
+  CellGroups cells_;  // the map points by all cells in their reach
 };
 
 }  // namespace dynains::evaluation::detail
