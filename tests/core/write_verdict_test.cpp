@@ -74,6 +74,12 @@ struct Votes {
   }
 };
 
+// Keeps what the verdicts need, as after the push of a scan.
+void keep(detail::ScanSlot& scan, const std::vector<std::uint32_t>& cluster_of) {
+  scan.cluster_of.assign(cluster_of);
+  scan.input.assign(Span<const std::uint32_t>(scan.split.input.data(), scan.split.count));
+}
+
 TEST_CASE("verdicts by point run equal those by point, at once and after more windows") {
   // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
@@ -135,7 +141,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     const std::vector<ClusterVerdict> first = random_verdicts(random);
     add(scan.windows.point_runs, first);
     detail::WindowVoter::record_first(points, first, scan.windows);
-    scan.assign_instances(first_cluster);
+    keep(scan, first_cluster);
     writer.begin(scan);
     writer.write_windows(scan, 1);
     check(1);
@@ -244,7 +250,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     };
 
     change();
-    slot.assign_instances(scan.cluster_of);
+    keep(slot, scan.cluster_of);
     writer.begin(slot);
     writer.write_groups(slot, {groups, scan.group_of, moved});
     check(false);

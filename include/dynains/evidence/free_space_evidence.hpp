@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
@@ -26,6 +27,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/short_numbers.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
@@ -87,11 +89,13 @@ class FreeSpaceEvidence {
         std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
           return a.evidence.samples.size() < b.evidence.samples.size();
         });
+    const Record roomy = *largest;
     // Some spare capacity, since a copy has none and scans of one sensor differ in size.
-    Record roomy = *largest;
-    std::vector<std::uint32_t>& by_point = roomy.evidence.samples.number_of_point;
-    by_point.resize(by_point.size() + by_point.size() / 8);
-    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) records_[i] = roomy;
+    const std::size_t points = roomy.number_of_point.size() + roomy.number_of_point.size() / 8;
+    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) {
+      records_[i] = roomy;
+      records_[i].number_of_point.reserve(points);
+    }
     for (Judged* judged : {&provisional_, &final_}) {
       detail::ensure_capacity(judged->supervoxels, roomy.evidence.samples.supervoxel_count());
       detail::ensure_capacity(judged->removed, roomy.evidence.samples.instance_count());
@@ -162,8 +166,9 @@ class FreeSpaceEvidence {
       groups_[i] = judged.supervoxels[samples.supervoxel_of_number[i]];
     }
     for (const std::size_t instance : judged.removed) add_hull(record.evidence, instance);
-    moved_ground_.add(split.non_ground(), samples.number_of_point, groups_);
-    return {groups_, samples.number_of_point,
+    record.number_of_point.copy_to(group_of_);
+    moved_ground_.add(split.non_ground(), group_of_, groups_);
+    return {groups_, group_of_,
             moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
   }
 
@@ -226,6 +231,7 @@ class FreeSpaceEvidence {
     Pose T_world_sensor = Pose::Identity();
     std::uint64_t since_begin = 0;  // scans since the first scan of the epoch
     detail::InstanceEvidence evidence;
+    detail::ShortNumbers number_of_point;  // by non-ground point: number of its supervoxel
     std::vector<detail::DynamicOccupancyGrid::Count> counted;  // by supervoxel
     std::vector<detail::GroundBox> ground_boxes;               // by block of 64 ground points
     detail::GroundSamples ground;
@@ -270,7 +276,11 @@ class FreeSpaceEvidence {
   void begin_evidence(PointsView points, Span<const std::uint32_t> instance_of,
                       std::size_t instance_count, Record& record) {
     detail::InstanceEvidence& evidence = record.evidence;
+    std::vector<std::uint32_t>& number_of_point = evidence.samples.number_of_point;
+    number_of_point = std::move(newest_number_of_point_);
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
+    newest_number_of_point_ = std::move(number_of_point);
+    record.number_of_point.assign(newest_number_of_point_);
     updater().begin(evidence.samples, evidence.beliefs);
     record.counted.assign(evidence.samples.supervoxel_count(),
                           detail::DynamicOccupancyGrid::Count::kNone);
@@ -429,7 +439,7 @@ class FreeSpaceEvidence {
            evidence.tracked.instances[instance].own >= 0.0F;
   }
 
-  // Writes by non-ground point whether `test(supervoxel)` holds.
+  // Writes by non-ground point of the newest scan whether `test(supervoxel)` holds.
   template <class Test>
   void mark_points(const detail::InstanceSamples& samples, Test&& test,
                    std::vector<std::uint8_t>& marks) {
@@ -437,10 +447,10 @@ class FreeSpaceEvidence {
     for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i) {
       is_marked_group_[i] = test(samples.supervoxel_of_number[i]) ? 1 : 0;
     }
-    detail::ensure_capacity(marks, samples.number_of_point.size());
-    marks.resize(samples.number_of_point.size());
+    detail::ensure_capacity(marks, newest_number_of_point_.size());
+    marks.resize(newest_number_of_point_.size());
     for (std::size_t i = 0; i < marks.size(); ++i) {
-      marks[i] = is_marked_group_[samples.number_of_point[i]];
+      marks[i] = is_marked_group_[newest_number_of_point_[i]];
     }
   }
 
@@ -468,6 +478,7 @@ class FreeSpaceEvidence {
   std::vector<std::vector<int>> lags_after_;   // by scans since the latest reference
   std::vector<Record> records_;                // ring buffer, by scan number
   Judged provisional_, final_;
+  std::vector<std::uint32_t> newest_number_of_point_, group_of_;
   std::vector<Verdict> groups_;                     // by number of the supervoxel
   std::vector<std::uint8_t> is_marked_group_;       // by number of the supervoxel
   std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point

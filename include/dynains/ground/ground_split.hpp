@@ -13,10 +13,11 @@ namespace dynains {
 /// One scan, reordered: ground points first, then all other points. Later stages use views of it
 /// and copy no points.
 struct GroundSplit {
-  PointBuffer points;                ///< m, sensor frame; padded for packs beyond `count`
-  std::vector<std::uint32_t> input;  ///< index of each point in the input of the remover
-  std::size_t ground_count = 0;      ///< number of ground points
-  std::size_t count = 0;             ///< number of all points
+  PointBuffer points;  ///< m, sensor frame; padded for packs beyond `count`
+  /// Index of each point in the input of the remover; empty after the push of the scan.
+  std::vector<std::uint32_t> input;
+  std::size_t ground_count = 0;  ///< number of ground points
+  std::size_t count = 0;         ///< number of all points
 
   PointsView ground() const { return PointsView(points).subview(0, ground_count); }
   PointsView non_ground() const {

@@ -201,6 +201,7 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   void record(ScanRing& scans, std::uint64_t first_scan) {
     ScanSlot& newest = scans.newest();
     const Span<const ClusterSet::PointRun> runs = clusters_.point_runs(clusters_.scan_count() - 1);
+    ensure_capacity(newest.windows.point_runs, runs.size());
     newest.windows.point_runs.assign(runs.begin(), runs.end());
     assign_ids(scans);
     WindowVoter::record_first(newest.non_ground_count(), verdicts_, newest.windows);

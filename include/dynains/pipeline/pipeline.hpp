@@ -205,6 +205,7 @@ class Pipeline final : private NewestVerdictMaker {
   const ScanSlot* unwritten_ = nullptr;  // its scan, until newest_ is made
   Map map_;
   ScanRing scans_;
+  std::vector<std::uint32_t> split_input_;  // memory of GroundSplit::input, for one scan at a time
   ScanRate rate_;
   PlausibilityCheck plausibility_;
   // Outcome of finish_due() for push() or finish_oldest().
@@ -225,6 +226,7 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
     timed(times.ingest, [&] { find_sensor(newest); });
   }
   const auto cluster = [&] {
+    newest.split.input = std::move(split_input_);
     timed(times.ground, [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
     timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
     timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
@@ -236,7 +238,11 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   }
   timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
   timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
-  timed(times.verdict, [&] { newest.assign_instances(window_.newest_cluster_of()); });
+  timed(times.verdict, [&] {
+    newest.cluster_of.assign(window_.newest_cluster_of());
+    newest.input.assign(Span<const std::uint32_t>(newest.split.input.data(), newest.split.count));
+    split_input_ = std::move(newest.split.input);
+  });
   transaction.commit();
   if (!finishes_later_) finish_due(times);
   const std::optional<ScanVerdict> finished = take_finished();
@@ -314,7 +320,6 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
   } else {
     ingest_.read(cloud, region, nullptr, next.input_labels);
   }
-  next.ensure_capacity(next.input_labels.size());
 }
 
 template <class Stages>

@@ -17,6 +17,7 @@
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/short_numbers.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -32,47 +33,27 @@ struct ScanSlot {
 
   GroundSplit split;
   std::vector<PointLabel> input_labels;  ///< by input point: kGround for valid points
-  std::vector<std::uint32_t> instances;  ///< by non-ground point: id, or kNoInstance
+  ShortNumbers input;                    ///< by point of the split: its index in the input
+  ShortNumbers cluster_of;               ///< by non-ground point: index in `ids`, or kNoCluster
   std::vector<std::uint32_t> ids;        ///< by cluster of the window that ends with this scan
   WindowVotes windows;
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
-  /// Input index of each non-ground point.
-  const std::uint32_t* non_ground_input() const { return split.input.data() + split.ground_count; }
-
-  /// Sets `instances` from `ids`. `cluster_of`: by non-ground point, or kNoCluster.
-  void assign_instances(Span<const std::uint32_t> cluster_of) {
-    detail::ensure_capacity(instances, cluster_of.size());
-    instances.resize(cluster_of.size());
-    for (std::size_t i = 0; i < cluster_of.size(); ++i) {
-      instances[i] = cluster_of[i] == kNoCluster ? kNoInstance : ids[cluster_of[i]];
-    }
-  }
-
-  /// Ensures capacity for a scan of `points` points.
-  void ensure_capacity(std::size_t points) {
-    const auto ensure = [points](auto&... values) {
-      (detail::ensure_capacity(values, points), ...);
-    };
-    ensure(input_labels, instances);
-    ensure(windows.stage, windows.votes, windows.belief);
-    constexpr std::size_t kPointsPerRun = 4;  // typical mean; more runs reallocate
-    detail::ensure_capacity(windows.point_runs, points / kPointsPerRun);
-  }
 
   /// Ensures capacity for `points` points and writes to the memory of the points, so that later
   /// scans cause no page faults.
   void touch(std::size_t points) {
-    ensure_capacity(points);
-    split.resize(points);
-    split.resize(0);
+    split.points.grow(points + kMaxPackWidth);
+    detail::ensure_capacity(input_labels, points);
     input_labels.resize(points);
-    input_labels.clear();
+    input.reserve(points);
+    cluster_of.reserve(points);
   }
 
-  /// Ensures capacity for the number of clusters of `other`.
+  /// Ensures capacity for the clusters and the windows of `other`.
   void ensure_capacity_like(const ScanSlot& other) {
     detail::ensure_capacity(ids, other.ids.size());
+    windows.reserve_like(other.windows);
   }
 };
 

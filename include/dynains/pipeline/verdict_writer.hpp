@@ -35,7 +35,8 @@ class VerdictWriter {
   /// Ensures capacity for a scan of `points` points and writes to the memory, so that later scans
   /// cause no page faults.
   void touch(std::size_t points) {
-    resize_all(points, labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_);
+    resize_all(points, labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_, input_,
+               cluster_of_);
   }
 
   /// Ensures capacity for the number of groups of `other`.
@@ -49,11 +50,13 @@ class VerdictWriter {
     is_kept_.assign(scan.split.count, 1);
     ensure_capacity(instances_, count);
     instances_.assign(count, kNoInstance);
-    const std::uint32_t* const input = scan.non_ground_input();
-    const std::uint32_t* const ids = scan.instances.data();
+    scan.input.copy_to(input_);
+    scan.cluster_of.copy_to(cluster_of_);
+    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     std::uint32_t* const instances = instances_.data();
-    const std::size_t non_ground_count = scan.instances.size();
-    for (std::size_t i = 0; i < non_ground_count; ++i) instances[input[i]] = ids[i];
+    for (std::size_t i = 0; i < cluster_of_.size(); ++i) {
+      if (cluster_of_[i] != kNoCluster) instances[input[i]] = scan.ids[cluster_of_[i]];
+    }
     resize_all(count, labels_, beliefs_, causes_);
   }
 
@@ -62,14 +65,13 @@ class VerdictWriter {
   void write_windows(const ScanSlot& scan, int votes_needed) {
     write_input_labels(scan.input_labels);
     const std::size_t count = scan.non_ground_count();
-    const std::uint32_t* const input = scan.non_ground_input();
+    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     const DecisionStage* const stage = scan.windows.stage.data();
     PointLabel* const labels = labels_.data();
     Cause* const causes = causes_.data();
-    const Points points = this->points(scan);
     for (std::size_t i = 0; i < count; ++i) {
       if (stage[i] == DecisionStage::kProposed) {
-        points.write(scan.split.ground_count + i, point_verdict(scan.windows, i, votes_needed));
+        write(scan.split.ground_count + i, point_verdict(scan.windows, i, votes_needed));
       } else {
         labels[input[i]] = PointLabel::kStatic;
         causes[input[i]] = static_cause(stage[i]);
@@ -88,9 +90,8 @@ class VerdictWriter {
     }
     order_groups(scan, evidence.group_of);
     expand_groups(scan.input_labels);
-    const Points points = this->points(scan);
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
-      points.write(ground.point, ground.verdict);
+      write(ground.point, ground.verdict);
     }
   }
 
@@ -102,27 +103,6 @@ class VerdictWriter {
     std::uint8_t* const is_kept = is_kept_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < count; ++i) is_kept[i] = verdicts[group_of[i]].is_kept;
   }
-
-  /// Writes verdicts on single points, by index in the split.
-  class Points {
-   public:
-    void write(std::size_t point, const PointVerdict& verdict) const {
-      const std::uint32_t to = input_[point];
-      writer_.labels_[to] = label_of(verdict.cause);
-      writer_.causes_[to] = verdict.cause;
-      writer_.beliefs_[to] = verdict.belief;
-      writer_.is_kept_[point] = is_dynamic(verdict.cause) ? 0 : 1;
-    }
-
-   private:
-    friend class VerdictWriter;
-    Points(const ScanSlot& scan, VerdictWriter& writer)
-        : input_(scan.split.input.data()), writer_(writer) {}
-
-    const std::uint32_t* input_;
-    VerdictWriter& writer_;
-  };
-  Points points(const ScanSlot& scan) { return {scan, *this}; }
 
  private:
   // Verdict on the points of a group, packed in eight bytes.
@@ -142,6 +122,15 @@ class VerdictWriter {
   static constexpr std::uint32_t kBadPoints = 0;
   static constexpr std::uint32_t kGroundPoints = 1;
   static constexpr std::uint32_t kFirstGroup = 2;
+
+  // Writes the verdict on a single point, by index in the split.
+  void write(std::size_t point, const PointVerdict& verdict) {
+    const std::uint32_t to = input_[point];
+    labels_[to] = label_of(verdict.cause);
+    causes_[to] = verdict.cause;
+    beliefs_[to] = verdict.belief;
+    is_kept_[point] = is_dynamic(verdict.cause) ? 0 : 1;
+  }
 
   template <class... Vectors>
   static void resize_all(std::size_t count, Vectors&... values) {
@@ -168,7 +157,7 @@ class VerdictWriter {
     for (std::size_t i = 0; i < count; ++i) {
       group_of[i] = labels[i] == PointLabel::kGround ? kGroundPoints : kBadPoints;
     }
-    const std::uint32_t* const input = scan.non_ground_input();
+    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
 
@@ -195,7 +184,9 @@ class VerdictWriter {
   std::vector<Cause> causes_;
   std::vector<std::uint32_t> group_of_input_;
 
-  std::vector<std::uint8_t> is_kept_;  // by point of the split
+  std::vector<std::uint8_t> is_kept_;      // by point of the split
+  std::vector<std::uint32_t> input_;       // by point of the split
+  std::vector<std::uint32_t> cluster_of_;  // by non-ground point
   std::vector<GroupVerdict> verdicts_;
 };
 

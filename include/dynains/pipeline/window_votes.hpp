@@ -33,6 +33,14 @@ struct WindowVotes {
   std::vector<std::uint8_t> votes;   ///< proposed points: number of windows with verdict dynamic
   std::vector<float> belief;         ///< proposed points: highest posterior of all windows
   std::vector<ClusterSet::PointRun> point_runs;  ///< in the window that ends with the scan
+
+  /// Ensures capacity for the votes on the scan of `other`.
+  void reserve_like(const WindowVotes& other) {
+    ensure_capacity(stage, other.stage.size());
+    ensure_capacity(votes, other.votes.size());
+    ensure_capacity(belief, other.belief.size());
+    ensure_capacity(point_runs, other.point_runs.size());
+  }
 };
 
 /// Cause of a static verdict on a point whose cluster reached `stage`.
@@ -64,9 +72,9 @@ class WindowVoter {
   /// Records the window that ends with the scan. `votes.point_runs` must be set.
   static void record_first(std::size_t point_count, Span<const ClusterVerdict> verdicts,
                            WindowVotes& votes) {
-    votes.votes.resize(point_count);
-    votes.belief.resize(point_count);
-    votes.stage.resize(point_count + kPiece);
+    resize(votes.votes, point_count);
+    resize(votes.belief, point_count);
+    resize(votes.stage, point_count + kPiece);
     spread_stages(votes.point_runs, verdicts, votes.stage.data());
     for (const PointRun& run : votes.point_runs) {
       const ClusterVerdict verdict = verdict_on(run, verdicts);
@@ -92,6 +100,12 @@ class WindowVoter {
  private:
   static constexpr std::size_t kPiece = 16;
   using Piece = std::array<DecisionStage, kPiece>;
+
+  template <class T>
+  static void resize(std::vector<T>& values, std::size_t size) {
+    ensure_capacity(values, size);
+    values.resize(size);
+  }
 
   static ClusterVerdict verdict_on(const PointRun& run, Span<const ClusterVerdict> verdicts) {
     return run.cluster != kNoCluster ? verdicts[run.cluster] : ClusterVerdict();

@@ -1,0 +1,97 @@
+// A list of numbers of 32 bits in about half of its memory.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
+
+namespace dynains::detail {
+
+/// Holds the lower 16 bits of each number, and the upper 16 bits of each run of numbers that share
+/// them: two bytes per number, and eight per run.
+class ShortNumbers {
+ public:
+  std::size_t size() const { return lower_.size(); }
+
+  /// Ensures capacity for `count` numbers with few runs.
+  void reserve(std::size_t count) {
+    constexpr std::size_t kNumbersPerRun = 16;
+    ensure_capacity(lower_, count);
+    ensure_capacity(runs_, count / kNumbersPerRun);
+  }
+
+  void assign(Span<const std::uint32_t> numbers) {
+    reserve(numbers.size());
+    lower_.resize(numbers.size());
+    runs_.clear();
+    with_largest_packs([&](auto packs) { take<decltype(packs)>(numbers); });
+  }
+
+  /// Replaces the content of `numbers` by the list.
+  void copy_to(std::vector<std::uint32_t>& numbers) const {
+    ensure_capacity(numbers, size());
+    numbers.resize(size());
+    std::uint32_t* const to = numbers.data();
+    const std::uint16_t* const lower = lower_.data();
+    with_packs([&](auto) {
+      for (std::size_t run = 0; run < runs_.size(); ++run) {
+        const std::uint32_t upper = runs_[run].upper;
+        const std::size_t end = run + 1 < runs_.size() ? runs_[run + 1].begin : size();
+        for (std::size_t i = runs_[run].begin; i < end; ++i) to[i] = upper | lower[i];
+      }
+    });
+  }
+
+ private:
+  static constexpr int kHalf = 16;           // bits
+  static constexpr std::size_t kBlock = 64;  // numbers
+  struct Run {
+    std::uint32_t begin;
+    std::uint32_t upper;  // the lower bits are zero
+  };
+
+  template <class Packs>
+  void take(Span<const std::uint32_t> numbers) {
+    const std::size_t count = numbers.size();
+    const std::uint32_t* const from = numbers.data();
+    std::uint16_t* const lower = lower_.data();
+    for (std::size_t i = 0; i < count; ++i) lower[i] = static_cast<std::uint16_t>(from[i]);
+    const auto begin_run = [&](std::size_t i) {
+      runs_.push_back({static_cast<std::uint32_t>(i), from[i] >> kHalf << kHalf});
+    };
+    if (count > 0) begin_run(0);
+    for (std::size_t begin = 1; begin < count; begin += kBlock) {
+      const std::size_t size = std::min(kBlock, count - begin);
+      for_each_bit(find_begins<Packs>(from + begin, size),
+                   [&](std::size_t i) { begin_run(begin + i); });
+    }
+  }
+
+  // Bit i is set if number i of at most kBlock begins a run. The number before the first must
+  // exist.
+  template <class Packs>
+  static std::uint64_t find_begins(const std::uint32_t* numbers, std::size_t count) {
+    using Int = typename Packs::Int;
+    std::uint64_t same = 0;
+    std::size_t i = 0;
+    for (; i + Packs::kCount <= count; i += Packs::kCount) {
+      const auto* const from = reinterpret_cast<const std::int32_t*>(numbers + i);
+      const Int changed = (Int::load(from) ^ Int::load(from - 1)) >> kHalf;
+      same |= std::uint64_t{(changed == Int(0)).bits()} << i;
+    }
+    for (; i < count; ++i) {
+      same |= std::uint64_t{(numbers[i] ^ *(numbers + i - 1)) >> kHalf == 0} << i;
+    }
+    return ~same & ~std::uint64_t{0} >> (kBlock - count);
+  }
+
+  std::vector<std::uint16_t> lower_;
+  std::vector<Run> runs_;
+};
+
+}  // namespace dynains::detail
