@@ -35,8 +35,6 @@ InstanceSamples samples_of(const Instances& instances) {
   std::uint32_t instance = 0;
   for (const std::vector<std::uint32_t>& supervoxels : instances) {
     for (const std::uint32_t count : supervoxels) {
-      samples.supervoxel_of.insert(samples.supervoxel_of.end(), count,
-                                   static_cast<std::uint32_t>(samples.supervoxel_count()));
       for (std::uint32_t i = 0; i < count; ++i) samples.points.push_back(10.0F, 0.0F, 0.0F);
       samples.sample_begin.push_back(samples.sample_begin.back() + count);
       samples.instance_of.push_back(instance);
@@ -45,6 +43,7 @@ InstanceSamples samples_of(const Instances& instances) {
     samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.supervoxel_count()));
     ++instance;
   }
+  samples.mark_begins();
   return samples;
 }
 

@@ -78,7 +78,7 @@ std::map<Place, std::multiset<Point>> by_supervoxel(const InstanceSamples& sampl
       REQUIRE(samples.instance_of[s] == instance);
       std::multiset<Point> points;
       for (std::uint32_t p = samples.sample_begin[s]; p < samples.sample_begin[s + 1]; ++p) {
-        REQUIRE(samples.supervoxel_of[p] == s);
+        REQUIRE(samples.supervoxel_of(p) == s);
         points.insert({samples.points.x[p], samples.points.y[p], samples.points.z[p]});
       }
       REQUIRE(!points.empty());

@@ -44,10 +44,10 @@ class GroundSampler {
     out.run_begins.assign(blocks, 0);
     if (!is_active_) return;
     std::size_t runs = 0;
-    firsts_.grow(ground.size());
     for (std::size_t i = 0; i < blocks; ++i) {
       const PointsView block = GroundFootprint::block_of(ground, i * kBlock);
       out.run_begins[i] = sampler_.find_changes(block);
+      firsts_.grow(runs + kBlock);
       for_each_bit(out.run_begins[i], [&](std::size_t k) {
         firsts_.x[runs] = block.x[k];
         firsts_.y[runs] = block.y[k];

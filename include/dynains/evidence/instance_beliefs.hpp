@@ -207,7 +207,7 @@ class InstanceBeliefUpdater {
   // Writes the supervoxels that can change to `touched_`, in ascending order; returns their number.
   std::size_t find_touched(const InstanceSamples& samples, const Visibility& visibility,
                            const InstanceBeliefs& beliefs) {
-    constexpr std::size_t kBits = 64;
+    constexpr std::size_t kBits = InstanceSamples::kWord;
     grow(touched_, samples.supervoxel_count() + 1);
     std::size_t count = 0;
     std::uint32_t last = kNoCluster;
@@ -216,15 +216,20 @@ class InstanceBeliefUpdater {
           visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
       const std::size_t left = samples.size() - begin;
       if (left < kBits) touched &= (std::uint64_t{1} << left) - 1;
-      for_each_bit(touched, [&](std::size_t i) {
-        const std::uint32_t s = samples.supervoxel_of[begin + i];
+      const std::uint64_t begins = samples.begins[begin / kBits];
+      while (touched != 0) {
+        const std::uint64_t above = ~std::uint64_t{1} << __builtin_ctzll(touched);
+        const std::uint32_t s =
+            samples.supervoxels_before[begin / kBits] + count_ones(begins & ~above) - 1;
         touched_[count] = s;
         count += s != last ? 1 : 0;
         last = s;
         __builtin_prefetch(&beliefs.supervoxels[s]);
         __builtin_prefetch(&samples.sample_begin[s]);
         __builtin_prefetch(&samples.instance_of[s]);
-      });
+        const std::uint64_t next = begins & above & (~(begins & above) + 1);  // begin after s, or 0
+        touched &= ~next + 1;
+      }
     }
     return count;
   }

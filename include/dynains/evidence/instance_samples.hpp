@@ -11,6 +11,7 @@
 #include "dynains/evidence/smallest_k.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -20,13 +21,17 @@ namespace dynains::detail {
 /// The samples of one scan, ordered by instance, then by supervoxel: each instance and each
 /// supervoxel is one range of samples.
 struct InstanceSamples {
+  static constexpr std::size_t kWord = 64;  ///< samples
+
   PointBuffer points;                           ///< samples, m, sensor frame; padded for packs
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel: first sample, and the end
   std::vector<VoxelKey> place;                  ///< by supervoxel: its voxel in the sensor frame
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
-  std::vector<std::uint32_t> supervoxel_of;     ///< by sample; padded at the end
-  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> number_of_point;   ///< by point: number of its supervoxel; 0: none
+  /// By 64 samples: bits of the first sample of each supervoxel, and number of supervoxels before.
+  std::vector<std::uint64_t> begins;
+  std::vector<std::uint32_t> supervoxels_before;
+  std::vector<std::uint32_t> instance_of;      ///< by supervoxel
+  std::vector<std::uint32_t> number_of_point;  ///< by point: number of its supervoxel; 0: none
   /// By number, which follows the points: index of the supervoxel; [0]: kNoCluster.
   std::vector<std::uint32_t> supervoxel_of_number;
 
@@ -36,6 +41,28 @@ struct InstanceSamples {
   }
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
+  }
+  /// Supervoxel of a sample.
+  std::uint32_t supervoxel_of(std::size_t sample) const {
+    const std::uint64_t up_to_sample = ~std::uint64_t{0} >> (kWord - 1 - sample % kWord);
+    return supervoxels_before[sample / kWord] + count_ones(begins[sample / kWord] & up_to_sample) -
+           1;
+  }
+  /// Sets `begins` and `supervoxels_before`.
+  void mark_begins() {
+    const std::size_t words = size() / kWord + 1;
+    ensure_capacity(begins, words);
+    ensure_capacity(supervoxels_before, words);
+    begins.assign(words, 0);
+    supervoxels_before.resize(words);
+    for (std::size_t s = 0; s < supervoxel_count(); ++s) {
+      begins[sample_begin[s] / kWord] |= std::uint64_t{1} << sample_begin[s] % kWord;
+    }
+    std::uint32_t before = 0;
+    for (std::size_t word = 0; word < words; ++word) {
+      supervoxels_before[word] = before;
+      before += count_ones(begins[word]);
+    }
   }
   /// Number of samples of an instance.
   std::uint32_t count(std::size_t instance) const {
@@ -238,19 +265,15 @@ class InstanceSampler {
     copy_samples(points, supervoxel_count, out);
   }
 
-  // Copies the maximum number of samples of each supervoxel, without a branch. The next supervoxel
+  // Gathers the maximum number of samples of each supervoxel, without a branch. The next supervoxel
   // overwrites the excess.
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
     const std::size_t most = samples_.most();
-    const std::size_t capacity =
-        std::min(supervoxel_count * most, points.size() + most) + kMaxPackWidth;
-    out.points.grow(capacity);
-    grow(out.supervoxel_of, capacity);
+    gathered_.grow(supervoxel_count * most + kMaxPackWidth);
     out.sample_begin.resize(supervoxel_count + 1);
-    float* const x = out.points.x.data();
-    float* const y = out.points.y.data();
-    float* const z = out.points.z.data();
-    std::uint32_t* const supervoxel_of = out.supervoxel_of.data();
+    float* const x = gathered_.x.data();
+    float* const y = gathered_.y.data();
+    float* const z = gathered_.z.data();
     std::size_t to = 0;
     for (std::size_t s = 0; s < supervoxel_count; ++s) {
       out.sample_begin[s] = static_cast<std::uint32_t>(to);
@@ -260,11 +283,15 @@ class InstanceSampler {
         x[to + k] = points.x[i];
         y[to + k] = points.y[i];
         z[to + k] = points.z[i];
-        supervoxel_of[to + k] = static_cast<std::uint32_t>(s);
       }
       to += samples_.count(number);
     }
     out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
+    out.points.grow(to + kMaxPackWidth);
+    std::copy_n(x, to, out.points.x.data());
+    std::copy_n(y, to, out.points.y.data());
+    std::copy_n(z, to, out.points.z.data());
+    out.mark_begins();
   }
 
   float supervoxels_per_metre_;
@@ -276,6 +303,7 @@ class InstanceSampler {
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end
   std::vector<std::uint32_t> next_;      // by instance: position of its next supervoxel
   std::vector<std::uint32_t> ordered_;   // by supervoxel: number in the table
+  PointBuffer gathered_;                 // samples
 };
 
 }  // namespace dynains::detail

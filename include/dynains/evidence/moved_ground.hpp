@@ -115,11 +115,11 @@ class MovedGround {
   // The first points of the runs beside the removed points give the height of the surrounding
   // ground, which is unknown without samples.
   void find_surroundings(PointsView ground, const GroundSamples& samples) {
-    around_points_.grow(ground.size());
     std::size_t count = 0;
     for (std::size_t i = 0; samples.size() > 0 && i < under_.size(); ++i) {
       const PointsView block = block_of(ground, i);
       const std::uint64_t beside = ~under_[i] & all_of(block);
+      around_points_.grow(count + GroundFootprint::kBlock);
       const std::uint64_t first = beside & (samples.run_begins[i] | ~(beside << 1U));
       for_each_bit(first, [&](std::size_t k) {
         around_points_.x[count] = block.x[k];
