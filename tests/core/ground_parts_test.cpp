@@ -90,7 +90,7 @@ TEST_CASE("LowestMean gives the bits of sorting for few values, ties, rising and
   }
 }
 
-TEST_CASE("Ingest takes good points in order and labels the others, in any mixture") {
+TEST_CASE("Ingest takes good points in order and marks the others, in any mixture") {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr float kTiny = std::numeric_limits<float>::denorm_min();
@@ -100,6 +100,7 @@ TEST_CASE("Ingest takes good points in order and labels the others, in any mixtu
       {1e30F, 1e30F, 0.0F}, {0.0F, -kInfinity, 0.0F}, {0.0F, 0.0F, -2.0F}};
   Random random(3);
   detail::Ingest ingest;
+  detail::UnjudgedPoints unjudged;
   for (const std::size_t stride : {3U, 4U, 6U}) {
     for (const float min_range : {0.0F, 1.0F}) {
       for (const std::size_t count : {0U, 1U, 7U, 8U, 200U, 1000U}) {
@@ -111,12 +112,16 @@ TEST_CASE("Ingest takes good points in order and labels the others, in any mixtu
           const std::array<float, 3>& p = kinds[is_bad ? kind : 0];
           std::copy(p.begin(), p.end(), cloud.begin() + static_cast<std::ptrdiff_t>(stride * i));
         }
-        std::vector<PointLabel> labels(count / 2, PointLabel::kDynamic);  // of an earlier scan
         const RawPoints<float> points{cloud.data(), count, stride};
-        ingest.read(detail::CloudView(points), {min_range, 50.0F}, nullptr, labels);
+        ingest.read(detail::CloudView(points), {min_range, 50.0F}, nullptr, unjudged);
 
         CAPTURE(stride, min_range, count);
-        REQUIRE(labels.size() == count);
+        REQUIRE(unjudged.size() == count);
+        std::vector<PointLabel> labels(count, PointLabel::kGround);
+        unjudged.for_each([&](std::size_t i, PointLabel label) {
+          REQUIRE(i < count);
+          labels[i] = label;
+        });
         std::size_t taken = 0;
         for (std::size_t i = 0; i < count; ++i) {
           const Eigen::Vector3f p = PointCloudTraits<RawPoints<float>>::point(points, i);

@@ -93,12 +93,12 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     const std::uint32_t bad = 3;
     scan.split.resize(ground + points);
     scan.split.ground_count = ground;
-    scan.input_labels.assign(ground + points + bad, PointLabel::kInvalid);
     const std::vector<std::size_t> order = random.permutation(ground + points + bad);
     for (std::size_t i = 0; i < ground + points; ++i) {
       scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
-      scan.input_labels[order[i]] = PointLabel::kGround;  // of good points
     }
+    scan.unjudged.reset(order.size());
+    for (std::size_t i = ground + points; i < order.size(); ++i) scan.unjudged.mark(order[i], 1, 0);
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
@@ -177,9 +177,8 @@ struct JudgedScan {
     slot.split.resize(ground + above);
     slot.split.ground_count = ground;
     std::copy_n(order.begin(), ground + above, slot.split.input.begin());
-    slot.input_labels.assign(all, PointLabel::kOutOfRange);
-    for (std::size_t i = 0; i < ground + above; ++i)
-      slot.input_labels[order[i]] = PointLabel::kGround;
+    slot.unjudged.reset(all);
+    for (std::size_t i = ground + above; i < all; ++i) slot.unjudged.mark(order[i], 1, 1);
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
     for (std::size_t i = 0; i < above; ++i) {
       const std::size_t cluster = random.index(kClusters + 1);

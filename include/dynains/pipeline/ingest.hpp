@@ -1,4 +1,4 @@
-// Input filter: copies the valid points of a cloud and labels all points.
+// Input filter: copies the valid points of a cloud and marks the others.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"
@@ -24,20 +25,18 @@ struct JudgedRegion {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();
 };
 
-/// Copies the valid points of a cloud as floats and labels every input point. A valid point has
-/// finite coordinates and lies within the judged region; its first label is kGround. The copies
-/// are relative to the position of the sensor.
+/// Copies the valid points of a cloud as floats. A valid point has finite coordinates and lies
+/// within the judged region. The copies are relative to the position of the sensor.
 class Ingest {
  public:
   /// `cloud`: m. Points at the origin of the cloud or at the sensor are beams without a return and
   /// get kInvalid, as do NaN and infinity. `R`: rotation of the valid points after the range test,
-  /// or null for none. `labels`: by input point.
+  /// or null for none. `unjudged`: receives the points that are not valid.
   void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R,
-            std::vector<PointLabel>& labels) {
+            UnjudgedPoints& unjudged) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
-    ensure_capacity(labels, count);
-    labels.resize(count);
+    unjudged.reset(count);
     points_.grow(count + kMaxPackWidth);
     grow(input_, count + kMaxPackWidth);
     count_ = 0;
@@ -46,7 +45,7 @@ class Ingest {
       copy(cloud, begin, length);
       if (!region.origin.isZero(0.0F)) subtract(region.origin, length);
       const std::size_t valid_count = filter(begin, length, region.min_range * region.min_range,
-                                             region.max_range * region.max_range, labels.data());
+                                             region.max_range * region.max_range, unjudged);
       if (R != nullptr) {
         transform_points(PointsView(points_).subview(count_, valid_count), rotation, points_,
                          count_);
@@ -117,10 +116,10 @@ class Ingest {
     }
   }
 
-  // Labels the appended points and compacts the valid ones. Returns the number of valid points. The
-  // branch for a whole valid pack is the common case.
+  // Compacts the valid points among the appended ones and marks the others. Returns the number of
+  // valid points. The branch for a whole valid pack is the common case.
   std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
-                     PointLabel* label_of) {
+                     UnjudgedPoints& unjudged) {
     std::size_t result = 0;
     with_largest_packs([&](auto packs) {
       using Packs = decltype(packs);
@@ -132,7 +131,6 @@ class Ingest {
       float* const ys = points_.y.data() + count_;
       float* const zs = points_.z.data() + count_;
       std::uint32_t* const input = input_.data() + count_;
-      PointLabel* const labels = label_of;
       std::size_t valid_count = 0;
       for_slices<Packs>(length, [&](auto at) {
         const Float x = at.load(xs);
@@ -151,7 +149,6 @@ class Ingest {
           z.store(zs + valid_count);
           (pack_indices<Int>() + Int(static_cast<std::int32_t>(first)))
               .store(reinterpret_cast<std::int32_t*>(input + valid_count));
-          std::fill_n(labels + first, Packs::kCount, PointLabel::kGround);
           valid_count += Packs::kCount;
           return;
         }
@@ -159,16 +156,15 @@ class Ingest {
         const unsigned returns = ((abs(x) < infinity) & (abs(y) < infinity) & (abs(z) < infinity) &
                                   (abs(x) + abs(y) + abs(z) > zero))
                                      .bits();
+        const unsigned bad = ~good & ((1U << at.size()) - 1U);
+        static_assert(UnjudgedPoints::kWord % Packs::kCount == 0);
+        unjudged.mark(first, bad, bad & returns);
         for (std::size_t k = 0; k < at.size(); ++k) {
           xs[valid_count] = xs[at.begin + k];
           ys[valid_count] = ys[at.begin + k];
           zs[valid_count] = zs[at.begin + k];
           input[valid_count] = static_cast<std::uint32_t>(first + k);
-          const unsigned is_good = (good >> k) & 1U;
-          valid_count += is_good;
-          const PointLabel bad =
-              ((returns >> k) & 1U) != 0 ? PointLabel::kOutOfRange : PointLabel::kInvalid;
-          labels[first + k] = is_good != 0 ? PointLabel::kGround : bad;
+          valid_count += (good >> k) & 1U;
         }
       });
       result = valid_count;

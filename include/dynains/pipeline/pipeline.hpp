@@ -316,9 +316,9 @@ void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
                                config_.sensor_origin().template cast<float>()};
   if (frame_.rotates_scans()) {
     const Eigen::Matrix3d R_level_sensor = level(next);
-    ingest_.read(cloud, region, &R_level_sensor, next.input_labels);
+    ingest_.read(cloud, region, &R_level_sensor, next.unjudged);
   } else {
-    ingest_.read(cloud, region, nullptr, next.input_labels);
+    ingest_.read(cloud, region, nullptr, next.unjudged);
   }
 }
 
@@ -393,7 +393,7 @@ template <class Stages>
 Plausibility Pipeline<Stages>::plausibility(const ScanSlot& newest, const FrameResult& result) {
   PlausibilityCheck::Scan scan;
   scan.scan = newest.scan;
-  scan.points = newest.input_labels.size();
+  scan.points = newest.unjudged.size();
   scan.judged = newest.split.count;
   scan.surfaces = decision_->surfaces().value_or(SurfaceCounts());
   if (result.pose_residual) scan.residual = result.pose_residual->translation;

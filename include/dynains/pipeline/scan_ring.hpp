@@ -14,6 +14,7 @@
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/ground/ground_split.hpp"
+#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -32,10 +33,10 @@ struct ScanSlot {
   Pose T_world_level = Pose::Identity();  ///< frame of split.points
 
   GroundSplit split;
-  std::vector<PointLabel> input_labels;  ///< by input point: kGround for valid points
-  ShortNumbers input;                    ///< by point of the split: its index in the input
-  ShortNumbers cluster_of;               ///< by non-ground point: index in `ids`, or kNoCluster
-  std::vector<std::uint32_t> ids;        ///< by cluster of the window that ends with this scan
+  UnjudgedPoints unjudged;
+  ShortNumbers input;              ///< by point of the split: its index in the input
+  ShortNumbers cluster_of;         ///< by non-ground point: index in `ids`, or kNoCluster
+  std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
   WindowVotes windows;
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
@@ -44,8 +45,7 @@ struct ScanSlot {
   /// scans cause no page faults.
   void touch(std::size_t points) {
     split.points.grow(points + kMaxPackWidth);
-    detail::ensure_capacity(input_labels, points);
-    input_labels.resize(points);
+    unjudged.reset(points);
     input.reserve(points);
     cluster_of.reserve(points);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/pipeline/scan_ring.hpp"
+#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
@@ -46,7 +47,7 @@ class VerdictWriter {
 
   /// Begins the verdict on a scan: writes the instance ids, and sets all keep flags.
   void begin(const ScanSlot& scan) {
-    const std::size_t count = scan.input_labels.size();
+    const std::size_t count = scan.unjudged.size();
     is_kept_.assign(scan.split.count, 1);
     ensure_capacity(instances_, count);
     instances_.assign(count, kNoInstance);
@@ -63,7 +64,7 @@ class VerdictWriter {
   /// Writes the verdict of the windows so far on all points: dynamic with at least `votes_needed`
   /// votes. Also writes the keep flags.
   void write_windows(const ScanSlot& scan, int votes_needed) {
-    write_input_labels(scan.input_labels);
+    write_ground(scan.unjudged);
     const std::size_t count = scan.non_ground_count();
     const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     const DecisionStage* const stage = scan.windows.stage.data();
@@ -83,13 +84,16 @@ class VerdictWriter {
   /// so that the arrays are written sequentially.
   void write_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     verdicts_.resize(kFirstGroup + evidence.groups.size());
-    verdicts_[kBadPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
+    verdicts_[kInvalidPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
+    verdicts_[kInvalidPoints].label = PointLabel::kInvalid;
+    verdicts_[kFarPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
+    verdicts_[kFarPoints].label = PointLabel::kOutOfRange;
     verdicts_[kGroundPoints] = GroupVerdict({Cause::kGround, 0.0F});
     for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
       verdicts_[kFirstGroup + g] = GroupVerdict(evidence.groups[g]);
     }
     order_groups(scan, evidence.group_of);
-    expand_groups(scan.input_labels);
+    expand_groups(scan.unjudged.size());
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
       write(ground.point, ground.verdict);
     }
@@ -118,10 +122,11 @@ class VerdictWriter {
     Cause cause = Cause::kNotJudged;
     std::uint8_t is_kept = 1;
   };
-  // Group numbers in group_of_input_: two with fixed verdicts, then the groups of the evidence.
-  static constexpr std::uint32_t kBadPoints = 0;
-  static constexpr std::uint32_t kGroundPoints = 1;
-  static constexpr std::uint32_t kFirstGroup = 2;
+  // Group numbers in group_of_input_: three with fixed verdicts, then the groups of the evidence.
+  static constexpr std::uint32_t kInvalidPoints = 0;
+  static constexpr std::uint32_t kFarPoints = 1;
+  static constexpr std::uint32_t kGroundPoints = 2;
+  static constexpr std::uint32_t kFirstGroup = 3;
 
   // Writes the verdict on a single point, by index in the split.
   void write(std::size_t point, const PointVerdict& verdict) {
@@ -138,32 +143,30 @@ class VerdictWriter {
     (values.resize(count), ...);
   }
 
-  // Writes the verdict on ground and on invalid points; other points get that of the ground.
-  void write_input_labels(Span<const PointLabel> input_labels) {
-    Cause* const causes = causes_.data();
-    const PointLabel* const from = input_labels.data();
-    for (std::size_t i = 0; i < input_labels.size(); ++i) {
-      causes[i] = from[i] == PointLabel::kGround ? Cause::kGround : Cause::kNotJudged;
-    }
-    std::copy(input_labels.begin(), input_labels.end(), labels_.begin());
+  // Writes the verdict on ground and on unjudged points; other points get that of the ground.
+  void write_ground(const UnjudgedPoints& unjudged) {
+    std::fill(causes_.begin(), causes_.end(), Cause::kGround);
+    std::fill(labels_.begin(), labels_.end(), PointLabel::kGround);
     std::fill(beliefs_.begin(), beliefs_.end(), 0.0F);
+    unjudged.for_each([&](std::size_t i, PointLabel label) {
+      causes_[i] = Cause::kNotJudged;
+      labels_[i] = label;
+    });
   }
 
   void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups) {
-    const std::size_t count = scan.input_labels.size();
-    grow(group_of_input_, count);
+    ensure_capacity(group_of_input_, scan.unjudged.size());
+    group_of_input_.assign(scan.unjudged.size(), kGroundPoints);
     std::uint32_t* const group_of = group_of_input_.data();
-    const PointLabel* const labels = scan.input_labels.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      group_of[i] = labels[i] == PointLabel::kGround ? kGroundPoints : kBadPoints;
-    }
+    scan.unjudged.for_each([&](std::size_t i, PointLabel label) {
+      group_of[i] = label == PointLabel::kInvalid ? kInvalidPoints : kFarPoints;
+    });
     const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
 
-  void expand_groups(Span<const PointLabel> input_labels) {
+  void expand_groups(std::size_t count) {
     // Local copies of members avoid reloads after byte stores, which could alias them.
-    const std::size_t count = input_labels.size();
     const std::uint32_t* const group_of = group_of_input_.data();
     const GroupVerdict* const verdicts = verdicts_.data();
     PointLabel* const labels = labels_.data();
@@ -173,7 +176,7 @@ class VerdictWriter {
       const GroupVerdict verdict = verdicts[group_of[i]];
       beliefs[i] = verdict.belief;
       causes[i] = verdict.cause;
-      labels[i] = group_of[i] == kBadPoints ? input_labels[i] : verdict.label;
+      labels[i] = verdict.label;
     }
   }
 
