@@ -29,7 +29,10 @@ class ShortNumbers {
     reserve(numbers.size());
     lower_.resize(numbers.size());
     runs_.clear();
-    with_largest_packs([&](auto packs) { take<decltype(packs)>(numbers); });
+    with_largest_packs([&](auto packs) {
+      using Packs = decltype(packs);
+      take<Packs>(numbers);
+    });
   }
 
   /// Replaces the content of `numbers` by the list.
@@ -67,8 +70,8 @@ class ShortNumbers {
     if (count > 0) begin_run(0);
     for (std::size_t begin = 1; begin < count; begin += kBlock) {
       const std::size_t size = std::min(kBlock, count - begin);
-      for_each_bit(find_begins<Packs>(from + begin, size),
-                   [&](std::size_t i) { begin_run(begin + i); });
+      const std::uint64_t begins = find_begins<Packs>(from + begin, size);
+      for_each_bit(begins, [&](std::size_t i) { begin_run(begin + i); });
     }
   }
 
