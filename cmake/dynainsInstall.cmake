@@ -64,7 +64,7 @@ endif()
 
 configure_file(cmake/dynainsConfig.cmake.in ${PROJECT_BINARY_DIR}/dynainsConfig.cmake @ONLY)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dynainsConfigVersion.cmake
-  COMPATIBILITY SameMinorVersion)
+  COMPATIBILITY SameMajorVersion)
 set(dynains_adapters cmake/dynains-pcl-adapter.cmake cmake/dynains-sophus-adapter.cmake)
 file(COPY ${dynains_adapters} DESTINATION ${PROJECT_BINARY_DIR})
 install(FILES ${PROJECT_BINARY_DIR}/dynainsConfig.cmake

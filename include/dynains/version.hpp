@@ -3,9 +3,9 @@
 
 namespace dynains {
 
-inline constexpr int kVersionMajor = 0;
-inline constexpr int kVersionMinor = 1;
+inline constexpr int kVersionMajor = 1;
+inline constexpr int kVersionMinor = 0;
 inline constexpr int kVersionPatch = 0;
-inline constexpr char kVersionString[] = "0.1.0";
+inline constexpr char kVersionString[] = "1.0.0";
 
 }  // namespace dynains
