@@ -181,12 +181,12 @@ class RemoverNode::Work {
   /// Messages are moved to readers of this process.
   void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
     newest_ = cloud.header.stamp;
-    const dynains::Span<const dynains::PointLabel> labels = frame.newest.labels;
     if (has_readers(*static_)) {
-      static_->publish(std::make_unique<Cloud>(dynains::static_points(cloud, labels)));
+      static_->publish(std::make_unique<Cloud>(dynains::static_points(cloud, frame.newest.labels)));
     }
     if (has_readers(*dynamic_)) {
-      dynamic_->publish(std::make_unique<Cloud>(dynains::dynamic_points(cloud, labels)));
+      dynamic_->publish(
+          std::make_unique<Cloud>(dynains::dynamic_points(cloud, frame.newest.labels)));
     }
     if (frame.pose_residual) {
       residual_->publish(std::make_unique<Residual>(
