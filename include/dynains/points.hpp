@@ -82,12 +82,17 @@ void ensure_capacity(std::vector<T>& values, std::size_t size) {
   if (values.capacity() < size) values.reserve(size + size / 8);
 }
 
+/// Resizes `values` to `size`, with the capacity of ensure_capacity().
+template <class T>
+void resize_with_margin(std::vector<T>& values, std::size_t size) {
+  ensure_capacity(values, size);
+  values.resize(size);
+}
+
 /// Resizes `values` to at least `size`.
 template <class T>
 void grow(std::vector<T>& values, std::size_t size) {
-  if (values.size() >= size) return;
-  ensure_capacity(values, size);
-  values.resize(size);
+  if (values.size() < size) resize_with_margin(values, size);
 }
 
 }  // namespace detail

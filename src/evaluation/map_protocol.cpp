@@ -256,8 +256,8 @@ class MapProtocol::Impl {
   detail::RadiusLookup lookup_;
   PointScore point_score_;
 
-  // Of a block.
-  std::array<detail::LayeredTruth, detail::PointBlock::kMost> labels_;
+  // The block of points that is added or resolved uses these arrays.
+  std::array<detail::LayeredTruth, detail::PointBlock::kMost> labels_;  // by point
   detail::PointRuns runs_;
   std::array<std::uint32_t, detail::PointBlock::kMost> numbers_;  // by run
 

@@ -45,12 +45,7 @@ void revise(TileHistory& history, int count, const Beam& beam) {
   for (int scan = 0; scan < count; ++scan) {
     history.revise(static_cast<std::uint32_t>(scan), sensor,
                    [&](const PointBuffer& points, std::size_t size) -> const detail::Visibility& {
-                     std::vector<BeamResult> seen(size);
-                     for (std::size_t i = 0; i < size; ++i) {
-                       const Eigen::Vector3f local(points.x[i], points.y[i], points.z[i]);
-                       seen[i] = beam(sensor + local.cast<double>());
-                     }
-                     visibility = test::visibility_of(seen);
+                     visibility = test::visibility_by(beam, points, size, sensor);
                      return visibility;
                    });
   }

@@ -11,7 +11,7 @@
 namespace dynains::test {
 namespace {
 
-TEST_CASE("short numbers are those that were assigned, whatever their upper halves") {
+TEST_CASE("a list of short numbers returns the numbers that it was given") {
   detail::ShortNumbers list;
   std::vector<std::uint32_t> copy;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {

@@ -223,7 +223,7 @@ TEST_CASE("Broken scans and labels are refused with path and size") {
   }
 }
 
-TEST_CASE("A scan is read as it was written, whatever its size") {
+TEST_CASE("A scan of any size has the same points after it is written and read") {
   TemporaryFolder folder;
   const fs::path file = folder / "000000.bin";
   for (const std::size_t points : {0U, 4095U, 4096U, 4097U, 10000U}) {

@@ -51,7 +51,7 @@ class Recorder {
       if (!beside.empty()) judge_places(first, beside[i], count, count);
     }
   }
-  /// The same for the places from `first` on in one scan.
+  /// The first pass judges the points of `count` places, from place `first` on, in one scan.
   void judge_places(std::uint32_t scan, PointLabel verdict, int count, int first) {
     scan_ = scan;
     time_ = scan;
@@ -68,12 +68,7 @@ class Recorder {
       places.begin_test(scan_, time_, sensor);
       places.test(
           0, [&](const PointBuffer& points, std::size_t size) -> const auto& {
-            std::vector<BeamResult> seen(size);
-            for (std::size_t k = 0; k < size; ++k) {
-              const Eigen::Vector3f local(points.x[k], points.y[k], points.z[k]);
-              seen[k] = beam(sensor + local.cast<double>());
-            }
-            visibility_ = test::visibility_of(seen);
+            visibility_ = test::visibility_by(beam, points, size, sensor);
             return visibility_;
           });
     }

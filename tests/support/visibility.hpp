@@ -1,11 +1,13 @@
 // Visibility bits of a reference, given sample by sample.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "dynains/evidence/visibility.hpp"
+#include "dynains/points.hpp"
 
 namespace dynains::test {
 
@@ -24,6 +26,19 @@ inline detail::Visibility visibility_of(const std::vector<BeamResult>& seen) {
     set(bytes.hit, seen[i] == BeamResult::kHit);
   }
   return visibility;
+}
+
+/// Visibility of the first `count` points (m, relative to `sensor`), of which `beam(position)`
+/// tells, m, world frame.
+template <class Beam>
+detail::Visibility visibility_by(const Beam& beam, const PointBuffer& points, std::size_t count,
+                                 const Eigen::Vector3d& sensor) {
+  std::vector<BeamResult> seen(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f local(points.x[i], points.y[i], points.z[i]);
+    seen[i] = beam(sensor + local.cast<double>());
+  }
+  return visibility_of(seen);
 }
 
 }  // namespace dynains::test

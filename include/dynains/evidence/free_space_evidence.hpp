@@ -447,8 +447,7 @@ class FreeSpaceEvidence {
     for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i) {
       is_marked_group_[i] = test(samples.supervoxel_of_number[i]) ? 1 : 0;
     }
-    detail::ensure_capacity(marks, newest_number_of_point_.size());
-    marks.resize(newest_number_of_point_.size());
+    detail::resize_with_margin(marks, newest_number_of_point_.size());
     for (std::size_t i = 0; i < marks.size(); ++i) {
       marks[i] = is_marked_group_[newest_number_of_point_[i]];
     }

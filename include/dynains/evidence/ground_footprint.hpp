@@ -80,8 +80,7 @@ class GroundFootprint {
   /// Computes the box of each block of points, for find_under().
   void bound(PointsView points, std::vector<GroundBox>& boxes) const {
     const std::size_t count = (points.size() + kBlock - 1) / kBlock;
-    ensure_capacity(boxes, count);
-    boxes.resize(count);
+    resize_with_margin(boxes, count);
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;

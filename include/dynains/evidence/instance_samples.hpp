@@ -52,9 +52,8 @@ struct InstanceSamples {
   void mark_begins() {
     const std::size_t words = size() / kWord + 1;
     ensure_capacity(begins, words);
-    ensure_capacity(supervoxels_before, words);
     begins.assign(words, 0);
-    supervoxels_before.resize(words);
+    resize_with_margin(supervoxels_before, words);
     for (std::size_t s = 0; s < supervoxel_count(); ++s) {
       begins[sample_begin[s] / kWord] |= std::uint64_t{1} << sample_begin[s] % kWord;
     }
@@ -129,8 +128,7 @@ class InstanceSampler {
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     begin_scan();
-    ensure_capacity(out.number_of_point, points.size());
-    out.number_of_point.resize(points.size());
+    resize_with_margin(out.number_of_point, points.size());
     for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
       const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);

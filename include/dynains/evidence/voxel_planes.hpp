@@ -11,6 +11,7 @@
 
 #include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
+#include "dynains/simd/floor.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
@@ -143,9 +144,7 @@ class VoxelPlanes {
     for (std::size_t i = 0; i < block.count; ++i) {
       std::int64_t index[3];
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double scaled = block.points[i][axis] / kEdge;
-        const auto truncated = static_cast<std::int64_t>(scaled);
-        index[axis] = truncated - (static_cast<double>(truncated) > scaled ? 1 : 0);
+        index[axis] = floor_to<std::int64_t>(block.points[i][axis] / kEdge);
       }
       keys[i] = voxel_key(index[0], index[1], index[2]);
       __builtin_prefetch(&table_.first_slot(voxel_hash(keys[i])));

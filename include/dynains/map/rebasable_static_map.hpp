@@ -16,6 +16,7 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/floor.hpp"
 #include "dynains/voxels/block_table.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
@@ -230,15 +231,10 @@ class RebasableStaticMap {
             T(2, 0) * x + T(2, 1) * y + T(2, 2) * z + T(2, 3)};
   }
 
-  /// std::floor() is a function call without SSE4.1. `value`: within the range of 32 bits.
-  static std::int32_t floor_of(double value) {
-    const auto truncated = static_cast<std::int32_t>(value);
-    return truncated - (value < static_cast<double>(truncated) ? 1 : 0);
-  }
-
   BlockIndex block_of(const Eigen::Vector3d& point) const {
-    return {floor_of(point.x() * blocks_per_m_[0]), floor_of(point.y() * blocks_per_m_[1]),
-            floor_of(point.z() * blocks_per_m_[2])};
+    return {detail::floor_to<std::int32_t>(point.x() * blocks_per_m_[0]),
+            detail::floor_to<std::int32_t>(point.y() * blocks_per_m_[1]),
+            detail::floor_to<std::int32_t>(point.z() * blocks_per_m_[2])};
   }
 
   /// Calls `visit(BlockIndex, first, count)` for the runs of a scan.
@@ -350,7 +346,7 @@ class RebasableStaticMap {
       const double offset = point[static_cast<Eigen::Index>(axis)] - index[axis] * block_size(axis);
       // A point on a border can be rounded to either side of it.
       const int last = kBlockVoxels[axis] - 1;
-      const int at = std::clamp(floor_of(offset / voxel_), 0, last);
+      const int at = std::clamp(detail::floor_to<std::int32_t>(offset / voxel_), 0, last);
       voxel = voxel * static_cast<std::size_t>(kBlockVoxels[axis]) + static_cast<std::size_t>(at);
     }
     return voxel;

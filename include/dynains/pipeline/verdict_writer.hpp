@@ -139,8 +139,7 @@ class VerdictWriter {
 
   template <class... Vectors>
   static void resize_all(std::size_t count, Vectors&... values) {
-    (ensure_capacity(values, count), ...);
-    (values.resize(count), ...);
+    (resize_with_margin(values, count), ...);
   }
 
   // Writes the verdict on ground and on unjudged points; other points get that of the ground.

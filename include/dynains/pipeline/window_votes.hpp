@@ -72,9 +72,9 @@ class WindowVoter {
   /// Records the window that ends with the scan. `votes.point_runs` must be set.
   static void record_first(std::size_t point_count, Span<const ClusterVerdict> verdicts,
                            WindowVotes& votes) {
-    resize(votes.votes, point_count);
-    resize(votes.belief, point_count);
-    resize(votes.stage, point_count + kPiece);
+    resize_with_margin(votes.votes, point_count);
+    resize_with_margin(votes.belief, point_count);
+    resize_with_margin(votes.stage, point_count + kPiece);
     spread_stages(votes.point_runs, verdicts, votes.stage.data());
     for (const PointRun& run : votes.point_runs) {
       const ClusterVerdict verdict = verdict_on(run, verdicts);
@@ -100,12 +100,6 @@ class WindowVoter {
  private:
   static constexpr std::size_t kPiece = 16;
   using Piece = std::array<DecisionStage, kPiece>;
-
-  template <class T>
-  static void resize(std::vector<T>& values, std::size_t size) {
-    ensure_capacity(values, size);
-    values.resize(size);
-  }
 
   static ClusterVerdict verdict_on(const PointRun& run, Span<const ClusterVerdict> verdicts) {
     return run.cluster != kNoCluster ? verdicts[run.cluster] : ClusterVerdict();

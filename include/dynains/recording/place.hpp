@@ -138,7 +138,7 @@ struct alignas(64) RecordingPlace {
   std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
   std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  ///< looks
   std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
-  std::uint32_t object = 0;     ///< number, from 1 on; 0: none
+  std::uint32_t object = 0;     ///< number, from 1 on, if the place has changed
 
   bool was_passed() const { return longest.back() > 0; }
   /// Whether looks of a class of ranges passed it before the first pass saw something move into it.

@@ -10,6 +10,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/floor.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
@@ -118,12 +119,10 @@ class LocatedPoints {
     }
     for (std::size_t k = 0; k < kMost; ++k) {
       const double cells = axis.world[k] / kWorldCell;
-      // Not std::floor() and std::min(), so that compilers make vectors of it.
-      const auto truncated = static_cast<std::int32_t>(cells);
-      const std::int32_t cell = truncated - (static_cast<double>(truncated) - cells > 0.0 ? 1 : 0);
+      const auto cell = detail::floor_to<std::int32_t>(cells);
       const auto within = static_cast<std::int32_t>(256.0 * (cells - static_cast<double>(cell)));
       axis.cell[k] = cell;
-      axis.within[k] = within - (within >> 8);
+      axis.within[k] = within - (within >> 8);  // 256 by rounding is 255; std::min() is no vector
     }
   }
 

@@ -14,6 +14,7 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/floor.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
@@ -158,10 +159,7 @@ class MountingEstimator {
       const float p[3] = {points.x[i], points.y[i], points.z[i]};
       std::size_t at = 0;
       for (const float coordinate : p) {
-        // Without std::floor(), which is a call in plain x86-64 code.
-        const float scaled = coordinate / static_cast<float>(kCell);
-        const auto truncated = static_cast<std::int32_t>(scaled);
-        const std::int32_t index = truncated - (static_cast<float>(truncated) > scaled ? 1 : 0);
+        const auto index = floor_to<std::int32_t>(coordinate / static_cast<float>(kCell));
         at = at * kWidth + static_cast<std::size_t>(index + kHalf);
       }
       if (number[at] == 0) {

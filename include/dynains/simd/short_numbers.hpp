@@ -37,8 +37,7 @@ class ShortNumbers {
 
   /// Replaces the content of `numbers` by the list.
   void copy_to(std::vector<std::uint32_t>& numbers) const {
-    ensure_capacity(numbers, size());
-    numbers.resize(size());
+    resize_with_margin(numbers, size());
     std::uint32_t* const to = numbers.data();
     const std::uint16_t* const lower = lower_.data();
     with_packs([&](auto) {
