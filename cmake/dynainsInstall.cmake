@@ -71,16 +71,26 @@ install(FILES ${PROJECT_BINARY_DIR}/dynainsConfig.cmake
   ${PROJECT_BINARY_DIR}/dynainsConfigVersion.cmake ${dynains_adapters}
   DESTINATION ${dynains_cmake_dir} COMPONENT dynains_core)
 
-# The pkg-config file names the prefix relative to itself, so that the tree can be moved. It is of
-# headers alone, and therefore of every architecture.
-file(RELATIVE_PATH dynains_pc_to_prefix
-  ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
-string(REGEX REPLACE "/$" "" dynains_pc_to_prefix "${dynains_pc_to_prefix}")
-set(dynains_pc_includedir "\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}")
-if(IS_ABSOLUTE "${CMAKE_INSTALL_INCLUDEDIR}")
-  set(dynains_pc_includedir "${CMAKE_INSTALL_INCLUDEDIR}")
+# The pkg-config files name the prefix relative to themselves, so that the tree can be moved. That of
+# the headers is of every architecture, that of the compiled remover is not.
+set(dynains_pc_core_folder ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig)
+set(dynains_pc_remover_folder ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)
+foreach(kind includedir libdir)
+  string(TOUPPER ${kind} upper_kind)
+  set(dynains_pc_${kind} "\${prefix}/${CMAKE_INSTALL_${upper_kind}}")
+  if(IS_ABSOLUTE "${CMAKE_INSTALL_${upper_kind}}")
+    set(dynains_pc_${kind} "${CMAKE_INSTALL_${upper_kind}}")
+  endif()
+endforeach()
+function(dynains_install_pc part name)
+  set(folder ${dynains_pc_${part}_folder})
+  file(RELATIVE_PATH dynains_pc_to_prefix ${folder} ${CMAKE_INSTALL_PREFIX})
+  string(REGEX REPLACE "/$" "" dynains_pc_to_prefix "${dynains_pc_to_prefix}")
+  configure_file(cmake/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${folder} COMPONENT dynains_${part})
+endfunction()
+dynains_install_pc(core dynains)
+if(TARGET dynains_remover)
+  dynains_install_pc(remover dynains-remover)
 endif()
-configure_file(cmake/dynains.pc.in ${PROJECT_BINARY_DIR}/dynains.pc @ONLY)
-install(FILES ${PROJECT_BINARY_DIR}/dynains.pc
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/pkgconfig COMPONENT dynains_core)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dynains_core)

@@ -1,7 +1,7 @@
 // Behind an odometry: the pose of the newest scan is corrected, and its moving points are removed.
 #include <cmath>
 #include <cstdio>
-#include <dynains/compiled_remover.hpp>
+#include <dynains/adapters/odometry_corrector.hpp>
 #include <vector>
 
 using Cloud = std::vector<Eigen::Vector3d>;
@@ -30,10 +30,10 @@ Eigen::Isometry3d register_motion(const Cloud& /*scan*/) {
 
 int main() {
   using dynains::PointLabel;
-  dynains::DynaInsRemover remover(dynains::DynaInsRemover::Config::odometry());
-  Eigen::Isometry3d T_odometry = Eigen::Isometry3d::Identity();      // poses of the odometry alone
-  Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();  // corrected
-  Cloud map;  // replaces the map of the odometry
+  dynains::OdometryCorrector corrector;
+  Eigen::Isometry3d T_odometry = Eigen::Isometry3d::Identity();  // poses of the odometry alone
+  double y = 0.0;                                                // m, corrected
+  Cloud map;                                                     // replaces the map of the odometry
   std::size_t removed = 0;
 
   for (int i = 0; i < 12; ++i) {
@@ -41,31 +41,26 @@ int main() {
     const Cloud scan = read_scan(5.0 * time, time);
 
     // 1. Register all points.
-    Eigen::Isometry3d T_last_newest = Eigen::Isometry3d::Identity();
-    if (i > 0) T_last_newest = register_motion(scan);
-    T_odometry = T_odometry * T_last_newest;
+    if (i > 0) T_odometry = T_odometry * register_motion(scan);
 
-    // 2. Push the scan with the pose of the odometry, without earlier corrections.
-    const dynains::FrameResult frame = remover.push(scan, T_odometry, time);
+    // 2. Correct the pose of the odometry.
+    const auto result = corrector.correct(scan, T_odometry, time);
+    y = result.T_world_sensor.translation().y();
 
-    // 3. Take the corrected motion. Without common surfaces there is none.
-    if (frame.pose_residual) T_last_newest = frame.pose_residual->T_previous_newest;
-    T_world_sensor = T_world_sensor * T_last_newest;
-
-    // 4. Insert the static points into the map. Points out of range are not judged and stay.
+    // 3. Insert the static points into the map. Points out of range are not judged and stay.
     // kInvalid marks points that are no measurement (NaN, no return).
     Cloud still;
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      const PointLabel label = frame.newest.labels[k];
+      const PointLabel label = result.frame.newest.labels[k];
       if (label != PointLabel::kDynamic && label != PointLabel::kInvalid) still.push_back(scan[k]);
     }
     removed += scan.size() - still.size();
-    for (const Eigen::Vector3d& p : still) map.push_back(T_world_sensor * p);
+    for (const Eigen::Vector3d& p : still) map.push_back(result.T_world_sensor * p);
     std::printf("scan %2d: %zu points, %zu of them static, y = %.3f m, %.1f ms\n", i, scan.size(),
-                still.size(), T_world_sensor.translation().y(), frame.times.total());
+                still.size(), y, result.frame.times.total());
   }
 
   std::printf("%zu points moved and did not reach the map of %zu\n", removed, map.size());
-  const bool is_corrected = std::abs(T_world_sensor.translation().y()) < 0.1;
+  const bool is_corrected = std::abs(y) < 0.1;
   return removed > 0 && is_corrected ? 0 : 1;
 }

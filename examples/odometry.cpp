@@ -7,11 +7,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <dynains/compiled_remover.hpp>
+#include <dynains/adapters/odometry_corrector.hpp>
 #include <dynains/simulation/simulator.hpp>
 #include <vector>
 
-#include "odometry_loop.hpp"
 #include "small_odometry.hpp"
 
 using small_odometry::Odometry;
@@ -20,7 +19,7 @@ using small_odometry::Points;
 // Distances between estimated and true positions.
 class Errors {
  public:
-  void add(const Eigen::Isometry3d& estimated, const Eigen::Isometry3d& truth) {
+  void add(const dynains::Pose& estimated, const Eigen::Isometry3d& truth) {
     last_ = (estimated.translation() - truth.translation()).norm();
     sum_of_squares_ += last_ * last_;
     ++count_;
@@ -53,15 +52,15 @@ int main(int argc, char** argv) {
   dynains::simulation::Simulator simulator(street);
 
   Odometry odometry;
-  Eigen::Isometry3d T_odometry;
-  odometry_loop::RefinedOdometry loop(
-      [&](const Points& scan) { return T_odometry = odometry.register_scan(scan); });
+  dynains::OdometryCorrector corrector;
   const Eigen::Isometry3d T_first_world = simulator.scan(0).T_world_sensor.inverse();
   Errors of_odometry, refined;
   std::size_t points = 0, dynamic = 0;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const dynains::simulation::SimulatedScan scan = simulator.scan(i);
-    const auto result = loop.push(points_of(scan), scan.time);
+    const Points cloud = points_of(scan);
+    const Eigen::Isometry3d T_odometry = odometry.register_scan(cloud);
+    const auto result = corrector.correct(cloud, T_odometry, scan.time);
     for (const dynains::PointLabel label : result.frame.newest.labels) {
       dynamic += label == dynains::PointLabel::kDynamic ? 1 : 0;
     }

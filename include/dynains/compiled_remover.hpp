@@ -130,25 +130,26 @@ class BasicDynaInsRemover {
   ///
   /// `cloud`: m, sensor frame, z up (RemoverConfig::level handles tilted sensors); any type with
   /// PointCloudTraits, any size. Invalid points get PointLabel::kInvalid or kOutOfRange.
-  /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan. Both are those of a
-  /// body, such as base_link, if RemoverConfig::sensor_origin() is the position of the sensor in
-  /// it; clouds of several sensors are pushed one by one. `time`: s, greater than the time of the
+  /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan, in a type that
+  /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both are those of a body, such
+  /// as base_link, if RemoverConfig::sensor_origin() is the position of the sensor in it; clouds of
+  /// several sensors are pushed one by one. `time`: s, greater than the time of the
   /// previous scan.
   ///
   /// Throws PoseError, or the exceptions of PointCloudTraits such as CloudError; the state is then
   /// unchanged. If a stage throws (std::bad_alloc), the scan is discarded and the next scan starts
   /// a new epoch; evidence of the discarded scan on older scans may remain. If the finalization of
   /// an older scan throws, for example in the map, only the final verdict on that scan is lost.
-  template <class Cloud>
-  FrameResult push(const Cloud& cloud, const Pose& T_world_sensor, double time) {
-    return push_view(detail::CloudView(cloud), T_world_sensor, time);
+  template <class Cloud, class PoseLike>
+  FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor, double time) {
+    return push_view(detail::CloudView(cloud), to_pose(T_world_sensor), time);
   }
 
   /// Pushes a scan with a default time: 0 s for the first scan, else 0.1 s after the previous scan,
   /// or the next double if 0.1 s is below the resolution.
-  template <class Cloud>
-  FrameResult push(const Cloud& cloud, const Pose& T_world_sensor) {
-    return push_view(detail::CloudView(cloud), T_world_sensor, std::nullopt);
+  template <class Cloud, class PoseLike>
+  FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor) {
+    return push_view(detail::CloudView(cloud), to_pose(T_world_sensor), std::nullopt);
   }
 
   /// Makes the verdicts on all open scans final, oldest first, and calls `sink(const ScanVerdict&)`
@@ -157,7 +158,13 @@ class BasicDynaInsRemover {
   void flush(Sink&& sink) {
     const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
     while (const std::optional<ScanVerdict> verdict = finish_oldest()) sink(*verdict);
-    start_epoch();
+    begin_epoch();
+  }
+
+  /// The next scan is not compared with the scans before it, as after a correction of the poses.
+  void start_epoch() {
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    begin_epoch();
   }
 
   /// Restores the state after construction and clears the map; buffers keep their capacity. A
@@ -173,7 +180,7 @@ class BasicDynaInsRemover {
                         std::optional<double> time);
   void reserve_view(const detail::CloudView& example, std::size_t scans);
   std::optional<ScanVerdict> finish_oldest();
-  void start_epoch();
+  void begin_epoch();
 
   std::unique_ptr<Pipeline> pipeline_;
   detail::ReentrancyGuard reentrancy_guard_;

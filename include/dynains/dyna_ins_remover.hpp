@@ -92,7 +92,7 @@ std::optional<ScanVerdict> BasicDynaInsRemover<Stages>::finish_oldest() {
 }
 
 template <class Stages>
-void BasicDynaInsRemover<Stages>::start_epoch() {
+void BasicDynaInsRemover<Stages>::begin_epoch() {
   pipeline().start_epoch();
 }
 

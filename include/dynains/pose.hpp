@@ -205,6 +205,22 @@ inline void validate_pose(const std::string& name, const Pose& T) {
   }
 }
 
+/// The pose of any transform or 4x4 matrix of Eigen, of float or double. Whoever takes the pose
+/// validates it.
+inline Pose to_pose(const Pose& T_target_source) { return T_target_source; }
+template <class Derived>
+Pose to_pose(const Eigen::MatrixBase<Derived>& T_target_source) {
+  static_assert(Derived::RowsAtCompileTime == 4 && Derived::ColsAtCompileTime == 4,
+                "a pose is a 4x4 matrix");
+  Pose T;
+  T.matrix() = T_target_source.template cast<double>();
+  return T;
+}
+template <class Scalar, int kMode, int kOptions>
+Pose to_pose(const Eigen::Transform<Scalar, 3, kMode, kOptions>& T_target_source) {
+  return to_pose(T_target_source.matrix());
+}
+
 /// `T` with an orthonormalized rotation.
 inline Pose orthonormalized(const Pose& T) {
   Pose result = T;

@@ -1,5 +1,6 @@
 # extract_blocks(<page> <prefix> <result>): writes the C++ blocks of a page to <prefix>_1.inc, ..., and
-# sets the variable <result> to the list of these files.
+# the headers that each block includes to <prefix>_1.hpp, .... Sets the variable <result> to the list
+# of the blocks.
 function(extract_blocks page prefix result)
   file(READ ${page} rest)
   set(files "")
@@ -12,6 +13,9 @@ function(extract_blocks page prefix result)
     string(FIND "${rest}" "```" end)
     string(SUBSTRING "${rest}" 0 ${end} block)
     file(WRITE ${prefix}_${count}.inc "${block}")
+    string(REGEX MATCHALL "#include <[^>]+>" headers "${block}")
+    string(REPLACE ";" "\n" headers "${headers}")
+    file(WRITE ${prefix}_${count}.hpp "${headers}\n")
     list(APPEND files ${prefix}_${count}.inc)
     string(FIND "${rest}" "```cpp\n" begin)
   endwhile()

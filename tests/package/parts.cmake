@@ -53,4 +53,4 @@ file(WRITE ${WORK_DIR}/parts/parent/CMakeLists.txt
 execute_process(
   COMMAND ${CMAKE_COMMAND} -S ${WORK_DIR}/parts/parent -B ${WORK_DIR}/parts/parent/build ${common}
   RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-expect("set DYNAINS_BUILD_COMPONENTS to ON to build it")
+expect("set DYNAINS_BUILD_COMPONENTS to ON to build it" "set DYNAINS_BUILD_REMOVER to ON to build it")

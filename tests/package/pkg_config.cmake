@@ -32,3 +32,26 @@ execute_process(COMMAND ${program} RESULT_VARIABLE result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "${program} ended with ${result}")
 endif()
+
+# The compiled remover, where it is installed.
+set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${DATA_DIR}/pkgconfig:${PREFIX}/${LIB_DIR}/pkgconfig)
+if(NOT EXISTS ${PREFIX}/${LIB_DIR}/pkgconfig/dynains-remover.pc)
+  return()
+endif()
+execute_process(COMMAND ${PKG_CONFIG} --cflags --libs --print-errors dynains-remover
+  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE)
+separate_arguments(flags)
+file(WRITE ${WORK_DIR}/pkg_config_remover.cpp
+  "#include <dynains/compiled_remover.hpp>\n"
+  "int main() { return dynains::DynaInsRemover().latency() == 0 ? 1 : 0; }\n")
+execute_process(
+  COMMAND ${COMPILER} -std=c++17 ${WORK_DIR}/pkg_config_remover.cpp ${INSTRUMENTED} ${flags} -o ${program}
+  RESULT_VARIABLE result)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "does not link with: ${flags}")
+endif()
+execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=${PREFIX}/${LIB_DIR} ${program}
+  RESULT_VARIABLE result)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "the program of the compiled remover ended with ${result}")
+endif()

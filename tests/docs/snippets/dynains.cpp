@@ -1,36 +1,41 @@
-// Blocks of the pages, each in code that has what the text around it presupposes. Their includes do
-// nothing within a function, because they are here as well.
-#include <Eigen/Geometry>
-#include <vector>
+// Blocks of the pages, each in code that has what the text around it presupposes. The headers are
+// those that the blocks include themselves; within a function their includes do nothing.
+#include "embedding_1.hpp"
+#include "embedding_3.hpp"
+#include "embedding_4.hpp"
+#include "embedding_6.hpp"
+#include "embedding_7.hpp"
 
-#include "dynains/adapters/sophus.hpp"
-#include "dynains/dyna_ins_remover.hpp"
-#include "dynains/io/tiled_map.hpp"
-#include "dynains/map/rebasable_static_map.hpp"
+void corrector_loop(const std::vector<Eigen::Vector3d>& scan, const Eigen::Isometry3d& T_odometry,
+                    double time, std::vector<dynains::Pose>& trajectory,
+                    std::vector<Eigen::Vector3d>& map) {
+#include "embedding_1.inc"
+}
 
 /// A stand-in for kiss_icp::pipeline::KissICP with the functions that the block calls.
 struct KissIcpLookAlike {
-  void RegisterFrame(const std::vector<Eigen::Vector3d>& points,
-                     const std::vector<double>& timestamps);
+  using Points = std::vector<Eigen::Vector3d>;
+  std::tuple<Points, Points> RegisterFrame(const Points& points,
+                                           const std::vector<double>& timestamps);
   const Sophus::SE3d& pose() const;
 };
 
 void kiss_icp_loop(KissIcpLookAlike& odometry, const std::vector<Eigen::Vector3d>& points,
                    const std::vector<double>& timestamps, double time,
-                   Eigen::Isometry3d& T_odometry_last, Eigen::Isometry3d& T_world_last) {
-#include "embedding_2.inc"
-}
-
+                   std::vector<dynains::Pose>& trajectory) {
 #include "embedding_3.inc"
-
-void reserve(dynains::DynaInsRemover& remover, const dynains::RawPoints<float>& first_cloud) {
-#include "embedding_4.inc"
 }
 
-void long_drive() {
+#include "embedding_4.inc"
+
+void reserve(const dynains::RawPoints<float>& first_cloud) {
 #include "embedding_5.inc"
 }
 
-void move_scans() {
+void long_drive() {
 #include "embedding_6.inc"
+}
+
+void move_scans() {
+#include "embedding_7.inc"
 }
