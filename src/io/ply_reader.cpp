@@ -1,6 +1,5 @@
 #include <array>
 #include <charconv>
-#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -230,26 +229,19 @@ void check_count(const ByteReader& reader, const Element& element, PlyEncoding e
   }
 }
 
-enum class Storage : std::uint8_t { kAllPoints, kOnePoint };
-
-/// Reads all elements. The sink gets all vertices, or each one in place of the one before; `done()`
-/// is called after each vertex.
-template <class Done>
-void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink, Storage storage,
-                   Done&& done) {
+/// Reads all elements; the sink gets the vertices.
+void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink) {
   const bool swap = header.encoding == PlyEncoding::kBigEndian;
   std::string line;
   for (const Element& element : header.elements) {
     check_count(reader, element, header.encoding);
     if (element.properties.empty()) continue;
-    const bool has_all = storage == Storage::kAllPoints;
-    if (element.is_vertex) sink.resize(has_all ? static_cast<std::size_t>(element.count) : 1);
+    if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
     for (std::size_t i = 0; i < element.count; ++i) {
       const auto store = [&](const Property& property, double value) {
-        const std::size_t at = has_all ? i : 0;
         const bool is_held =
-            property.other ? store_scalar(property.type, value, sink.other(at, *property.other))
-                           : sink.set(at, property.role, value);
+            property.other ? store_scalar(property.type, value, sink.other(i, *property.other))
+                           : sink.set(i, property.role, value);
         if (is_held) return;
         const std::string what = "expected a whole number that " + property.name + " can have";
         header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
@@ -259,7 +251,6 @@ void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink,
       } else {
         read_binary_element(reader, element, swap, store);
       }
-      if (element.is_vertex) done();
     }
   }
 }
@@ -297,15 +288,7 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
 void read_ply(const std::filesystem::path& path, PointSink& sink) {
   ByteReader reader(path);
   const PlyHeader header = parse_ply_header(reader, sink);
-  read_elements(reader, header, sink, Storage::kAllPoints, [] {});
-}
-
-void visit_ply(const std::filesystem::path& path,
-               const std::function<void(const FilePoint&)>& visit) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PlyHeader header = parse_ply_header(reader, sink);
-  read_elements(reader, header, sink, Storage::kOnePoint, [&] { visit(point_of(sink.file(), 0)); });
+  read_elements(reader, header, sink);
 }
 
 PointFileHeader read_ply_header(const std::filesystem::path& path) {

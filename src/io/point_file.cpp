@@ -217,22 +217,6 @@ OtherValues read_other_columns(const fs::path& path) {
   return others;
 }
 
-FilePoint point_of(const PointFile& file, std::size_t i) {
-  FilePoint point;
-  point.position = file.positions[i];
-  if (!file.intensity.empty()) point.intensity = file.intensity[i];
-  if (!file.ring.empty()) point.ring = file.ring[i];
-  if (!file.time.empty()) point.time = file.time[i];
-  if (!file.label.empty()) point.label = file.label[i];
-  return point;
-}
-
-void for_each_point(const fs::path& path, const std::function<void(const FilePoint&)>& visit) {
-  if (extension_in_lower_case(path) == ".ply") return visit_ply(path, visit);
-  const PointFile file = read_points(path);
-  for (std::size_t i = 0; i < file.positions.size(); ++i) visit(point_of(file, i));
-}
-
 PointFileHeader read_point_file_header(const fs::path& path) {
   return format_to_read(path).read_header(path);
 }

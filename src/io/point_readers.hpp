@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 
 #include "dynains/io/point_file.hpp"
 
@@ -20,10 +19,6 @@ void read_las(const std::filesystem::path& path, PointSink& sink);
 void read_npy(const std::filesystem::path& path, PointSink& sink);
 void read_npz(const std::filesystem::path& path, PointSink& sink);
 void read_xyz(const std::filesystem::path& path, PointSink& sink);
-
-/// Reads a PLY file without points in memory.
-void visit_ply(const std::filesystem::path& path,
-               const std::function<void(const FilePoint&)>& visit);
 
 PointFileHeader read_ply_header(const std::filesystem::path& path);
 PointFileHeader read_pcd_header(const std::filesystem::path& path);

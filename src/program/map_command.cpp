@@ -1,4 +1,3 @@
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,11 +17,8 @@
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "figure.hpp"
-#include "run/interrupt.hpp"
 #include "run/map_file.hpp"
 #include "run/output_folder.hpp"
-#include "tileset_files.hpp"
-#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -34,7 +30,6 @@ struct MapOptions {
   std::string session, later_session;
   std::string file, added, removed, picture;
   std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
-  std::string format;          // empty: by the extension of the file
   int pixels = 1600;           // of the longer side of a picture
   bool no_picture = false;
   bool force = false;
@@ -53,24 +48,6 @@ void check_is_new(const fs::path& path, const std::string& name, bool force) {
   if (fs::exists(fs::symlink_status(path)) && !force) {
     throw IoError(name + ": exists; choose another name, or replace it by --force");
   }
-}
-
-/// Columns of a point of a city, in addition to x y z.
-PointColumns city_columns() {
-  PointColumns columns;
-  columns.label = columns.time = columns.session = true;
-  return columns;
-}
-
-/// The time is the begin of the session.
-FilePoint file_point(const CityMap& map, const Eigen::Vector3d& position, std::uint32_t session,
-                     const SessionPoint& point) {
-  FilePoint file_point;
-  file_point.position = position;
-  file_point.label = point.label;
-  file_point.time = map.sessions()[session].begin;
-  file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-  return file_point;
 }
 
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
@@ -97,7 +74,8 @@ class CityPointFile {
       las_ = std::make_unique<LasWriter>(path, las_options_near(lowest));
       return;
     }
-    PointColumns columns = city_columns();
+    PointColumns columns;
+    columns.label = columns.time = columns.session = true;
     columns.double_xyz = most > kFloatCoordinateLimit;
     points_ = std::make_unique<PointFileWriter>(path, columns);
   }
@@ -113,7 +91,12 @@ class CityPointFile {
       las_->add(las);
       return;
     }
-    points_->add(file_point(map_, position, session, point));
+    FilePoint file_point;
+    file_point.position = position;
+    file_point.label = point.label;
+    file_point.time = map_.sessions()[session].begin;
+    file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+    points_->add(file_point);
   }
 
   std::size_t size() const { return size_; }
@@ -176,39 +159,6 @@ void for_each_standing(const City& city, const CityMap& map, std::uint32_t last,
   }
 }
 
-void write_tiles(const City& city, const CityMap& map, std::uint32_t last,
-                 const MapOptions& options) {
-  check_is_outside(city.folder(), options.file);
-  const LockedFolder lock(options.file);
-  OutputFolder out(Folder(options.file), tileset_output_kind());
-  if (out.has_results() && !options.force) {
-    throw IoError(options.file +
-                  ": holds earlier results; choose another folder, or replace "
-                  "them by --force");
-  }
-  out.check(tileset_listing(), InputFiles());
-  const InterruptGuard interrupt;
-  const auto mode = out.has_results() ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace;
-  OutputChange change(out, mode, tileset_marker(false), tileset_listing());
-  Eigen::AlignedBox3d bounds(Eigen::Vector3d::Zero());
-  if (!map.sessions().empty()) bounds.setEmpty();
-  for (const SessionInfo& session : map.sessions()) {
-    bounds.extend(session.lowest).extend(session.highest);
-  }
-  viewer::TilesetWriter writer(change.folder(), city_columns(), bounds.min(), bounds.max());
-  for_each_standing(
-      city, map, last, options.region,
-      [&](const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
-        if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-        writer.add(file_point(map, position, session, point));
-      });
-  writer.commit();
-  change.put_in_place();
-  change.finish(tileset_marker(true), tileset_listing());
-  std::cout << (out.path() / viewer::kTilesetFile).string() << ": " << writer.size() << " points"
-            << std::endl;
-}
-
 /// Writes the map after session number `last`.
 void write_map(const City& city, const CityMap& map, std::uint32_t last,
                const MapOptions& options) {
@@ -216,7 +166,6 @@ void write_map(const City& city, const CityMap& map, std::uint32_t last,
       !(options.region[0] < options.region[2] && options.region[1] < options.region[3])) {
     throw ConfigError("--region: expected the lowest x and y before the highest x and y");
   }
-  if (!options.format.empty()) return write_tiles(city, map, last, options);
   CityPointFile file(map, city.folder(), options.file, options.force);
   for_each_standing(city, map, last, options.region,
                     [&](const Eigen::Vector3d& position, std::uint32_t session,
@@ -346,14 +295,9 @@ void add_map_command(CLI::App& app) {
     command->add_option(name, value, "name of a session")->required()->type_name("");
   };
   const auto add_file = [&](CLI::App* command) {
-    command->add_option("FILE", options->file, "points, .ply, .pcd or .las; a folder for 3dtiles")
+    command->add_option("FILE", options->file, "points, .ply, .pcd or .las")
         ->required()
         ->type_name("");
-    command
-        ->add_option("--format", options->format,
-                     "3dtiles: write OGC 3D Tiles into the folder FILE [by the extension]")
-        ->check(CLI::IsMember({"3dtiles"}))
-        ->type_name("NAME");
     command
         ->add_option("--region", options->region,
                      "lowest x, lowest y, highest x and highest y of the points [all]")

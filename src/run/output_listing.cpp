@@ -11,8 +11,6 @@
 #include "dynains/io/point_file.hpp"
 #include "json_file.hpp"
 #include "map_file.hpp"
-#include "viewer/tile_point.hpp"
-#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -22,12 +20,6 @@ using ListingJson = nlohmann::ordered_json;
 bool is_tile_name(const std::string& name) {
   static const std::regex form("-?[0-9]{1,19}_-?[0-9]{1,19}_-?[0-9]{1,19}\\.tile");
   return std::regex_match(name, form);
-}
-
-bool is_point_tile_name(const std::string& name) {
-  const std::filesystem::path path = name;
-  return path.extension() == viewer::kPointTileExtension &&
-         viewer::is_tile_node_name(path.stem().string());
 }
 
 std::string encode(const std::string& name) {
@@ -129,7 +121,6 @@ bool OutputListing::contains(const std::string& folder, const std::string& name)
   if (found == folders.end()) return false;
   const std::string& extension = found->second;
   if (extension == kTileExtension) return is_tile_name(name);
-  if (extension == viewer::kPointTileExtension) return is_point_tile_name(name);
   const std::size_t stem = name.size() - std::min(name.size(), extension.size());
   return name.compare(stem, name.npos, extension) == 0 && scans.count(name.substr(0, stem)) > 0;
 }

@@ -10,7 +10,6 @@
 #include "output_folder.hpp"
 #include "points_of.hpp"
 #include "read_ahead.hpp"
-#include "viewer/tileset_writer.hpp"
 
 namespace dynains::program {
 namespace {
@@ -69,19 +68,17 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 }
 
 const OutputKind& run_output_kind() {
-  static const OutputKind kind = {
-      "run",
-      "report.json",
-      {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog, kOverviewPicture,
-       kEstimatedPoses, kViewPage, viewer::kTilesetFile, viewer::kTilesetPage},
-      true,
-      {{"labels", {".label"}},
-       {"online", {".label"}},
-       {"causes", {".cause"}},
-       {"beliefs", {".belief"}},
-       {"clean", {".bin", ".pcd", ".ply"}},
-       {kTileFolder, {kTileExtension}},
-       {viewer::kTilesetFolder, {viewer::kPointTileExtension}}}};
+  static const OutputKind kind = {"run",
+                                  "report.json",
+                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog,
+                                   kOverviewPicture, kEstimatedPoses, kViewPage},
+                                  true,
+                                  {{"labels", {".label"}},
+                                   {"online", {".label"}},
+                                   {"causes", {".cause"}},
+                                   {"beliefs", {".belief"}},
+                                   {"clean", {".bin", ".pcd", ".ply"}},
+                                   {kTileFolder, {kTileExtension}}}};
   return kind;
 }
 

@@ -1,5 +1,4 @@
-# cmake -DOUTPUT=... -DSTYLE=... -DHTML=... "-DSCRIPTS=a.js;b.js" -DMAP_HTML=... "-DMAP_SCRIPTS=..."
-#   -P embed_page.cmake
+# cmake -DOUTPUT=... -DSTYLE=... -DHTML=... "-DSCRIPTS=a.js;b.js" -P embed_page.cmake
 # Writes a C++ file with the content of the files. Scripts are joined in their order.
 function(embed name content)
   string(HEX "${content}" digits)
@@ -10,23 +9,18 @@ function(embed name content)
   set(text "${text}constexpr unsigned char ${name}_bytes[] = {\n${bytes}0};\n" PARENT_SCOPE)
 endfunction()
 
-foreach(list SCRIPTS MAP_SCRIPTS)
-  set(joined_${list} "")
-  foreach(file IN LISTS ${list})
-    file(READ ${file} part)
-    string(APPEND joined_${list} "${part}")
-  endforeach()
+set(script "")
+foreach(file IN LISTS SCRIPTS)
+  file(READ ${file} part)
+  string(APPEND script "${part}")
 endforeach()
 file(READ ${HTML} html)
-file(READ ${MAP_HTML} map_html)
 file(READ ${STYLE} style)
 
 set(text "")
 embed(html "${html}")
 embed(style "${style}")
-embed(script "${joined_SCRIPTS}")
-embed(map_html "${map_html}")
-embed(map_script "${joined_MAP_SCRIPTS}")
+embed(script "${script}")
 set(file "#include \"viewer/page_files.hpp\"\n\nnamespace dynains::viewer {\nnamespace {\n\n${text}
 template <std::size_t kSize>
 std::string_view text_of(const unsigned char (&bytes)[kSize]) {
@@ -38,8 +32,6 @@ std::string_view text_of(const unsigned char (&bytes)[kSize]) {
 const std::string_view kPageHtml = text_of(html_bytes);
 const std::string_view kPageStyle = text_of(style_bytes);
 const std::string_view kPageScript = text_of(script_bytes);
-const std::string_view kMapPageHtml = text_of(map_html_bytes);
-const std::string_view kMapPageScript = text_of(map_script_bytes);
 
 }  // namespace dynains::viewer\n")
 file(WRITE ${OUTPUT} "${file}")

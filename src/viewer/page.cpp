@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -81,34 +80,24 @@ std::string script_json(const Json& json) {
   return text;
 }
 
-/// Writes `html` with content_of(NAME) in the place of each {{NAME}}.
-template <class ContentOf>
-void fill(std::ostream& out, std::string_view html, ContentOf&& content_of) {
+}  // namespace
+
+void write_page(std::ostream& out, const ViewData& data) {
+  const PackedPoints points = pack(data);
+  const auto content_of = [&](std::string_view mark) -> std::string {
+    if (mark == "style") return std::string(kPageStyle);
+    if (mark == "script") return std::string(kPageScript);
+    if (mark == "description") return script_json(describe(data, points.description));
+    return base64(points.bytes);
+  };
+  // Each {{NAME}} becomes content_of(NAME).
+  std::string_view html = kPageHtml;
   for (std::size_t begin = html.find("{{"); begin != html.npos; begin = html.find("{{")) {
     const std::size_t end = html.find("}}", begin);
     out << html.substr(0, begin) << content_of(html.substr(begin + 2, end - begin - 2));
     html.remove_prefix(end + 2);
   }
   out << html;
-}
-
-}  // namespace
-
-void write_page(std::ostream& out, const ViewData& data) {
-  const PackedPoints points = pack(data);
-  fill(out, kPageHtml, [&](std::string_view mark) -> std::string {
-    if (mark == "style") return std::string(kPageStyle);
-    if (mark == "script") return std::string(kPageScript);
-    if (mark == "description") return script_json(describe(data, points.description));
-    return base64(points.bytes);
-  });
-}
-
-std::string map_page() {
-  std::ostringstream page;
-  fill(page, kMapPageHtml,
-       [](std::string_view mark) { return mark == "style" ? kPageStyle : kMapPageScript; });
-  return page.str();
 }
 
 }  // namespace dynains::viewer

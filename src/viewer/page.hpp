@@ -1,8 +1,7 @@
-// Pages of HTML without references to other files.
+// A page of HTML without references to other files.
 #pragma once
 
 #include <ostream>
-#include <string>
 
 #include "view_data.hpp"
 
@@ -11,8 +10,5 @@ namespace dynains::viewer {
 /// Writes the page of a run with its style, its program and the points. Needs WebGL 2 and
 /// DecompressionStream to be shown (Firefox from 113 on, Chromium from 80 on).
 void write_page(std::ostream& out, const ViewData& data);
-
-/// The page of a map in tiles. It loads tileset.json and tiles from its folder.
-std::string map_page();
 
 }  // namespace dynains::viewer

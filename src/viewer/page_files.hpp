@@ -1,4 +1,4 @@
-// Files of the pages, embedded by CMake.
+// Files of the page, embedded by CMake.
 #pragma once
 
 #include <string_view>
@@ -8,7 +8,5 @@ namespace dynains::viewer {
 extern const std::string_view kPageHtml;
 extern const std::string_view kPageStyle;
 extern const std::string_view kPageScript;
-extern const std::string_view kMapPageHtml;
-extern const std::string_view kMapPageScript;
 
 }  // namespace dynains::viewer

@@ -271,50 +271,6 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   CHECK(content_of(days.at("city")) == after);
 }
 
-TEST_CASE("map: a city is exported as tiles, the same bytes each time, and files of others stay") {
-  const Days days;
-  REQUIRE(days.update(0, "city", "out").code == 0);
-  REQUIRE(days.update(1, "city", "out1").code == 0);
-  const auto export_to = [&](const std::string& folder, std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"map",           days.at("city"), "export",
-                                          days.at(folder), "--format",      "3dtiles"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return start(arguments);
-  };
-  const Outcome first = export_to("tiles");
-  CAPTURE(first.err);
-  REQUIRE(first.code == 0);
-  days.exported("city", "all.ply");
-  const std::size_t points = read_points(days.at("all.ply")).positions.size();
-  CHECK_THAT(first.out, ContainsSubstring(": " + std::to_string(points) + " points"));
-  const auto content = content_of(days.at("tiles"));
-  REQUIRE(content.count("tileset/r.pnts") == 1);
-  CHECK_THAT(content.at("tileset.json"),
-             ContainsSubstring("\"points\":" + std::to_string(points) + ','));
-  // The attributes of a point of a city.
-  CHECK_THAT(content.at("tileset.json"), ContainsSubstring("[\"time\",\"label\",\"session\"]"));
-
-  CHECK(export_to("tiles").code == 1);
-  CHECK(content_of(days.at("tiles")) == content);
-  write_text(days.at("tiles/tileset/notes.txt"), "mine");
-  REQUIRE(export_to("tiles", {"--force"}).code == 0);
-  CHECK(read_text(days.at("tiles/tileset/notes.txt")) == "mine");
-  fs::remove(days.at("tiles/tileset/notes.txt"));
-  CHECK(content_of(days.at("tiles")) == content);
-
-  // A region has fewer points; a folder of others and the city itself are refused.
-  REQUIRE(export_to("part", {"--region", "-5", "-5", "5", "5"}).code == 0);
-  CHECK(read_text(days.at("part/tileset/r.pnts")).size() < content.at("tileset/r.pnts").size());
-  write_text(days.at("mine/tileset.json"), "{}");
-  CHECK(export_to("mine", {"--force"}).code == 1);
-  CHECK(read_text(days.at("mine/tileset.json")) == "{}");
-  CHECK(export_to("city/tiles").code == 2);
-  CHECK_FALSE(fs::exists(days.at("city/tiles")));
-  const Outcome served = start({"view", days.at("city"), "--tiles"});
-  CHECK(served.code == 1);
-  CHECK_THAT(served.err, ContainsSubstring("write its tiles first: dynains map"));
-}
-
 TEST_CASE("map: a session of a slightly different frame is aligned, or refused before anything") {
   const TemporaryFolder folder;
   const auto at = [&](const std::string& name) { return (folder / name).string(); };

@@ -90,34 +90,3 @@ TEST_CASE("beliefs are written on demand, one byte per point") {
   CHECK(outcome.code == 1);
   CHECK(contains(outcome.err, "000003.belief: has 7 bytes; expected a byte for each"));
 }
-
-TEST_CASE(
-    "view --tiles refuses what is no finished run, a run without a map, and files of others") {
-  const PageFixture fixture;
-  CHECK(contains(start({"view", fixture.out, "--tiles"}).err, "no such folder"));
-  fs::create_directory(fixture.out);
-  CHECK(contains(start({"view", fixture.out, "--tiles"}).err, "holds no results"));
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--build-map", "false"}).code == 0);
-  const Outcome no_map = start({"view", fixture.out, "--tiles"});
-  CHECK(no_map.code == 1);
-  CHECK(contains(no_map.err, "the run built no map"));
-
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--force"}).code == 0);
-  write_text(fixture.out + "/tileset.json", "mine");
-  const Outcome foreign = start({"view", fixture.out, "--tiles"});
-  CHECK(foreign.code == 1);
-  CHECK(contains(foreign.err, "tileset.json"));
-  CHECK(read_text(fixture.out + "/tileset.json") == "mine");
-  fs::remove(fixture.out + "/tileset.json");
-
-  const Outcome tiles = start({"view", fixture.out, "--tiles"});
-  CHECK(tiles.code == 0);
-  CHECK(contains(tiles.out, "python3 -m http.server --bind 127.0.0.1 --directory " + fixture.out));
-  const std::string page = read_text(fixture.out + "/map.html");
-  CHECK(contains(page, "<!DOCTYPE html>"));
-  CHECK(!contains(page, "{{"));
-  CHECK(fs::exists(fixture.out + "/tileset/r.pnts"));
-  // Tiles and page belong to the results: they go with them.
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--force"}).code == 0);
-  CHECK(!fs::exists(fixture.out + "/map.html"));
-}

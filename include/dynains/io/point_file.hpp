@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -87,14 +86,6 @@ struct PointFile {
 ///
 /// Throws IoError with path, line or byte, and expected content.
 PointFile read_points(const std::filesystem::path& path);
-
-/// Point i of a file; columns that the file lacks are 0.
-FilePoint point_of(const PointFile& file, std::size_t i);
-
-/// Calls `visit` for each point of a file, in their order. PLY is read without points in memory,
-/// another format as a whole. Throws IoError like read_points().
-void for_each_point(const std::filesystem::path& path,
-                    const std::function<void(const FilePoint&)>& visit);
 
 /// Header of a point file.
 struct PointFileHeader {

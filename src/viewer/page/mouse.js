@@ -2,7 +2,7 @@
 
 // isMoved() is called after a change of the camera, isClicked(x, y) with a position in pixels of
 // the page.
-function connectCamera(canvas, camera, isMoved, isClicked = () => {}) {
+function connectCamera(canvas, camera, isMoved, isClicked) {
   let drag = null;
   canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   canvas.addEventListener('pointerdown', (event) => {
