@@ -167,9 +167,7 @@ class BasicDynaInsRemover {
     begin_epoch();
   }
 
-  /// Restores the state after construction and clears the map; buffers keep their capacity. A
-  /// TiledStaticMap removes its files, also those of earlier runs. To keep the map, construct a new
-  /// remover instead.
+  /// Restores the state after construction and clears the map; buffers keep their capacity.
   void reset();
 
  private:

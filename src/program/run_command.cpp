@@ -194,13 +194,6 @@ void add_run_command(CLI::App& app) {
       ->type_name("EPSG:N")
       ->group(kOutputs);
   command
-      .add_option(
-          "--map-memory", options->map_memory,
-          "bounds the memory of the map, for long drives: what is farthest goes to files in "
-          "--out until the run is complete [no bound]")
-      ->type_name("MB")
-      ->group(kOutputs);
-  command
       .add_option("--update", options->update,
                   "also adds the session to this map of many sessions, a folder (see `dynains "
                   "map`), when the run is complete")

@@ -81,12 +81,6 @@ const std::array<RunSetting, 28> kRunSettings{{
      [](RunArguments& run, const py::handle& value) {
        run.settings.crs = value.cast<std::string>();
      }},
-    {"map_memory", "float, MB", "bound of the memory of the map; the rest goes to files in out",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) {
-         run.settings.map_memory = to_number(value, 0.0);
-       }
-     }},
     {"update", "a path", "folder of a map of many sessions that the session is added to",
      [](RunArguments& run, const py::handle& value) {
        if (!value.is_none()) run.settings.update = to_path(value).string();

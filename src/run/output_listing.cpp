@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdio>
 #include <optional>
-#include <regex>
 #include <string_view>
 
 #include "dynains/errors.hpp"
@@ -16,11 +15,6 @@ namespace dynains::program {
 namespace {
 
 using ListingJson = nlohmann::ordered_json;
-
-bool is_tile_name(const std::string& name) {
-  static const std::regex form("-?[0-9]{1,19}_-?[0-9]{1,19}_-?[0-9]{1,19}\\.tile");
-  return std::regex_match(name, form);
-}
 
 std::string encode(const std::string& name) {
   std::string text;
@@ -120,7 +114,6 @@ bool OutputListing::contains(const std::string& folder, const std::string& name)
   const auto found = folders.find(folder);
   if (found == folders.end()) return false;
   const std::string& extension = found->second;
-  if (extension == kTileExtension) return is_tile_name(name);
   const std::size_t stem = name.size() - std::min(name.size(), extension.size());
   return name.compare(stem, name.npos, extension) == 0 && scans.count(name.substr(0, stem)) > 0;
 }

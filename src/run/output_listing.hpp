@@ -20,9 +20,6 @@ struct OutputKind {
   std::map<std::string, std::vector<std::string>> folders;
 };
 
-/// Extension of the files in a folder of map tiles, whose names follow from their places.
-inline constexpr const char* kTileExtension = ".tile";
-
 /// Files below a folder of results; the marker is not among them.
 struct OutputListing {
   std::set<std::string> files;                 ///< directly in the folder

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -32,8 +31,7 @@ namespace fs = std::filesystem;
 
 /// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
 /// After a signal, the first verdicts stay.
-template <class Remover>
-void finish_second_pass(Remover& remover, RunResults& results, const RunListener& listener) {
+void finish_second_pass(DynaInsRemover& remover, RunResults& results, const RunListener& listener) {
   SecondPass* const pass = results.second_pass();
   if (pass == nullptr) return;
   pass->test([] { return InterruptGuard::signal() == 0; });
@@ -54,40 +52,22 @@ int remover_threads(const RunPlan& plan) {
 }
 
 /// Processes all scans, or those that come before a signal. Returns the times.
-RunTiming process(const RunPlan& plan, const RunListener& listener, const fs::path& folder,
-                  RunResults& results) {
+RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& results) {
   const std::size_t total = plan.range.size();
   const auto report_progress = [&](std::size_t done) {
     if (listener.progress) listener.progress(done, total);
   };
-  RunTiming timing;
-  // The second pass makes the map.
-  const bool builds_map = results.second_pass() == nullptr;
-  const auto work = [&](auto& remover) {
-    report_progress(0);
-    timing = run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
-      report_progress(done);
-      return InterruptGuard::signal() == 0;
-    });
-    finish_second_pass(remover, results, listener);
-  };
-  if (plan.map_on_disk) {
-    RemoverWithMapOnDisk::Config config = *plan.map_on_disk;
-    config.build_map = builds_map;
-    config.threads = remover_threads(plan);
-    config.map.map_folder = folder / kTileFolder;
-    RemoverWithMapOnDisk remover(config);
-    work(remover);
-    remover.reset();
-    std::error_code ignored;
-    fs::remove(config.map.map_folder, ignored);
-  } else {
-    DynaInsRemover::Config config = plan.config;
-    config.build_map = config.build_map && builds_map;
-    config.threads = remover_threads(plan);
-    DynaInsRemover remover(config);
-    work(remover);
-  }
+  DynaInsRemover::Config config = plan.config;
+  if (results.second_pass() != nullptr) config.build_map = false;  // the second pass makes the map
+  config.threads = remover_threads(plan);
+  DynaInsRemover remover(config);
+  report_progress(0);
+  RunTiming timing =
+      run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
+        report_progress(done);
+        return InterruptGuard::signal() == 0;
+      });
+  finish_second_pass(remover, results, listener);
   return timing;
 }
 
@@ -138,9 +118,6 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
   description.complete = results.is_complete();
   description.map = plan.outputs.map_name();
   description.configuration = plan.configuration;
-  if (plan.map_on_disk) {
-    description.configuration["map_memory"] = plan.map_on_disk->map.map_memory;
-  }
   return description;
 }
 
@@ -231,7 +208,6 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
 
   const InterruptGuard interrupt(listener.second_signal);
   OutputChange change(out, mode, marker_of(plan), plan.listing);
-  if (!change.is_staged()) out.remove_folder_results(kTileFolder);
   RunOutputs outputs = plan.outputs;
   outputs.folder = change.folder();
   RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
@@ -244,7 +220,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
     config.threads = outputs.thread == std::launch::async ? 2 : 1;
     results.wait_for(second_pass.emplace(store.emplace(outputs.folder), config));
   }
-  const RunTiming timing = process(plan, listener, outputs.folder, results);
+  const RunTiming timing = process(plan, listener, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;
   check_not_empty(plan, results);
@@ -271,7 +247,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
   if (second_pass) report["second_pass"] = to_json(*second_pass, plan);
-  change.finish(report, plan.outputs.listing(plan.sequence, plan.range, false));
+  change.finish(report, plan.listing);
   return outcome;
 }
 

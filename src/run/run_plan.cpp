@@ -67,11 +67,6 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
   if (settings.map_attributes && !config.build_map) {
     throw ConfigError("--map-attributes needs --build-map true");
   }
-  if (outputs.map_attributes && outputs.map_on_disk) {
-    throw ConfigError(
-        "--map-memory bounds the memory of a map without attributes: not with "
-        "--map-attributes or a map of LAS");
-  }
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
   wkt_of(outputs.crs);
@@ -102,20 +97,11 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.log = choose_log(settings);
   outputs.mark_log = settings.mark_log;
   outputs.write_beliefs = settings.view || settings.write_beliefs;
-  outputs.map_on_disk = settings.map_memory.has_value();
   add_map_attributes(settings, config, outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
   if (passes_of(settings) > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
   return outputs;
-}
-
-/// Throws ConfigError.
-std::optional<RemoverWithMapOnDisk::Config> map_on_disk_of(const RunSettings& settings,
-                                                           const RunOutputs& outputs) {
-  if (!settings.map_memory) return std::nullopt;
-  if (!settings.config.build_map) throw ConfigError("--map-memory needs --build-map true");
-  return with_map_on_disk(settings.config, outputs.folder / kTileFolder, *settings.map_memory);
 }
 
 InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
@@ -178,7 +164,7 @@ bool is_whole(const RunPlan& plan, const OutputFolder& out) {
   const RunOutputs& outputs = plan.outputs;
   if (outputs.has_outside_map() && !fs::exists(outputs.map)) return false;
   if (!plan.session.city.empty() && !plan.session.is_fulfilled()) return false;
-  const OutputListing listing = outputs.listing(plan.sequence, plan.range, false);
+  const OutputListing& listing = plan.listing;
   for (const std::string& name : listing.files) {
     if (!out.folder().find(name)) return false;
   }
@@ -227,7 +213,7 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   return map;
 }
 
-void check_settings(const RunSettings& settings) { map_on_disk_of(settings, outputs_of(settings)); }
+void check_settings(const RunSettings& settings) { outputs_of(settings); }
 
 RunPlan make_plan(const RunSettings& given, Recording sequence) {
   RunSettings settings = given;
@@ -239,7 +225,6 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     config.min_range = own_body_range(sequence, range, config.min_range);
     config.validate();
   }
-  const auto map_on_disk = map_on_disk_of(settings, outputs);
   if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
@@ -258,10 +243,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["mark"] = outputs.mark_log;
   }
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
-  OutputListing listing = outputs.listing(sequence, range, true);
+  OutputListing listing = outputs.listing(sequence, range);
   InputFiles inputs = inputs_of(settings, sequence);
   return {config,
-          map_on_disk,
           std::move(sequence),
           range,
           outputs,

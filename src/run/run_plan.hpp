@@ -11,7 +11,6 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "input_files.hpp"
-#include "map_on_disk.hpp"
 #include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
@@ -22,11 +21,10 @@ namespace dynains::program {
 
 struct RunPlan {
   DynaInsRemover::Config config;
-  std::optional<RemoverWithMapOnDisk::Config> map_on_disk;  ///< its folder is not known yet
   Recording sequence;
   ScanRange range;
   RunOutputs outputs;
-  OutputListing listing;  ///< while the run lasts
+  OutputListing listing;  ///< of the results
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< see describe_request()

@@ -64,7 +64,6 @@ nlohmann::ordered_json describe_request(const Recording& recording, const ScanRa
           {"points_in_world", recording.frame() == PointFrame::kWorld},
           {"deskew", recording.is_deskewed()},
           {"map", outputs.map_name()},
-          {"map_on_disk", outputs.map_on_disk},
           {"map_attributes", outputs.map_attributes},
           {"crs", outputs.crs},
           {"write_online", outputs.write_online},

@@ -77,8 +77,7 @@ const OutputKind& run_output_kind() {
                                    {"online", {".label"}},
                                    {"causes", {".cause"}},
                                    {"beliefs", {".belief"}},
-                                   {"clean", {".bin", ".pcd", ".ply"}},
-                                   {kTileFolder, {kTileExtension}}}};
+                                   {"clean", {".bin", ".pcd", ".ply"}}}};
   return kind;
 }
 
@@ -90,8 +89,7 @@ std::string RunOutputs::map_name() const {
   return (has_outside_map() ? map : map.filename()).string();
 }
 
-OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range,
-                                  bool lasts) const {
+OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range) const {
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
@@ -105,7 +103,6 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
     listing.folders["clean"] =
         std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
   }
-  if (map_on_disk && lasts) listing.folders[kTileFolder] = kTileExtension;
   for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
   return listing;
 }

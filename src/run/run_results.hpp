@@ -34,9 +34,6 @@ class SecondPass;
 
 namespace dynains::program {
 
-/// In the folder of results, while a run with --map-memory lasts.
-inline constexpr const char* kTileFolder = "map_tiles";
-
 /// The picture of a run, see Overview.
 inline constexpr const char* kOverviewPicture = "overview.png";
 inline constexpr const char* kEstimatedPoses = "poses.txt";
@@ -57,7 +54,6 @@ struct RunOutputs {
   bool mark_log = false;      ///< adds labels to its clouds, which keep all points
   bool write_poses = false;
   bool write_beliefs = false;
-  bool map_on_disk = false;
   std::launch thread = std::launch::async;  ///< deferred: the caller reads and writes
   bool map_attributes = false;              ///< the map holds attributes of its points
   std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
@@ -70,8 +66,8 @@ struct RunOutputs {
   /// The map relative to the folder if it lies there, so that the folder can be moved; else
   /// absolute. Empty if there is none.
   std::string map_name() const;
-  /// Files in the folder of a run over these scans; with map tiles while it lasts.
-  OutputListing listing(const Recording& recording, const ScanRange& range, bool lasts) const;
+  /// Files in the folder of a run over these scans.
+  OutputListing listing(const Recording& recording, const ScanRange& range) const;
 };
 
 /// Positions of the sensor, m, world frame.

@@ -17,7 +17,6 @@ namespace dynains::program {
 struct RunSettings {
   std::string out;                      ///< folder of the results
   std::string map;                      ///< file of the static map; empty: static_map.ply in `out`
-  std::optional<double> map_memory;     ///< MB
   std::string update;                   ///< folder of a map of many sessions; empty: none
   std::string session;                  ///< name there; empty: that of the recording
   std::optional<double> session_begin;  ///< s; none: time of the first scan

@@ -9,7 +9,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/io/tiled_map.hpp"
 #include "dynains/pose.hpp"
 #include "io/files.hpp"
 #include "io/kitti_files.hpp"
@@ -139,47 +138,11 @@ void run_config(Bytes bytes) {
   });
 }
 
-void run_tile(Bytes bytes) {
-  static const test::TemporaryFolder folder;
-  const fs::path path = folder / "0_0_0.tile";
-  test::write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  expect_value_or<IoError>(path, [&](const fs::path&) {
-    TiledStaticMap::Config config;
-    config.map_folder = folder.path();
-    std::optional<TiledStaticMap> map(config);
-    std::size_t count = 0;
-    const auto check = [&](const Eigen::Vector3d& point) {
-      require(point.allFinite(), "points of a map are finite");
-      ++count;
-    };
-    map->for_each(check);
-    require(count == map->size() && 16 * count <= bytes.size(), "points come from bytes");
-    // Continues the map, from memory and from the file.
-    const PointBuffer one{{1.0F}, {1.0F}, {1.0F}};
-    map->insert(one, {}, Eigen::Isometry3d::Identity());
-    const std::size_t size = map->size();
-    map.reset();
-    count = 0;
-    TiledStaticMap(config).for_each(check);
-    require(count == size, "what is in memory is in the file");
-  });
-}
-
 std::vector<std::string> scan_seeds() {
   return {"", floats({1.0F, 2.0F, 3.0F, 0.5F}), floats({1.0F, 2.0F, 3.0F})};
 }
 
 std::vector<std::string> label_seeds() { return {"", std::string("\xFB\0\1\0", 4), "abc"}; }
-
-std::vector<std::string> tile_seeds() {
-  const test::TemporaryFolder folder;
-  TiledStaticMap::Config config;
-  config.map_folder = folder.path();
-  const PointBuffer points{{1.0F, 2.0F, 3.0F}, {4.0F, 4.0F, 4.5F}, {0.5F, 1.5F, 2.5F}};
-  TiledStaticMap(config).insert(points, {}, Eigen::Isometry3d::Identity());
-  const std::string whole = test::read_text(folder / "0_0_0.tile");
-  return {whole, whole.substr(0, whole.size() - 5), whole.substr(0, 48), ""};
-}
 
 std::vector<std::string> calib_seeds() {
   return {"P0: 1 2 3\nTr: " + pose_row(0.25), "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 -0.08"};

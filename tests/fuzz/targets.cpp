@@ -23,7 +23,6 @@ const std::vector<Target>& targets() {
       {"recording", run_recording, recording_seeds},
       {"log", run_log, log_seeds},
       {"nuscenes", run_nuscenes, nuscenes_seeds},
-      {"tile", run_tile, tile_seeds},
       {"facade", run_facade, facade_seeds},
   };
   return all;

@@ -42,7 +42,6 @@ void run_transforms(Bytes bytes);
 void run_recording(Bytes bytes);
 void run_log(Bytes bytes);
 void run_nuscenes(Bytes bytes);
-void run_tile(Bytes bytes);
 void run_facade(Bytes bytes);
 
 std::vector<std::string> scan_seeds();
@@ -62,7 +61,6 @@ std::vector<std::string> transforms_seeds();
 std::vector<std::string> recording_seeds();
 std::vector<std::string> log_seeds();
 std::vector<std::string> nuscenes_seeds();
-std::vector<std::string> tile_seeds();
 std::vector<std::string> facade_seeds();
 
 }  // namespace dynains::fuzz

@@ -11,7 +11,6 @@
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/io/tiled_map.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
@@ -43,43 +42,6 @@ struct Fixture {
 };
 
 }  // namespace
-
-TEST_CASE("with --map-memory the map is kept on the disk, and the results are equal") {
-  const Fixture fixture;
-  // Walls of the tiny scans lie on borders of voxels. A rotation would move points across them.
-  REQUIRE(fixture.run({"--level", "false"}).code == 0);
-  const std::size_t points = read_points(fixture.out + "/static_map.ply").positions.size();
-  const std::string labels = read_text(fixture.out + "/labels/" + scan_name(5) + ".label");
-  const Outcome outcome = fixture.run({"--map-memory", "0", "--level", "false", "--force"});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
-  CHECK(count_entries(fixture.out) == 7);
-  CHECK(read_text(fixture.out + "/labels/" + scan_name(5) + ".label") == labels);
-  const auto size =
-      static_cast<double>(read_points(fixture.out + "/static_map.ply").positions.size());
-  CHECK(points > 0);
-  CHECK(std::abs(size - static_cast<double>(points)) <= 1e-3 * size);
-  CHECK(fixture.report()["configuration"]["map_memory"] == 0.0);
-  const std::string map = read_text(fixture.out + "/static_map.ply");
-
-  // Tiles of a killed run do not get into the map of the next run.
-  nlohmann::json report = fixture.report();
-  report["complete"] = false;
-  report["outputs"]["folders"]["map_tiles"] = ".tile";
-  write_text(fixture.out + "/report.json", report.dump());
-  {
-    TiledStaticMap::Config config;
-    config.map_folder = fixture.out + "/map_tiles";
-    const PointBuffer other{{1000.0F}, {1000.0F}, {1000.0F}};
-    TiledStaticMap(config).insert(other, {}, Eigen::Isometry3d::Identity());
-  }
-  // A tile that a power cut truncated, and a temporary file of a killed run.
-  write_text(fixture.out + "/map_tiles/0_0_0.tile", "");
-  write_text(fixture.out + "/map_tiles/.0_-1_0.tile.0123456789abcdef.tmp", "half");
-  REQUIRE(fixture.run({"--map-memory", "0", "--level", "false", "--resume"}).code == 0);
-  CHECK(count_entries(fixture.out) == 7);
-  CHECK(read_text(fixture.out + "/static_map.ply") == map);
-}
 
 TEST_CASE("File names are printed without bytes that control the terminal") {
   const Fixture fixture(3);
@@ -132,17 +94,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
     if (outcome.code != 0) CHECK(count_lines(outcome.err) == 1);
   }
   CHECK_THAT(start({"check", missing}).err, ContainsSubstring("evil\\x1B[31m\\nname\\xC2\\x9B"));
-}
-
-TEST_CASE("Flag --map-memory needs a map and a possible size") {
-  const Fixture fixture(3);
-  const Outcome no_map = fixture.run({"--map-memory", "10", "--build-map", "false"});
-  CHECK(no_map.code != 0);
-  CHECK_THAT(no_map.err, ContainsSubstring("--map-memory needs --build-map true"));
-  const Outcome negative = fixture.run({"--map-memory=-1"});
-  CHECK(negative.code != 0);
-  CHECK_THAT(negative.err, ContainsSubstring("TiledStaticMap.map_memory = -1"));
-  CHECK(!fs::exists(fixture.out));
 }
 
 TEST_CASE("run writes labels, causes, map, moving points, report and timing, and nothing else") {
@@ -277,7 +228,6 @@ TEST_CASE("Flags of attributes of the map that do not fit together are refused")
   CHECK_THAT(refusal({"--crs", "EPSG:25832"}), ContainsSubstring("--crs needs --map FILE.las"));
   CHECK_THAT(refusal({"--map", map, "--crs", "nowhere"}),
              ContainsSubstring("found nowhere") || ContainsSubstring("this build has no PROJ"));
-  CHECK_THAT(refusal({"--map", map, "--map-memory", "10"}), ContainsSubstring("a map of LAS"));
   CHECK_THAT(refusal({"--map-attributes", "--build-map", "false"}),
              ContainsSubstring("--map-attributes needs --build-map true"));
   CHECK_THAT(refusal({"--map", fixture.out + "/dynamic_points.las"}),
@@ -565,8 +515,7 @@ TEST_CASE("Flag --resume completes the requested run and no other") {
 
   for (const std::vector<std::string>& other :
        {std::vector<std::string>{"--map", fixture.folder / "b/map.ply", "--write-clean"},
-        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"},
-        std::vector<std::string>{"--map", map, "--write-clean", "--map-memory", "10"}}) {
+        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"}}) {
     std::vector<std::string> flags = other;
     flags.push_back("--resume");
     const Outcome refused = fixture.run(flags);
@@ -610,21 +559,6 @@ TEST_CASE("Flag --resume names what differs, with both values") {
   report.erase("request");
   write_text(fixture.out + "/report.json", report.dump());
   CHECK_THAT(refusal({"--window", "5"}), ContainsSubstring("(report.json does not tell of them)"));
-}
-
-TEST_CASE("Flag --resume accepts another --map-memory, which changes no result") {
-  const Fixture fixture;
-  REQUIRE(fixture.run({"--map-memory", "10"}).code == 0);
-  const std::string map = read_text(fixture.out + "/static_map.ply");
-  fs::remove(fixture.out + "/static_map.ply");
-  const Outcome resumed = fixture.run({"--map-memory", "0", "--resume"});
-  CAPTURE(resumed.err);
-  REQUIRE(resumed.code == 0);
-  CHECK(read_text(fixture.out + "/static_map.ply") == map);
-  CHECK(fixture.report()["configuration"]["map_memory"] == 0.0);
-  const Outcome in_memory = fixture.run({"--resume"});
-  CHECK(in_memory.code == 1);
-  CHECK_THAT(in_memory.err, ContainsSubstring("(map_on_disk was true, is false);"));
 }
 
 TEST_CASE("Different spellings of a path name one place") {
@@ -684,10 +618,8 @@ TEST_CASE("A folder that another run writes to is refused, and stays as it is") 
   const std::string before = read_text(fixture.out + "/report.json");
   {
     const FolderLock other(fixture.out);
-    for (const std::vector<std::string>& flags : {std::vector<std::string>{},
-                                                  {"--force"},
-                                                  {"--resume"},
-                                                  {"--force", "--map-memory", "0"}}) {
+    for (const std::vector<std::string>& flags :
+         {std::vector<std::string>{}, {"--force"}, {"--resume"}}) {
       CAPTURE(flags);
       const Outcome refused = fixture.run(flags);
       CHECK(refused.code == 2);

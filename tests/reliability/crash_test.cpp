@@ -89,10 +89,6 @@ TEST_CASE("power cut during a run with its map in another folder") {
   check_crashes(fresh_run({"--map", "/maps/map.ply"}));
 }
 
-TEST_CASE("power cut during a run with its map on the disk") {
-  check_crashes(fresh_run({"--map-memory", "0"}));
-}
-
 TEST_CASE("power cut while a stopped run is resumed") {
   check_crashes(resumed_run({"--write-clean"}));
 }

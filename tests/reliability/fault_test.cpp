@@ -124,10 +124,6 @@ TEST_CASE("calls of a run fail once") {
   check_faults(fresh_run({"--write-clean", "--config", "/seq/run.cfg"}));
 }
 
-TEST_CASE("calls of a run with its map on the disk fail once") {
-  check_faults(fresh_run({"--map-memory", "0"}));
-}
-
 TEST_CASE("calls of a run that replaces a result fail once") {
   check_faults(replacing_run({"--write-clean"}, {"--map", "/maps/map.ply"}));
 }

@@ -70,7 +70,7 @@ kill_runs() {
       "$program" run "$seq" --out "$out" --resume --quiet "$@" || fail "kill $i: --resume"
       complete "$out" || fail "kill $i: not complete after --resume"
       same "$expected" "$out" || fail "kill $i: other bytes after --resume"
-      [[ -z $(find "$out" -name '.*.tmp' -o -name '*.tile') ]] ||
+      [[ -z $(find "$out" -name '.*.tmp') ]] ||
         fail "kill $i: leftovers after --resume"
     fi
   done
@@ -78,10 +78,6 @@ kill_runs() {
   ((early + broken > 0)) || fail "no kill hit a run"
 }
 kill_runs "$kills" "$work/expected"
-"$program" run "$seq" --out "$work/expected_tiles" --map-memory 0 --quiet
-diff -r "$work/expected/labels" "$work/expected_tiles/labels" ||
-  fail "labels depend on where the map is"
-kill_runs "$((kills / 4))" "$work/expected_tiles" --map-memory 0
 
 echo "--- kill -9 of --force: the earlier results, whole, or unfinished ones that --resume completes"
 "$program" run "$seq" --out "$work/earlier" --end 9 --write-online --quiet
@@ -175,17 +171,6 @@ if mount -t tmpfs -o size=600k tmpfs "$disk" 2>/dev/null; then
   "$program" run "$seq" --out "$disk/out" --resume --quiet || fail "full disk: --resume"
   same "$work/expected" "$disk/out" || fail "full disk: other bytes after --resume"
 
-  echo "--- a full disk with the map on it"
-  rm -rf "$disk"/*
-  mount -o remount,size=600k "$disk"
-  code=0
-  "$program" run "$seq" --out "$disk/out" --map-memory 0 --quiet 2>"$work/err" || code=$?
-  [[ $code == 1 ]] || fail "full disk, map on it: exit code $code"
-  grep -q 'No space left' "$work/err" || fail "full disk, map on it: $(cat "$work/err")"
-  mount -o remount,size=64m "$disk"
-  "$program" run "$seq" --out "$disk/out" --map-memory 0 --resume --quiet ||
-    fail "full disk, map on it: --resume"
-  same "$work/expected_tiles" "$disk/out" || fail "full disk, map on it: other bytes"
   rm -rf "$disk"/*
   cp -r "$work/expected" "$disk/out"
 

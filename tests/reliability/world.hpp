@@ -167,9 +167,9 @@ class WorldMaker {
   std::string name_in_out(const World& world) {
     return world.out + '/' +
            pick<std::string>({"report.json", "static_map.ply", "dynamic_points.ply", "timing.csv",
-                              "labels", "causes", "clean", "online", "map_tiles", "velodyne",
-                              "simulation.json", "labels/000000.label", "causes/000001.cause",
-                              "clean/000000.bin", "poses.txt", "map_tiles/0_0_0.tile"});
+                              "labels", "causes", "clean", "online", "velodyne", "simulation.json",
+                              "labels/000000.label", "causes/000001.cause", "clean/000000.bin",
+                              "poses.txt"});
   }
 
   void change(World& world) {
@@ -299,7 +299,6 @@ class WorldMaker {
     if (chance(0.3)) add_target(world, start, "--map");
     const std::vector<Arguments> flags = {{"--write-online"},
                                           {"--write-clean"},
-                                          {"--map-memory", "0"},
                                           {"--quiet"},
                                           {"--end", "2"},
                                           {"--start", "1"},

@@ -4,7 +4,6 @@
 #include "embedding_3.hpp"
 #include "embedding_4.hpp"
 #include "embedding_6.hpp"
-#include "embedding_7.hpp"
 
 void corrector_loop(const std::vector<Eigen::Vector3d>& scan, const Eigen::Isometry3d& T_odometry,
                     double time, std::vector<dynains::Pose>& trajectory,
@@ -32,10 +31,6 @@ void reserve(const dynains::RawPoints<float>& first_cloud) {
 #include "embedding_5.inc"
 }
 
-void long_drive() {
-#include "embedding_6.inc"
-}
-
 void move_scans() {
-#include "embedding_7.inc"
+#include "embedding_6.inc"
 }
