@@ -1,11 +1,11 @@
 // Loop closure: a drive around a block of houses, with an odometry that drifts. Scans that come
-// back to a place are registered to the scans of the first visit, a pose graph corrects all poses,
-// and the static map follows by RebasableStaticMap::update_poses().
+// back to a place are registered to the scans of the first visit, and a pose graph corrects all
+// poses. Verdicts compare neighbouring scans, so a loop closure does not change them: the static
+// map is built again from the static points of each scan.
 //
-//   example_loop_closure [scans] [picture.ppm]
+//   example_loop_closure [scans]
 //
-// The picture shows the static map from above: before, after, and both, points of the first in red
-// and of the second in green. The world is made of boxes, so the program needs no data.
+// The world is made of boxes, so the program needs no data.
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
@@ -14,9 +14,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <deque>
 #include <dynains/dyna_ins_remover.hpp>
-#include <dynains/map/rebasable_static_map.hpp>
-#include <fstream>
 #include <map>
 #include <random>
 #include <set>
@@ -319,7 +318,26 @@ double rms_error(const Poses& poses, const Poses& truth) {
   return std::sqrt(sum / static_cast<double>(poses.size()));  // m
 }
 
-Points points_of(const dynains::RebasableStaticMap& map) {
+// The static points of a scan whose verdict is final, thinned; sensor frame.
+dynains::PointBuffer static_points(const Points& scan, const dynains::ScanVerdict& verdict) {
+  Points points;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const dynains::PointLabel label = verdict.labels[i];
+    if (label == dynains::PointLabel::kStatic || label == dynains::PointLabel::kGround) {
+      points.push_back(scan[i]);
+    }
+  }
+  dynains::PointBuffer buffer;
+  for (const Eigen::Vector3d& p : small_odometry::thin_out(points, 0.4)) {
+    buffer.push_back(float(p.x()), float(p.y()), float(p.z()));
+  }
+  return buffer;
+}
+
+// The static map under these poses.
+Points map_of(const std::vector<dynains::PointBuffer>& scans, const Poses& poses) {
+  dynains::StaticMapAccumulator map;
+  for (std::size_t i = 0; i < scans.size(); ++i) map.insert(scans[i], {}, poses[i]);
   Points points;
   map.for_each([&](const Eigen::Vector3d& p) { points.push_back(p); });
   return points;
@@ -354,70 +372,18 @@ double share_outside(const Cells& cells, const Cells& others) {
   return static_cast<double>(outside) / static_cast<double>(std::max<std::size_t>(1, cells.size()));
 }
 
-// Before | after | both, as a portable pixmap.
-void write_picture(const std::string& path, const Points& before, const Points& after) {
-  constexpr int kMargin = 8;  // pixels
-  const double edge = 0.25;   // m
-  const Cells a = cells_of(before, edge), b = cells_of(after, edge);
-  std::array<int, 2> low = {1 << 30, 1 << 30}, high = {-(1 << 30), -(1 << 30)};
-  for (const Cells* cells : {&a, &b}) {
-    for (const auto& cell : *cells) {
-      for (std::size_t k = 0; k < 2; ++k) {
-        low[k] = std::min(low[k], cell[k]);
-        high[k] = std::max(high[k], cell[k]);
-      }
-    }
-  }
-  const int panel = high[0] - low[0] + 1 + 2 * kMargin;
-  const int width = 3 * panel, height = high[1] - low[1] + 1 + 2 * kMargin;
-  using Colour = std::array<char, 3>;
-  const Colour white = {'\xff', '\xff', '\xff'}, grey = {'\x60', '\x60', '\x60'},
-               red = {'\xd0', '\x20', '\x20'}, green = {'\x10', '\x90', '\x30'};
-  std::vector<Colour> pixels(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-                             white);
-  const auto draw = [&](int number, const Cells& cells, const Cells& others, const Colour& colour) {
-    for (const auto& cell : cells) {
-      const int x = number * panel + kMargin + cell[0] - low[0];
-      const int y = height - 1 - kMargin - (cell[1] - low[1]);
-      pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-             static_cast<std::size_t>(x)] = others.count(cell) > 0 ? grey : colour;
-    }
-  };
-  draw(0, a, a, grey);
-  draw(1, b, b, grey);
-  draw(2, a, b, red);
-  draw(2, b, a, green);
-  std::ofstream file(path, std::ios::binary);
-  file << "P6\n" << width << ' ' << height << "\n255\n";
-  for (const Colour& pixel : pixels) file.write(pixel.data(), 3);
-  if (!file) std::printf("%s: cannot be written\n", path.c_str());
-}
-
-struct Stages : dynains::DefaultStages {
-  using Map = dynains::RebasableStaticMap;
-};
-using Remover = dynains::BasicDynaInsRemover<Stages>;
-
-void move_map(Remover& remover, const Poses& poses) {
-  std::vector<dynains::ScanPose> moved;
-  for (std::size_t i = 0; i < poses.size(); ++i) moved.push_back({i, poses[i]});
-  remover.mutable_map().update_poses(moved);
-}
-
-// Errors of poses and of the map under them, which the remover keeps.
+// Errors of poses and of the map under them.
 struct Quality {
   double rms;      // m, of the positions
   double outside;  // share of the cells of the map where the map under true poses has none
 };
 
-// Leaves the map under true poses.
-Quality assess(Remover& remover, const Poses& poses, const Poses& truth) {
+Quality assess(const std::vector<dynains::PointBuffer>& scans, const Poses& poses,
+               const Poses& truth) {
   constexpr double kEdge = 0.4;  // m
   const Poses fitted = fitted_to(poses, truth);
-  const Cells cells = cells_of(points_of(remover.map()), kEdge);
-  move_map(remover, fitted);
-  return {rms_error(poses, fitted),
-          share_outside(cells, cells_of(points_of(remover.map()), kEdge))};
+  return {rms_error(poses, fitted), share_outside(cells_of(map_of(scans, poses), kEdge),
+                                                  cells_of(map_of(scans, fitted), kEdge))};
 }
 
 void print(const char* name, const Quality& quality) {
@@ -439,8 +405,14 @@ int main(int argc, char** argv) {
   std::mt19937 random(1);
 
   small_odometry::Odometry odometry(30.0);
-  Remover remover;
+  dynains::DynaInsRemover remover;
   std::vector<Points> scans;
+  std::deque<Points> open;                    // scans whose verdicts are not final yet
+  std::vector<dynains::PointBuffer> statics;  // by scan
+  const auto keep = [&](const dynains::ScanVerdict& verdict) {
+    statics.push_back(static_points(open.front(), verdict));
+    open.pop_front();
+  };
   Poses poses, truth;
   const Eigen::Isometry3d T_first_world = way.at(0.0).inverse();
   for (std::size_t i = 0; i < count; ++i) {
@@ -449,12 +421,13 @@ int main(int argc, char** argv) {
     const Points scan = world.measure(T_world_sensor, time, random);
     truth.push_back(T_first_world * T_world_sensor);
     poses.push_back(odometry.register_scan(scan));
-    remover.push(scan, poses.back(), time);
+    open.push_back(scan);
+    const dynains::FrameResult frame = remover.push(scan, poses.back(), time);
+    if (frame.finished) keep(*frame.finished);
     scans.push_back(small_odometry::thin_out(scan, 0.4));
   }
-  remover.flush([](const dynains::ScanVerdict&) {});
-  const Points before = points_of(remover.map());
-  const Quality drifted = assess(remover, poses, truth);
+  remover.flush(keep);
+  const Quality drifted = assess(statics, poses, truth);
 
   const auto revisit = static_cast<std::size_t>(way.length() / kStep);
   std::vector<Edge> edges = close_loops(scans, poses, revisit);
@@ -465,10 +438,9 @@ int main(int argc, char** argv) {
   const auto start = std::chrono::steady_clock::now();
   optimize(poses, edges);
   const auto optimized = std::chrono::steady_clock::now();
-  move_map(remover, poses);
-  const auto updated = std::chrono::steady_clock::now();
-  const Points after = points_of(remover.map());
-  const Quality closed = assess(remover, poses, truth);
+  const Points map = map_of(statics, poses);
+  const auto built = std::chrono::steady_clock::now();
+  const Quality closed = assess(statics, poses, truth);
 
   const auto seconds = [](auto from, auto to) {
     return std::chrono::duration<double>(to - from).count();
@@ -477,9 +449,8 @@ int main(int argc, char** argv) {
               closures);
   print("before:", drifted);
   print("after:", closed);
-  std::printf("pose graph %.2f s, update of the map %.2f s, %zu points\n",
-              seconds(start, optimized), seconds(optimized, updated), after.size());
-  if (argc > 2) write_picture(argv[2], before, after);
+  std::printf("pose graph %.2f s, map %.2f s, %zu points\n", seconds(start, optimized),
+              seconds(optimized, built), map.size());
   const bool is_better = closed.rms < 0.7 * drifted.rms && closed.outside < 0.7 * drifted.outside;
   return closures > 0 && is_better ? 0 : 1;
 }

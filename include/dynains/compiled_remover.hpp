@@ -101,8 +101,6 @@ class BasicDynaInsRemover {
 
   const Config& config() const;
   const Map& map() const;
-  /// For maps that can be corrected, such as RebasableStaticMap. Not during a call of this remover.
-  Map& mutable_map();
 
   /// Number of scans between a push and the final verdict on its scan.
   std::size_t latency() const;

@@ -51,11 +51,6 @@ const typename Stages::Map& BasicDynaInsRemover<Stages>::map() const {
 }
 
 template <class Stages>
-typename Stages::Map& BasicDynaInsRemover<Stages>::mutable_map() {
-  return pipeline().mutable_map();
-}
-
-template <class Stages>
 std::size_t BasicDynaInsRemover<Stages>::latency() const {
   return pipeline().latency();
 }

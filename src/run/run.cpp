@@ -10,6 +10,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/recording/second_pass.hpp"
 #include "estimate_poses.hpp"
 #include "interrupt.hpp"
@@ -31,18 +32,19 @@ namespace fs = std::filesystem;
 
 /// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
 /// After a signal, the first verdicts stay.
-void finish_second_pass(DynaInsRemover& remover, RunResults& results, const RunListener& listener) {
+void finish_second_pass(const RunPlan& plan, RunResults& results, const RunListener& listener) {
   SecondPass* const pass = results.second_pass();
   if (pass == nullptr) return;
   pass->test([] { return InterruptGuard::signal() == 0; });
+  StaticMapAccumulator map(plan.config.map);
   const auto add_to_map = [&](PointsView points, Span<const std::uint8_t> keep, const Pose& T) {
-    remover.mutable_map().insert(points, keep, T);
+    map.insert(points, keep, T);
   };
   results.revise(add_to_map, [&](std::size_t done) {
     if (listener.revision_progress) listener.revision_progress(done, results.finished());
   });
   if (!results.map_points()) return;
-  remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
+  map.for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
 }
 
 /// Threads of the remover: two, if the machine has two cores or the configuration says so.
@@ -67,7 +69,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& 
         report_progress(done);
         return InterruptGuard::signal() == 0;
       });
-  finish_second_pass(remover, results, listener);
+  finish_second_pass(plan, results, listener);
   return timing;
 }
 

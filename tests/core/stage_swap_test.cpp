@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/map/rebasable_static_map.hpp"
 #include "support/catch.hpp"
 #include "support/counting_map.hpp"
 #include "support/own_stages.hpp"
@@ -170,10 +169,6 @@ struct OwnEverything {
   using Map = CountingMap;
 };
 
-struct Rebasable : DefaultStages {
-  using Map = RebasableStaticMap;
-};
-
 TEST_CASE("a clusterer that omits points is refused with a reason") {
   const std::vector<Scan> scans = drive(yard(), 1, 0.0);
   BasicDynaInsRemover<OwnShortClusterer> remover;
@@ -223,40 +218,6 @@ TEST_CASE("all stages can be stages of the user at the same time") {
     }
   }
   CHECK(remover.map().count == static_points);
-}
-
-TEST_CASE("a rebasable map in a remover follows corrected poses of the sensor") {
-  const std::vector<Scan> scans = drive(yard(), 8, 3.0);
-  const bool level = GENERATE(true, false);
-  BasicDynaInsRemover<Rebasable>::Config config;
-  config.level = level;
-  BasicDynaInsRemover<Rebasable> remover(config);
-  run(remover, scans);
-  REQUIRE(remover.map().scan_count() == scans.size());
-
-  // The scans at their corrected places, with the same verdicts.
-  Eigen::Isometry3d T_new_old = Eigen::Isometry3d::Identity();
-  T_new_old.linear() = Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  T_new_old.translation() = Eigen::Vector3d(30.0, -7.0, 1.5);
-  std::vector<Scan> corrected = scans;
-  std::vector<ScanPose> updates;
-  for (std::size_t s = 0; s < scans.size(); ++s) {
-    corrected[s].T_world_sensor = T_new_old * scans[s].T_world_sensor;
-    updates.push_back({s, corrected[s].T_world_sensor});
-  }
-  remover.mutable_map().update_poses(updates);
-  BasicDynaInsRemover<Rebasable> other(config);
-  run(other, corrected);
-  CHECK(remover.map().stored_points() == other.map().stored_points());
-  const auto size = static_cast<double>(other.map().size());
-  std::size_t near = 0;
-  remover.map().for_each([&](const Eigen::Vector3d& p) {
-    bool is_found = false;
-    other.map().for_each_in({p.array() - 1e-3, p.array() + 1e-3},
-                            [&](const Eigen::Vector3d&) { is_found = true; });
-    near += is_found ? 1U : 0U;
-  });
-  CHECK(static_cast<double>(near) > 0.999 * size);
 }
 
 }  // namespace

@@ -131,7 +131,6 @@ class Pipeline final : private NewestVerdictMaker {
 
   const Config& config() const { return config_; }
   const Map& map() const { return map_; }
-  Map& mutable_map() { return map_; }
   std::size_t latency() const { return decision_->latency() + (finishes_later_ ? 1 : 0); }
   const SensorModel& sensor() const { return frame_.sensor(); }
   double next_time() const { return scans_.next_time(); }
@@ -300,9 +299,7 @@ ScanVerdict Pipeline<Stages>::finish_oldest(StageTimes& times) {
   });
   if (build_map_) {
     const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-    timed(times.map, [&] {
-      insert_scan(map_, points, final_writer_.is_kept(), scan.T_world_level, scan.T_world_sensor);
-    });
+    timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });
   }
   return final_writer_.verdict(scan);
 }

@@ -105,21 +105,6 @@ struct IsMap<
                            PointsView(), Span<const std::uint8_t>(), std::declval<const Pose&>())),
                        decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
-/// Inserts a scan. A map that takes the pose of the sensor as well can correct it later.
-template <class Map>
-using InsertWithSensor =
-    decltype(std::declval<Map&>().insert(PointsView(), Span<const std::uint8_t>(),
-                                         std::declval<const Pose&>(), std::declval<const Pose&>()));
-template <class Map>
-void insert_scan(Map& map, PointsView points, Span<const std::uint8_t> keep,
-                 const Pose& T_world_points, const Pose& T_world_sensor) {
-  if constexpr (Offers<InsertWithSensor, Map>::value) {
-    map.insert(points, keep, T_world_points, T_world_sensor);
-  } else {
-    map.insert(points, keep, T_world_points);
-  }
-}
-
 /// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
 template <class Stage, class = void>
 struct HasSensorMembers : std::false_type {};

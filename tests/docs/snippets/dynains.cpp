@@ -31,6 +31,7 @@ void reserve(const dynains::RawPoints<float>& first_cloud) {
 #include "embedding_5.inc"
 }
 
-void move_scans() {
+void move_scans(const std::vector<dynains::PointBuffer>& static_points,
+                const std::vector<dynains::Pose>& corrected) {
 #include "embedding_6.inc"
 }
