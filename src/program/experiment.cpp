@@ -9,7 +9,6 @@ void add_experiment_command(CLI::App& app) {
   add_table1_command(experiment);
   add_sweep_command(experiment);
   add_runtime_command(experiment);
-  add_figures_command(experiment);
 }
 
 }  // namespace dynains::program

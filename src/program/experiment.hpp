@@ -11,6 +11,5 @@ void add_experiment_command(CLI::App& app);
 void add_table1_command(CLI::App& experiment);   ///< Table I
 void add_sweep_command(CLI::App& experiment);    ///< Fig. 5
 void add_runtime_command(CLI::App& experiment);  ///< Fig. 7
-void add_figures_command(CLI::App& experiment);  ///< Fig. 1, 6 and 8
 
 }  // namespace dynains::program

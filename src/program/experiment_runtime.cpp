@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -15,6 +13,7 @@
 #include "experiment.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
+#include "run/run_report.hpp"
 #include "run/run_sequence.hpp"
 
 namespace dynains::program {
@@ -41,12 +40,6 @@ struct Component {
     double sum = 0;
     for (const double time : times) sum += time;
     return sum / static_cast<double>(times.size());
-  }
-  double quantile(double share) const {
-    std::vector<double> sorted = times;
-    std::sort(sorted.begin(), sorted.end());
-    const double rank = std::round(share * static_cast<double>(sorted.size() - 1));
-    return sorted[static_cast<std::size_t>(rank)];
   }
 };
 
@@ -87,11 +80,10 @@ void runtime(const RuntimeOptions& options) {
   csv << "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms\n";
   for (std::size_t c = 0; c + 1 < components.size(); ++c) {
     const Component& one = components[c];
-    const std::vector<double> values = {one.mean(), one.quantile(0.5), one.quantile(0.95),
-                                        one.quantile(0.99), one.quantile(1)};
+    const Statistics times = statistics(one.times);
     std::vector<std::string> row = {one.name};
     csv << one.name;
-    for (const double value : values) {
+    for (const double value : {one.mean(), times.median, times.p95, times.p99, times.max}) {
       row.push_back(format_number(value, 3));
       csv << ',' << format_number(value, 6);
     }

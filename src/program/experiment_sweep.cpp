@@ -5,12 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "chart.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "evaluation_options.hpp"
 #include "experiment.hpp"
-#include "gnuplot.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
@@ -38,7 +36,6 @@ struct SweepOptions {
   bool online = false;
   bool quiet = false;
   std::string csv;
-  std::string svg;
 };
 
 /// As many at once as one evaluation takes, so that a scan is read once for several values.
@@ -76,14 +73,11 @@ void sweep(const SweepOptions& options) {
     variants.push_back(variant);
   }
   TextFile csv_file(options.csv);
-  const std::string script = options.svg.empty() ? "" : options.svg + ".gp";
-  TextFile script_file(script);
   const std::vector<EvaluationRow> rows = measure(options, variants);
 
   evaluation::TextTable table({name, "PR %", "RR %", "F1", "SA %", "DA %", "HA %"});
   std::ostringstream csv;
   csv << name << ",pr,rr,f1,sa,da,ha\n";
-  Chart chart(name, {"PR", "RR", "F1 x 100"});
   for (const EvaluationRow& row : rows) {
     const double pr = row.voxels.preservation_rate();
     const double rr = row.voxels.rejection_rate();
@@ -99,12 +93,9 @@ void sweep(const SweepOptions& options) {
       csv << ',' << format_number(value, 6, "");
     }
     csv << '\n';
-    chart.add(row.name, {pr, rr, 100 * f1});
   }
   std::cout << table.to_string();
   csv_file.write(csv.str());
-  script_file.write(chart.script());
-  if (!options.svg.empty()) draw_by_gnuplot(script, options.svg);
 }
 
 }  // namespace
@@ -122,8 +113,6 @@ void add_sweep_command(CLI::App& experiment) {
   command.add_flag("--online", options->online, "judge the zero-latency verdict");
   command.add_flag("--quiet", options->quiet, "no progress");
   command.add_option("--csv", options->csv, "write the table to this file");
-  command.add_option("--svg", options->svg,
-                     "draw the curves into this file by gnuplot, from FILE.gp, which has the data");
   command.callback([options] { sweep(*options); });
 }
 

@@ -5,18 +5,15 @@
 #include <iomanip>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "change_picture.hpp"
 #include "command.hpp"
 #include "dynains/city/city.hpp"
 #include "dynains/city/city_map.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
-#include "figure.hpp"
 #include "run/map_file.hpp"
 #include "run/output_folder.hpp"
 
@@ -28,10 +25,8 @@ namespace fs = std::filesystem;
 struct MapOptions {
   std::string city;
   std::string session, later_session;
-  std::string file, added, removed, picture;
+  std::string file, added, removed;
   std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
-  int pixels = 1600;           // of the longer side of a picture
-  bool no_picture = false;
   bool force = false;
 };
 
@@ -185,37 +180,6 @@ void write_map_at(const MapOptions& options) {
   write_map(city, map, map.number_of(options.session), options);
 }
 
-/// Script, data and picture of a figure: NAME.gp, NAME.dat and NAME.png.
-class FigureFiles {
- public:
-  /// Throws ConfigError, IoError.
-  FigureFiles(const fs::path& city, const std::string& name, bool force) {
-    const fs::path path = whole_path(name);
-    folder_ = path.parent_path();
-    name_ = path.stem().string();
-    // The script names the data, and gnuplot would interpret other characters.
-    if (path.extension() != ".png" || !is_session_name(name_)) {
-      throw ConfigError(name +
-                        ": expected a name that ends in .png and consists of letters, digits, "
-                        "'.', '_' and '-'");
-    }
-    check_is_outside(city, name);
-    for (const char* extension : {".gp", ".dat", ".png"}) {
-      check_is_new(fs::path(path).replace_extension(extension),
-                   fs::path(name).replace_extension(extension).string(), force);
-    }
-  }
-
-  void write(const Figure& figure) const {
-    write_figure(figure, folder_, name_);
-    draw_figure(folder_, name_);
-  }
-
- private:
-  fs::path folder_;
-  std::string name_;
-};
-
 void diff(const MapOptions& options) {
   const City city{fs::path(options.city)};
   const CityMap map(city);
@@ -230,32 +194,19 @@ void diff(const MapOptions& options) {
   }
   CityPointFile added(map, city.folder(), options.added, options.force);
   CityPointFile removed(map, city.folder(), options.removed, options.force);
-  std::optional<FigureFiles> files;
-  if (!options.no_picture) files.emplace(city.folder(), options.picture, options.force);
-  ChangePicture picture(map.sessions(), options.pixels);
   for (const TileIndex& tile : map.tiles()) {
-    const TileHistory history = map.history(tile, b);
-    history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
-      const SessionPoint& point = history.points(session)[i];
-      picture.add_standing(map.position(tile, point), history.is_above_ground(point));
-    });
-    const CityChanges changes = map.changes(tile, history, a, b);
+    const CityChanges changes = map.changes(tile, map.history(tile, b), a, b);
     for (const CityPoint& p : changes.added) {
       added.add(map.position(tile, p.point), p.session, p.point);
-      picture.add_added(map.position(tile, p.point));
     }
     for (const CityPoint& p : changes.removed) {
       removed.add(map.position(tile, p.point), p.session, p.point);
-      picture.add_removed(map.position(tile, p.point));
     }
   }
   added.commit();
   removed.commit();
   std::cout << options.added << ": " << added.size() << " points\n"
             << options.removed << ": " << removed.size() << " points" << std::endl;
-  if (!files) return;
-  files->write(picture.figure());
-  std::cout << options.picture << ": drawn" << std::endl;
 }
 
 void drop(const MapOptions& options) {
@@ -326,16 +277,6 @@ void add_map_command(CLI::App& app) {
       ->type_name("FILE");
   diff_command->add_option("--removed", options->removed, "points that left [removed.ply]")
       ->type_name("FILE");
-  options->picture = "changes.png";
-  CLI::Option* const picture =
-      diff_command
-          ->add_option("--picture", options->picture,
-                       "both and the map after B from above, by gnuplot [changes.png]")
-          ->type_name("FILE");
-  diff_command->add_option("--pixels", options->pixels, "longer side of the picture")
-      ->check(CLI::Range(16, 16384))
-      ->capture_default_str();
-  diff_command->add_flag("--no-picture", options->no_picture, "points only")->excludes(picture);
   add_force(diff_command);
   add_session(add("drop", "Remove one session: the map is as if it had never come", drop),
               "SESSION", options->session);

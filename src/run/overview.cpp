@@ -9,7 +9,6 @@
 
 #include "moving_points.hpp"
 #include "picture_text.hpp"
-#include "verdict_cloud.hpp"
 
 namespace dynains::program {
 namespace {
@@ -22,6 +21,8 @@ constexpr int kStrip = kTextHeight + 8;  // pixels of a title, and of the scale 
 constexpr int kInset = 4;                // pixels around text
 constexpr Colour kInk = {40, 40, 40};
 constexpr Colour kGrey = {150, 150, 150};  // static points in a legend
+constexpr Colour kMoving = {30, 80, 220};
+constexpr Colour kRemoved = {30, 160, 60};
 constexpr Colour kPale = {232, 232, 232};
 
 /// One of so many static points of a scan is drawn: later scans show the same places again.
@@ -122,7 +123,6 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
 }
 
 Picture Overview::picture() const {
-  constexpr Colour kRemoved = kFateColours[static_cast<std::size_t>(Fate::kRemovedDynamic)];
   const bool is_beside = height_ > width_;
   const int step_x = is_beside ? width_ + kGap : 0;
   const int step_y = is_beside ? 0 : kStrip + height_ + kGap;
@@ -136,7 +136,7 @@ Picture Overview::picture() const {
       const Pixel& pixel = row[static_cast<std::size_t>(x)];
       const Colour grey = {pixel.grey, pixel.grey, pixel.grey};
       if (pixel.has_moving) {
-        draw(0, x, y, kRawDynamicColour);
+        draw(0, x, y, kMoving);
         draw(2, x, y, kRemoved);
       } else if (pixel.has_static()) {
         draw(0, x, y, grey);
@@ -145,7 +145,7 @@ Picture Overview::picture() const {
       if (pixel.has_static()) draw(1, x, y, grey);
     }
   }
-  const Entries before = {{kGrey, "static"}, {kRawDynamicColour, "moving"}};
+  const Entries before = {{kGrey, "static"}, {kMoving, "moving"}};
   draw_title(picture, 0, 0, "before:", before);
   draw_title(picture, step_x, step_y, "after:", {{kGrey, "static"}});
   draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kRemoved, "moving"}});

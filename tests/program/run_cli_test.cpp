@@ -56,7 +56,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
   const std::string out = fixture.folder / (evil + " out");
   const std::string table = fixture.folder / (evil + ".csv");
   const std::string missing = fixture.folder / (evil + " missing");
-  const std::string figures = fixture.folder / (evil + " figures");
   const std::string simulated = fixture.folder / (evil + " simulated");
   const std::string map = out + "/static_map.ply";
   const std::vector<std::vector<std::string>> calls = {
@@ -77,7 +76,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
       {"simulate", simulated, "--scans", "1", "--sensor", "vlp16"},
       {"simulate", seq, "--scans", "1", "--sensor", "vlp16"},
       {"experiment", "table1", seq},
-      {"experiment", "figures", seq, "--out", figures, "--run", out, "--pixels", "16"},
       {"config", "--preset", evil},
       {evil},
       {"run", seq, "--" + evil},
