@@ -9,8 +9,7 @@ string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
 file(WRITE ${documents}/changelog
   "${CPACK_PACKAGE_NAME} (${CPACK_PACKAGE_VERSION}) unstable; urgency=medium\n\n"
   "  * Version ${CPACK_PACKAGE_VERSION}.\n\n -- ${CPACK_PACKAGE_CONTACT}  ${date}\n")
-file(GLOB manuals ${share}/man/man1/*.1)
-execute_process(COMMAND gzip -9nf ${documents}/changelog ${manuals} RESULT_VARIABLE failed)
+execute_process(COMMAND gzip -9nf ${documents}/changelog RESULT_VARIABLE failed)
 if(failed)
   message(FATAL_ERROR "gzip: ${failed}")
 endif()

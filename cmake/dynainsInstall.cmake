@@ -44,8 +44,6 @@ if(TARGET dynains_program)
   install(TARGETS dynains_program
     RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dynains_program)
   if(NOT CMAKE_CROSSCOMPILING)
-    install(FILES ${PROJECT_BINARY_DIR}/dynains.1
-      DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT dynains_program)
     install(FILES ${PROJECT_BINARY_DIR}/dynains.bash RENAME dynains
       DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT dynains_program)
   endif()

@@ -95,11 +95,10 @@ int main(int argc, char** argv) {
   add_odometry_command(app);
   add_config_command(app);
   add_simulate_command(app);
-  add_statistics_command(app);
   add_eval_command(app);
   add_experiment_command(app);
   add_view_command(app);
-  add_reference_commands(app);
+  add_completion_command(app);
 
   try {
     app.parse(argc, argv);

@@ -72,7 +72,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
       {"eval", seq, out, out, "--map", map, "--map", map, "--csv", table},
       {"eval", seq, missing},
       {"eval", seq, "--map", missing},
-      {"statistics", seq},
       {"simulate", simulated, "--scans", "1", "--sensor", "vlp16"},
       {"simulate", seq, "--scans", "1", "--sensor", "vlp16"},
       {"experiment", "table1", seq},

@@ -68,11 +68,10 @@ TEST_CASE("An unknown command or option gives the nearest one") {
   };
   const std::string all =
       "xpected one of run, remap, clean, map, fleet, check, odometry, config, simulate, "
-      "statistics, eval, experiment, view, man, completion (";
+      "eval, experiment, view, completion (";
   const std::vector<Case> cases = {
       {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
       {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
-      {{"statistic"}, "did you mean statistics?"},
       {{"chekc", "seq"}, "did you mean check?"},
       {{"remove", "seq"}, "\"remove\" is no command; e" + all},
       {{""}, "\"\" is no command; e" + all},
@@ -147,15 +146,11 @@ TEST_CASE("A NUL byte in a config file is named with its line") {
                            ":2: expected a line of text, found a NUL byte\n");
 }
 
-TEST_CASE("The manual page and the completion have every command and option") {
-  const std::string manual = start({"man"}).out;
+TEST_CASE("The completion has every command and option") {
   const std::string completion = start({"completion"}).out;
-  CHECK_THAT(manual, StartsWith(".TH DYNAINS 1 "));
   for (const char* command : {"run", "view", "experiment table1"}) {
-    CHECK_THAT(manual, ContainsSubstring(std::string(".SS ") + command + '\n'));
     CHECK_THAT(completion, ContainsSubstring(std::string("    \"") + command + "\") options="));
   }
-  CHECK_THAT(manual, ContainsSubstring("\\fB\\-\\-tau\\-s\\fR"));
 
   // Bash completes the words of a command line by the function.
   const TemporaryFolder folder;

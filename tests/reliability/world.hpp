@@ -72,13 +72,8 @@ class WorldMaker {
     } else if (kind == 17) {
       simulate(world, start);
     } else {
-      start.arguments = pick<Arguments>({{"check", input(world)},
-                                         {"statistics", input(world)},
-                                         {"config"},
-                                         {"config", "--markdown"},
-                                         {"--help"},
-                                         {},
-                                         {"rum"}});
+      start.arguments = pick<Arguments>(
+          {{"check", input(world)}, {"config"}, {"config", "--markdown"}, {"--help"}, {}, {"rum"}});
     }
     if (chance(0.05)) start.arguments.push_back(pick<std::string>({"", "-1", "--", "nan", "--x"}));
     for (int descriptor = 0; descriptor < 3; ++descriptor) {
