@@ -62,6 +62,19 @@ struct Parameter {
 template <class T>
 Parameter(const char*, T&, Bounds, const char*, const char*) -> Parameter<T>;
 
+/// A field of another type, which is written as text.
+template <class T, class Read>
+struct TextParameter {
+  const char* name;    ///< as of Parameter
+  T& value;            ///< reference into the visited struct
+  Read read;           ///< text -> value; throws ConfigError or IoError
+  const char* values;  ///< for help and messages: "m|cm|mm", "FILE" ...
+  const char* help;    ///< one sentence, with [default]
+};
+
+template <class T, class Read>
+TextParameter(const char*, T&, Read, const char*, const char*) -> TextParameter<T, Read>;
+
 /// Whether parameters of type T have bounds.
 template <class T>
 inline constexpr bool kIsBounded =

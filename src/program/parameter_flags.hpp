@@ -1,129 +1,15 @@
-// Parameters as flags, as lines of a config file and as text: all from Config::visit.
+// Parameters and settings as flags, from the list of fields of a struct.
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <map>
-#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
 
-#include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
+#include "run/parameter_values.hpp"
 
 namespace dynains::program {
-
-/// "tau_s" -> "tau-s", the name of the flag and of the line in a config file.
-std::string flag_name(std::string parameter_name);
-
-/// Value of a parameter as text; nothing if it is none of that type.
-template <class T>
-std::optional<T> parse_value(const std::string& text) {
-  return value_of_name<T>(text);
-}
-template <>
-std::optional<bool> parse_value(const std::string& text);
-template <>
-std::optional<int> parse_value(const std::string& text);
-template <>
-std::optional<std::uint64_t> parse_value(const std::string& text);
-template <>
-std::optional<float> parse_value(const std::string& text);
-template <>
-std::optional<double> parse_value(const std::string& text);
-
-/// The shortest text that reads back to the same value.
-std::string format_value(double value);
-std::string format_value(float value);
-inline std::string format_value(bool value) { return value ? "true" : "false"; }
-template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, bool> = true>
-std::string format_value(Integer value) {
-  return std::to_string(value);
-}
-template <class Enum, std::enable_if_t<std::is_enum_v<Enum>, bool> = true>
-std::string format_value(Enum value) {
-  return plain_value(value);
-}
-
-/// Kind of value that a parameter takes, for help texts: "true|false", "INT in [2, 64]" ...
-template <class T>
-std::string describe_range(const Parameter<T>& parameter) {
-  using Value = std::remove_const_t<T>;
-  if constexpr (std::is_same_v<Value, bool>) {
-    return "true|false";
-  } else if constexpr (std::is_enum_v<Value>) {
-    return all_value_names<Value>();
-  } else {
-    std::string text = std::is_integral_v<Value> ? "INT" : "FLOAT";
-    const Bounds& bounds = parameter.bounds;
-    if (std::isfinite(bounds.min) || std::isfinite(bounds.max)) text += " in " + bounds.to_string();
-    return *parameter.unit == '\0' ? text : text + ' ' + parameter.unit;
-  }
-}
-
-/// Assigns `text` to a parameter. `where` starts the message of the ConfigError that is thrown if
-/// the text is no such value or the value is out of bounds.
-template <class T>
-void assign_parameter(const Parameter<T>& parameter, const std::string& text,
-                      const std::string& where) {
-  const std::optional<T> value = parse_value<T>(text);
-  bool valid = value.has_value();
-  if constexpr (kIsBounded<T>) {
-    valid = valid && parameter.bounds.contain(static_cast<double>(*value));
-  }
-  if (!valid) {
-    throw ConfigError(where + " = " + text + ": expected " + describe_range(parameter) + " (" +
-                      parameter.help + ")");
-  }
-  parameter.value = *value;
-}
-
-/// Values by flag name, each with the place it comes from.
-class ParameterValues {
- public:
-  void set(const std::string& name, const std::string& text, const std::string& where) {
-    values_[name] = {text, where};
-  }
-
-  bool empty() const { return values_.empty(); }
-  /// Whether a value has this flag name.
-  bool has(const std::string& name) const { return values_.count(name) > 0; }
-
-  /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown and for
-  /// former names.
-  template <class Config>
-  void apply(Config& config) const {
-    std::map<std::string, Value> left = values_;
-    std::vector<std::string> names;
-    Config::visit(config, [&](const auto& parameter) {
-      names.push_back(flag_name(parameter.name));
-      const auto found = left.find(flag_name(parameter.name));
-      if (found == left.end()) return;
-      assign_parameter(parameter, found->second.text, found->second.where);
-      left.erase(found);
-    });
-    if (left.empty()) return;
-    refuse(left.begin()->first, left.begin()->second.where, names);
-  }
-
- private:
-  /// Throws ConfigError with the present name of a former one, or the nearest of `names`.
-  [[noreturn]] static void refuse(const std::string& name, const std::string& where,
-                                  const std::vector<std::string>& names);
-
-  struct Value {
-    std::string text;
-    std::string where;
-  };
-  std::map<std::string, Value> values_;
-};
-
-/// Reads lines `name = value`; `#` starts a comment. Throws IoError if the file cannot be read,
-/// ConfigError for a line of another form or a name that stands twice.
-ParameterValues read_config_file(const std::filesystem::path& path);
 
 /// A flag for each parameter of a configuration.
 class ParameterFlags {
@@ -142,10 +28,54 @@ class ParameterFlags {
   }
 
   /// The flags that were given.
-  ParameterValues values() const;
+  ParameterValues values() const {
+    ParameterValues values;
+    for (const CLI::Option* option : options_) {
+      if (option->count() == 0) continue;
+      const std::string& name = option->get_lnames().front();
+      values.set(name, option->results().empty() ? "" : option->results().back(), "--" + name);
+    }
+    return values;
+  }
 
  private:
   std::vector<CLI::Option*> options_;
+};
+
+/// Help of a setting, with its default unless that is a text.
+template <class T>
+std::string help_of(const Parameter<T>& parameter) {
+  const bool is_flag = std::is_same_v<std::remove_const_t<T>, bool>;
+  return is_flag ? parameter.help
+                 : std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
+}
+template <class T, class Read>
+std::string help_of(const TextParameter<T, Read>& parameter) {
+  return parameter.help;
+}
+
+/// Visitor that adds a flag for each setting, which is set while the command line is read. Flags of
+/// booleans take no value. The settings outlive the command.
+struct SettingFlags {
+  CLI::App& command;
+  const char* group = "";  ///< empty: that of other options
+
+  template <class Setting>
+  void operator()(const Setting& setting) const {
+    const std::string flag = "--" + flag_name(setting.name);
+    using Value = std::remove_reference_t<decltype(setting.value)>;
+    CLI::Option* option = nullptr;
+    if constexpr (std::is_same_v<Value, bool>) {
+      option = command.add_flag(flag, setting.value, setting.help);
+    } else {
+      const auto assign = [setting, flag](const std::string& text) {
+        assign_parameter(setting, text, flag);
+      };
+      option = command.add_option_function<std::string>(flag, assign, help_of(setting));
+      option->type_name(describe_range(setting));
+    }
+    if (*group != '\0') option->group(group);
+  }
 };
 
 }  // namespace dynains::program

@@ -7,21 +7,22 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
+#include "run/recording_settings.hpp"
 
 namespace dynains::program {
 
 /// The argument SEQ and the flags that describe its files.
 class RecordingFlags {
  public:
-  /// `what` starts the help of the argument, for example "labelled sequence".
+  /// `what` starts the help of the argument, for example "labelled sequence". This is not moved
+  /// afterwards: flags refer to it.
   RecordingFlags(CLI::App& command, const std::string& what, bool required = true);
+  RecordingFlags(const RecordingFlags&) = delete;
+  RecordingFlags& operator=(const RecordingFlags&) = delete;
 
   const std::string& folder() const { return folder_; }
-  /// Throws ConfigError, and IoError for a file of --extrinsic.
-  RecordingOptions options() const;
-  /// As options(), of a recording whose poses are to be estimated. Throws ConfigError for flags
-  /// that tell of poses.
-  RecordingOptions options_without_poses() const;
+  /// Throws ConfigError.
+  const RecordingOptions& options() const { return settings_.checked(); }
   /// SEQ and the flags as a shell reads them, so that a message can propose a command. Flags in
   /// `further` replace those that were given.
   std::string as_given(const std::string& further = "") const;
@@ -31,7 +32,9 @@ class RecordingFlags {
   /// have them. Throws CLI::Error for flags or values that do not exist.
   void complete(const std::string& folder, const nlohmann::ordered_json& flags);
   /// Whether a file is named that belongs to one recording only.
-  bool names_files() const { return !poses_.empty() || !times_.empty(); }
+  bool names_files() const {
+    return !settings_.options.poses.empty() || !settings_.options.times.empty();
+  }
   /// Throws IoError. Warns of scans that are left out because they have no pose, and of a log that
   /// ends early.
   Recording open() const { return open(folder_); }
@@ -42,37 +45,14 @@ class RecordingFlags {
   /// for messages. Throws IoError.
   Recording open_of_run(const std::filesystem::path& report_file,
                         const nlohmann::ordered_json& report, const std::string& command);
-  /// Opens the folder without poses. `is_compensated`: see RecordingOptions.
+  /// Opens the folder without poses. `is_compensated`: see RecordingOptions. Throws ConfigError for
+  /// flags that tell of poses, and IoError.
   Recording open_without_poses(bool is_compensated) const;
 
  private:
   CLI::App* command_;
   std::string folder_;
-  std::string poses_;
-  std::string times_;
-  std::string frame_ = "auto";
-  std::string pose_frame_ = "auto";
-  std::string units_ = "m";
-  std::string quaternion_ = "auto";
-  bool invert_ = false;
-  bool left_handed_ = false;
-  int shift_ = 0;
-  bool deskew_ = false;
-  std::string point_time_unit_ = "auto";
-  std::string point_units_ = "m";
-  std::string bin_columns_ = "4";
-  std::string self_box_;
-  bool accept_missing_ = false;
-  std::string extrinsic_;
-  std::string sensor_origin_;
-  std::string sensor_frame_;
-  double time_offset_ = 0.0;  // s
-  double pose_scale_ = 1.0;
-  double pose_gap_ = kLongestPoseGap;  // s
-  std::string cloud_topic_;
-  std::string pose_topic_;
-  std::string pose_frame_id_;
-  std::string scene_;
+  RecordingSettings settings_;
 };
 
 }  // namespace dynains::program

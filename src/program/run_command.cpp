@@ -9,8 +9,8 @@
 #include <string>
 
 #include "command.hpp"
-#include "evaluation_options.hpp"
 #include "odometry_command.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "remover_options.hpp"
@@ -149,122 +149,9 @@ void add_run_command(CLI::App& app) {
                   "folder for the results; created, must be empty (see --force)")
       ->required()
       ->type_name("FOLDER");
-  CLI::Option* const force = command.add_flag(
-      "--force", options->force,
-      "replace the results of an earlier run in --out, and the file of --map, when the new ones "
-      "are "
-      "complete: until then the earlier ones stay. A folder without results is refused");
-  command
-      .add_flag("--resume", options->resume,
-                "complete a run with the same flags that was interrupted or killed, if --out holds "
-                "one; nothing to do if it is complete. It begins with the first scan again, for "
-                "verdicts depend on earlier scans")
-      ->excludes(force);
-  add_window_options(command, options->window);
-  command
-      .add_option("--map", options->map,
-                  "static map, .ply, .pcd or .las [static_map.ply in the folder of --out]")
-      ->type_name("FILE");
-  command
-      .add_option("--passes", options->passes,
-                  "2: after the last scan, scans of the whole recording remove what came or went "
-                  "at any time, and bring back what stands; 1: the verdicts of the stream [2; 1 "
-                  "with --decision window]")
-      ->check(CLI::Range(1, 2))
-      ->type_name("1|2");
-  command
-      .add_option_function<std::string>(
-          "--static",
-          [options](const std::string& value) {
-            options->static_policy = value == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
-          },
-          "with two passes: what never came or went, or what stands at last, as a car that has "
-          "parked [always]")
-      ->check(CLI::IsMember({"always", "last"}))
-      ->type_name("always|last");
-  const char* const kOutputs = "More outputs, and memory";
-  command
-      .add_flag("--map-attributes", options->map_attributes,
-                "the map holds intensity, time and label of its points, as far as scans have "
-                "them; a map of LAS holds its attributes always")
-      ->group(kOutputs);
-  command
-      .add_option("--crs", options->crs,
-                  "coordinate reference system of the poses, for a map of LAS [none]")
-      ->type_name("EPSG:N")
-      ->group(kOutputs);
-  command
-      .add_option("--update", options->update,
-                  "also adds the session to this map of many sessions, a folder (see `dynains "
-                  "map`), when the run is complete")
-      ->type_name("CITY")
-      ->group(kOutputs);
-  command
-      .add_option("--session", options->session,
-                  "name of the session in --update [name of the recording]")
-      ->type_name("NAME")
-      ->group(kOutputs);
-  command
-      .add_option("--session-begin", options->session_begin,
-                  "time by which sessions are ordered [time of the first scan]")
-      ->type_name("S")
-      ->group(kOutputs);
-  command
-      .add_flag("--align", options->align,
-                "moves the session into the frame of the map in --update: registers scans to its "
-                "points from a start that is within 2 m and 5 degrees; ends with exit code 2 "
-                "before anything is written if they do not fit")
-      ->group(kOutputs);
-  command
-      .add_option("--align-start", options->align_start,
-                  "start of --align, pose of the session's frame in that of the map: \"x y z qx qy "
-                  "qz qw\", 12 or 16 numbers of a matrix, or a file [identity]")
-      ->type_name("T")
-      ->group(kOutputs);
-  const auto add_output = [&](const char* flag, bool& value, const char* help) {
-    command.add_flag(flag, value, help)->group(kOutputs);
-  };
-  add_output("--write-online", options->write_online,
-             "also write the verdicts without latency, to the folder online");
-  add_output("--write-clean", options->write_clean,
-             "also write every scan without its moving points, to the folder clean, in the form it "
-             "has in SEQ");
-  command
-      .add_option("--write-log", options->log,
-                  "also write the log of SEQ again, as a file or folder of its kind: all messages "
-                  "as they are, except that clouds of the topic have no moving points")
-      ->type_name("FILE")
-      ->group(kOutputs);
-  add_output("--mark", options->mark_log,
-             "clouds of --write-log keep all points and get a field `label` (uint8): 251 moving, "
-             "9 static, 0 not judged");
-  command
-      .add_option_function<std::string>(
-          "--not-judged",
-          [options](const std::string& value) { options->drop_not_judged = value == "drop"; },
-          "points of --write-clean and --write-log that are not judged, as too near or too far "
-          "[keep]; the map never has them")
-      ->check(CLI::IsMember({"keep", "drop"}))
-      ->type_name("keep|drop")
-      ->group(kOutputs);
-  add_output("--write-beliefs", options->write_beliefs,
-             "also write the probability that a point moves, to the folder beliefs");
-  add_output("--write-mcap", options->write_mcap,
-             "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, instances, "
-             "beliefs and causes, the poses and the map");
-  command
-      .add_flag("--one-thread", options->one_thread,
-                "after the check of poses, the run works, reads and writes in one thread, for "
-                "machines on which many runs use "
-                "all cores")
-      ->group(kOutputs);
-  command.add_flag("--view", options->view,
-                   "also write the page view.html, which shows the results (see `dynains view`), "
-                   "and the folder beliefs");
-  command.add_flag(
-      "--accept-poses", options->accept_poses,
-      "run even if the scans disagree with the poses, which else ends the command with "
-      "exit code 2 before anything is written");
+  RunSettings::visit_common(*options, SettingFlags{command});
+  RunSettings::visit_more(*options, SettingFlags{command, "More outputs, and memory"});
+  command.get_option("--resume")->excludes(command.get_option("--force"));
   command.add_flag("--odometry", flags->odometry,
                    "estimate the poses from the scans, for a recording without poses (see `dynains "
                    "odometry`); also writes them to poses.txt");

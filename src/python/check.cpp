@@ -8,8 +8,9 @@
 #include "bindings.hpp"
 #include "parameters.hpp"
 #include "recording.hpp"
-#include "recording_settings.hpp"
 #include "run/recording_check.hpp"
+#include "run/recording_settings.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -157,7 +158,8 @@ void bind_check(py::module_& module) {
   const std::string doc =
       "Tells in seconds whether a recording will work, and which options it needs.\n\n"
       "recording: a Recording, or its path and by name:\n" +
-      describe_recording_settings() + "Returns a Diagnosis. Raises IoError if a file is broken.";
+      describe_settings<program::RecordingSettings>() +
+      "Returns a Diagnosis. Raises IoError if a file is broken.";
   module.def("check", &check_by_name, py::arg("recording"), doc.c_str());
 }
 

@@ -15,7 +15,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
-#include "recording_settings.hpp"
+#include "run/recording_settings.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -172,7 +173,7 @@ void bind_recording(py::module_& module) {
       ".npz, .xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with "
       "metadata.yaml).\n"
       "What the files mean, by name (dynains.check finds out):\n" +
-      describe_recording_settings();
+      describe_settings<program::RecordingSettings>();
   py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
       .def(
           py::init([](const std::filesystem::path& path, const py::kwargs& options) {

@@ -4,7 +4,6 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
-#include <array>
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
@@ -17,7 +16,6 @@
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "recording.hpp"
-#include "recording_settings.hpp"
 #include "run/json_file.hpp"
 #include "run/preset.hpp"
 #include "run/run_plan.hpp"
@@ -39,122 +37,54 @@ struct RunArguments {
   py::object progress = py::none();
 };
 
-using RunSetting = Setting<RunArguments>;
-
-template <bool RunSettings::*Field>
-void set_flag(RunArguments& run, const py::handle& value) {
-  run.settings.*Field = to_flag(value);
+[[noreturn]] void refuse_value(const std::string& name, const py::handle& value,
+                               const char* expected) {
+  throw py::type_error(name + " = " + py::repr(value).cast<std::string>() + ": expected " +
+                       expected);
 }
 
-template <std::optional<std::size_t> program::ScanWindow::*Field>
-void set_scan(RunArguments& run, const py::handle& value) {
-  if (!value.is_none()) run.settings.window.*Field = value.cast<std::size_t>();
+/// Takes an argument that is no flag of the program. False if `name` is none.
+bool take_object(RunArguments& run, const std::string& name, const py::handle& value) {
+  if (name == "preset") {
+    const auto& names = program::preset_names();
+    run.preset = to_text(value);
+    if (std::find(names.begin(), names.end(), *run.preset) == names.end()) {
+      refuse_value(name, value, "'default', 'offline', 'paper' or 'published'");
+    }
+  } else if (name == "config") {
+    if (value.is_none()) return true;
+    if (!py::isinstance<DynaInsRemover::Config>(value)) refuse_value(name, value, "a Config");
+    run.config = value.cast<DynaInsRemover::Config>();
+  } else if (name == "progress") {
+    if (!value.is_none() && PyCallable_Check(value.ptr()) == 0) {
+      refuse_value(name, value, "a function");
+    }
+    run.progress = py::reinterpret_borrow<py::object>(value);
+  } else {
+    return false;
+  }
+  return true;
 }
 
-const std::array<RunSetting, 28> kRunSettings{{
-    {"preset", "'default', 'offline', 'paper' or 'published'", "parameters to start from",
-     [](RunArguments& run, const py::handle& value) {
-       const auto& names = program::preset_names();
-       run.preset = value.cast<std::string>();
-       if (std::find(names.begin(), names.end(), *run.preset) == names.end()) {
-         throw py::cast_error();
-       }
-     }},
-    {"config", "a Config", "all parameters, in place of a preset",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.config = value.cast<DynaInsRemover::Config>();
-     }},
-    {"force", "bool", "replace the results of an earlier run when the new ones are complete",
-     &set_flag<&RunSettings::force>},
-    {"resume", "bool",
-     "complete a run with the same arguments that was interrupted; nothing to do if it is complete",
-     &set_flag<&RunSettings::resume>},
-    {"start", "int", "number of the first scan", &set_scan<&program::ScanWindow::start>},
-    {"end", "int", "number of the last scan", &set_scan<&program::ScanWindow::end>},
-    {"map", "a path", "file of the static map, .ply, .pcd or .las",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.map = to_path(value).string();
-     }},
-    {"map_attributes", "bool", "the map holds intensity, time and label of its points",
-     &set_flag<&RunSettings::map_attributes>},
-    {"crs", "str, 'EPSG:N'", "coordinate reference system of the poses, for a map of LAS",
-     [](RunArguments& run, const py::handle& value) {
-       run.settings.crs = value.cast<std::string>();
-     }},
-    {"update", "a path", "folder of a map of many sessions that the session is added to",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.update = to_path(value).string();
-     }},
-    {"session", "str", "name of the session in update; that of the recording if it is not given",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.session = value.cast<std::string>();
-     }},
-    {"session_begin", "float, s", "time by which sessions are ordered; default: of the first scan",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.session_begin = to_number(value);
-     }},
-    {"align", "bool", "moves the session into the frame of the map in update",
-     &set_flag<&RunSettings::align>},
-    {"align_start", "str, 'x y z qx qy qz qw' or a path",
-     "start of align, pose of the session's frame in that of the map; default: identity",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.align_start = value.cast<std::string>();
-     }},
-    {"passes", "1 or 2",
-     "2: scans of the whole recording revise what the first pass says; default: 2, and 1 with "
-     "decision window",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.passes = value.cast<int>();
-     }},
-    {"static", "'always' or 'last'",
-     "of two passes: what never came or went, or what stands at last",
-     [](RunArguments& run, const py::handle& value) {
-       const auto policy = value.cast<std::string>();
-       if (policy != "always" && policy != "last") throw py::cast_error();
-       run.settings.static_policy = policy == "last" ? StaticPolicy::kLast : StaticPolicy::kAlways;
-     }},
-    {"one_thread", "bool",
-     "after the check of poses, the run works, reads and writes in one thread",
-     &set_flag<&RunSettings::one_thread>},
-    {"write_online", "bool", "also write the verdicts without latency",
-     &set_flag<&RunSettings::write_online>},
-    {"write_clean", "bool", "also write every scan without its moving points",
-     &set_flag<&RunSettings::write_clean>},
-    {"write_log", "a path", "file or folder for the log without its moving points",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none()) run.settings.log = to_path(value).string();
-     }},
-    {"mark", "bool", "clouds of write_log keep all points and get a field label",
-     &set_flag<&RunSettings::mark_log>},
-    {"drop_not_judged", "bool",
-     "write_clean and write_log leave out points that are not judged, too",
-     &set_flag<&RunSettings::drop_not_judged>},
-    {"write_beliefs", "bool", "also write the probability that a point moves",
-     &set_flag<&RunSettings::write_beliefs>},
-    {"write_mcap", "bool", "also write verdicts.mcap, a log of ROS 2",
-     &set_flag<&RunSettings::write_mcap>},
-    {"view", "bool", "also write the page view.html and the folder beliefs",
-     &set_flag<&RunSettings::view>},
-    {"accept_poses", "bool", "run even if the scans disagree with the poses",
-     &set_flag<&RunSettings::accept_poses>},
-    {"progress", "a function", "called with the numbers of finished scans and of all scans",
-     [](RunArguments& run, const py::handle& value) {
-       if (!value.is_none() && PyCallable_Check(value.ptr()) == 0) throw py::cast_error();
-       run.progress = py::reinterpret_borrow<py::object>(value);
-     }},
-}};
+constexpr const char* kObjects =
+    "  preset: parameters to start from; 'default', 'offline', 'paper' or 'published'\n"
+    "  config: all parameters, in place of a preset; a Config\n"
+    "  progress: called with the numbers of finished scans and of all scans; a function\n";
 
 /// Takes the arguments of a run out of `values`, which keeps the options of the recording.
 RunArguments take_arguments(py::dict& values) {
   RunArguments run;
-  std::vector<std::string> names = recording_setting_names();
-  const std::vector<std::string> options = names;
-  for (const RunSetting& setting : kRunSettings) names.emplace_back(setting.name);
+  const std::vector<std::string> options = setting_names<program::RecordingSettings>();
   py::dict rest;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (assign_setting(kRunSettings, run, name, value)) continue;
-    if (std::find(options.begin(), options.end(), name) == options.end()) refuse(name, names);
+    if (take_object(run, name, value) || assign_setting(run.settings, name, value)) continue;
+    if (std::find(options.begin(), options.end(), name) == options.end()) {
+      std::vector<std::string> names = setting_names<RunSettings>();
+      names.insert(names.end(), options.begin(), options.end());
+      names.insert(names.end(), {"preset", "config", "progress"});
+      refuse(name, names);
+    }
     rest[key] = value;
   }
   values = rest;
@@ -347,8 +277,8 @@ void bind_run(py::module_& module) {
       "Removes what moves from a recorded sequence, as the program `dynains run`.\n\n"
       "recording: a Recording, or its path. out: folder for the results; created, must be empty.\n"
       "By name:\n" +
-      describe_settings(kRunSettings) + "For the path of a recording also:\n" +
-      describe_recording_settings() +
+      std::string(kObjects) + describe_settings<RunSettings>() + "For the path of a recording also:\n" +
+      describe_settings<program::RecordingSettings>() +
       "Returns a RunResult. Ctrl-C ends the run after the scan at hand and raises "
       "KeyboardInterrupt; what is there is written, and resume=True completes it. Raises IoError, "
       "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "

@@ -1,31 +1,73 @@
 #include "settings.hpp"
 
-#include <cmath>
+#include <algorithm>
+
+#include "arrays.hpp"
+#include "run/recording_settings.hpp"
 
 namespace dynains::python {
 namespace {
 
-// The number that a text stands for, or the value itself.
-py::object parse(const py::handle& value) {
-  if (!py::isinstance<py::str>(value)) return py::reinterpret_borrow<py::object>(value);
-  PyObject* const number = PyFloat_FromString(value.ptr());
-  if (number != nullptr) return py::reinterpret_steal<py::object>(number);
-  PyErr_Clear();
-  throw py::cast_error();
+using program::RecordingSettings;
+
+std::string joined(const py::object& numbers) {
+  std::string text;
+  for (const py::handle& number : numbers) {
+    text += (text.empty() ? "" : " ") +
+            py::repr(py::float_(py::reinterpret_borrow<py::object>(number))).cast<std::string>();
+  }
+  return text;
 }
 
 }  // namespace
 
-double to_number(const py::handle& value, double least, double most) {
-  const auto number = parse(value).cast<double>();
-  if (!std::isfinite(number) || number < least || number > most) throw py::cast_error();
-  return number;
+std::string to_text(const py::handle& value) {
+  if (py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__")) {
+    return py::module_::import("os").attr("fsdecode")(value).cast<std::string>();
+  }
+  const py::array array = py::array::ensure(value);
+  if (array && array.ndim() == 1) return joined(array);
+  if (array && array.ndim() > 1) {
+    const Pose T = to_pose(value);
+    const detail::Quaternion q(T.linear());
+    const Eigen::Vector3d t = T.translation();
+    return joined(py::make_tuple(t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()));
+  }
+  const auto text = py::str(value).cast<std::string>();
+  if (text == "True") return "true";
+  return text == "False" ? "false" : text;
 }
 
-std::int64_t to_whole_number(const py::handle& value, std::int64_t least, std::int64_t most) {
-  const double number = to_number(value, static_cast<double>(least), static_cast<double>(most));
-  if (std::trunc(number) != number) throw py::cast_error();
-  return static_cast<std::int64_t>(number);
+RecordingOptions to_recording_options(const py::dict& values) {
+  RecordingSettings settings;
+  for (const auto& [key, value] : values) {
+    const std::string name = py::str(key);
+    if (!assign_setting(settings, name, value)) refuse(name, setting_names<RecordingSettings>());
+  }
+  return settings.checked();
+}
+
+py::dict to_flags(const py::dict& values) {
+  py::dict flags;
+  for (const auto& [key, value] : values) {
+    const std::string text = to_text(value);
+    if (value.is_none() || text == "false") continue;
+    std::string flag = "--" + py::str(key).cast<std::string>();
+    std::replace(flag.begin(), flag.end(), '_', '-');
+    flags[flag.c_str()] = text;
+  }
+  return flags;
+}
+
+py::dict from_flags(const py::dict& flags) {
+  py::dict values;
+  for (const auto& [flag, value] : flags) {
+    std::string name = py::str(flag);
+    if (name.rfind("--", 0) == 0) name.erase(0, 2);
+    std::replace(name.begin(), name.end(), '-', '_');
+    values[name.c_str()] = value;
+  }
+  return values;
 }
 
 }  // namespace dynains::python

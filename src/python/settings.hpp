@@ -1,93 +1,63 @@
-// Keyword arguments that set the fields of a struct, from a table.
+// Settings of recordings and runs as keyword arguments: the names of the flags of the program, with
+// underscores. A value may be the text of the flag.
 #pragma once
 
 #include <pybind11/pybind11.h>
 
-#include <filesystem>
-#include <initializer_list>
-#include <limits>
 #include <string>
-#include <utility>
+#include <vector>
 
+#include "dynains/io/recording.hpp"
 #include "parameters.hpp"
+#include "run/parameter_values.hpp"
 
 namespace dynains::python {
 
-template <class Target>
-struct Setting {
-  const char* name;
-  const char* values;  ///< for messages, for example "bool"
-  const char* help;
-  /// Throws py::cast_error if `value` is none of the values.
-  void (*set)(Target& target, const py::handle& value);
-};
+/// The text of a flag with this value; that of a (4, 4) array is `x y z qx qy qz qw`. Throws
+/// PoseError for another array that is no list of numbers.
+std::string to_text(const py::handle& value);
 
-/// Sets what `name` stands for. False if no setting has that name. Throws TypeError for a value of
-/// another type or out of bounds.
-template <class Target, class Settings>
-bool assign_setting(const Settings& settings, Target& target, const std::string& name,
-                    const py::handle& value) {
-  for (const Setting<Target>& setting : settings) {
-    if (name != setting.name) continue;
-    try {
-      setting.set(target, value);
-    } catch (const py::cast_error&) {
-      throw py::type_error(name + " = " + py::repr(value).cast<std::string>() + ": expected " +
-                           setting.values);
-    }
-    return true;
-  }
-  return false;
+/// Sets what `name` stands for; None leaves the default. False if no setting has that name. Throws
+/// ConfigError for a value that is none of the setting, IoError for a file that cannot be read.
+template <class Settings>
+bool assign_setting(Settings& settings, const std::string& name, const py::handle& value) {
+  bool is_known = false;
+  Settings::visit(settings, [&](const auto& setting) {
+    if (name != setting.name) return;
+    is_known = true;
+    if (!value.is_none()) program::assign_parameter(setting, to_text(value), name);
+  });
+  return is_known;
+}
+
+template <class Settings>
+std::vector<std::string> setting_names() {
+  std::vector<std::string> names;
+  const Settings defaults;
+  Settings::visit(defaults, [&](const auto& setting) { names.emplace_back(setting.name); });
+  return names;
 }
 
 /// Name, meaning and values of each setting, one a line, for docstrings.
 template <class Settings>
-std::string describe_settings(const Settings& settings) {
+std::string describe_settings() {
   std::string text;
-  for (const auto& setting : settings) {
-    text += std::string("  ") + setting.name + ": " + setting.help + "; " + setting.values + '\n';
-  }
+  const Settings defaults;
+  Settings::visit(defaults, [&](const auto& setting) {
+    text += std::string("  ") + setting.name + ": " + setting.help + "; " +
+            program::describe_range(setting) + '\n';
+  });
   return text;
 }
 
-// Conversions for settings. Numbers and flags may be text, as reports of runs have them.
+/// Options with the keyword arguments `values`. Throws ConfigError, also for an unknown name,
+/// IoError for a file of an extrinsic calibration.
+RecordingOptions to_recording_options(const py::dict& values);
 
-/// The value that `word` stands for in a list of pairs.
-template <class Value>
-Value choose(const py::handle& word, std::initializer_list<std::pair<const char*, Value>> values) {
-  const auto wanted = word.cast<std::string>();
-  for (const auto& [name, value] : values) {
-    if (wanted == name) return value;
-  }
-  throw py::cast_error();
-}
-
-/// The value of this name.
-template <class Enum>
-Enum to_enum(const py::handle& name) {
-  const auto value = value_of_name<Enum>(name.cast<std::string>());
-  if (!value) throw py::cast_error();
-  return *value;
-}
-
-inline bool to_flag(const py::handle& value) {
-  if (py::isinstance<py::str>(value))
-    return choose<bool>(value, {{"true", true}, {"false", false}});
-  if (value.equal(py::bool_(true))) return true;
-  if (value.equal(py::bool_(false))) return false;
-  throw py::cast_error();
-}
-
-/// A finite number in [least, most].
-double to_number(const py::handle& value, double least = std::numeric_limits<double>::lowest(),
-                 double most = std::numeric_limits<double>::max());
-/// A whole number in [least, most].
-std::int64_t to_whole_number(const py::handle& value, std::int64_t least, std::int64_t most);
-
-/// The path of a str or an os.PathLike.
-inline std::filesystem::path to_path(const py::handle& value) {
-  if (!py::isinstance<py::str>(value) && !py::hasattr(value, "__fspath__")) throw py::cast_error();
-  return py::module_::import("os").attr("fsdecode")(value).cast<std::string>();
-}
+/// The keyword arguments as flags of the program, {"--pose-shift": "1"}, which reports of runs
+/// hold.
+py::dict to_flags(const py::dict& values);
+/// The keyword arguments that flags stand for; their values are text.
+py::dict from_flags(const py::dict& flags);
 
 }  // namespace dynains::python

@@ -1,7 +1,9 @@
 // Writes the type stubs of the Python module to standard output: the template, with a line for each
 // parameter in place of a line @NAME@.
+#include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <type_traits>
 
@@ -9,6 +11,8 @@
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/simulation/config.hpp"
+#include "run/recording_settings.hpp"
+#include "run/run_settings.hpp"
 
 namespace {
 
@@ -30,6 +34,26 @@ std::string type_of(const dynains::Parameter<T>&) {
   }
 }
 
+template <class T, class Read>
+std::string type_of(const dynains::TextParameter<T, Read>& parameter) {
+  using Value = std::remove_const_t<T>;
+  if constexpr (std::is_same_v<Value, std::optional<double>>) return "Optional[float]";
+  if constexpr (std::is_same_v<Value, std::optional<int>> ||
+                std::is_same_v<Value, std::optional<std::size_t>>) {
+    return "Optional[int]";
+  }
+  if constexpr (std::is_same_v<Value, std::string> ||
+                std::is_same_v<Value, std::filesystem::path>) {
+    return "Union[str, PathLike[str], None]";
+  }
+  std::string names = parameter.values;
+  if (names.find('|') == std::string::npos) return "Union[ArrayLike, PathLike[str], None]";
+  for (std::size_t at = names.find('|'); at != names.npos; at = names.find('|', at + 5)) {
+    names.replace(at, 1, "\", \"");
+  }
+  return "Optional[Literal[\"" + names + "\"]]";
+}
+
 /// A line for each parameter: its name, its type, and `end`.
 template <class Config>
 std::string lines_of(const std::string& indent, const std::string& end) {
@@ -49,6 +73,12 @@ std::string expand(const std::string& indent, const std::string& line) {
     return lines_of<dynains::DynaInsRemover::Config>(indent, as_argument);
   if (line == "@EVALUATION_ARGUMENTS@") {
     return lines_of<dynains::evaluation::EvaluationConfig>(indent, as_argument);
+  }
+  if (line == "@RECORDING_ARGUMENTS@") {
+    return lines_of<dynains::program::RecordingSettings>(indent, as_argument);
+  }
+  if (line == "@RUN_ARGUMENTS@") {
+    return lines_of<dynains::program::RunSettings>(indent, as_argument);
   }
   if (line == "@SIMULATION_ARGUMENTS@") {
     return lines_of<dynains::simulation::Config>(indent, as_argument);

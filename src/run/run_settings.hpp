@@ -9,10 +9,21 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/config.hpp"
+#include "dynains/parameters.hpp"
 #include "dynains/recording/static_policy.hpp"
 #include "labelled_sequence.hpp"
+#include "parameter_values.hpp"
+#include "recording_settings.hpp"
 
 namespace dynains::program {
+
+/// The number that a text is, for a field that may be empty. Throws ConfigError.
+template <class T>
+std::optional<T> read_number(const std::string& text) {
+  const std::optional<T> value = parse_value<T>(text);
+  if (!value) throw ConfigError("expected a number, found " + text);
+  return value;
+}
 
 struct RunSettings {
   std::string out;                      ///< folder of the results
@@ -53,7 +64,98 @@ struct RunSettings {
   /// Begin of the wall time in the report.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   nlohmann::ordered_json recording_flags;  ///< flag -> value, those that describe the files
+
+  /// What flags and keyword arguments set: what most runs need, then what few do.
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visit_common(self, visitor);
+    visit_more(self, visitor);
+  }
+  template <class Self, class Visitor>
+  static void visit_common(Self& self, Visitor&& visitor);
+  template <class Self, class Visitor>
+  static void visit_more(Self& self, Visitor&& visitor);
 };
+
+template <class Self, class Visitor>
+void RunSettings::visit_common(Self& self, Visitor&& visitor) {
+  visitor(Parameter{"force", self.force, Bounds(), "",
+                    "replace the results of an earlier run, and the file of the map, when the new "
+                    "ones are complete: until then the earlier ones stay. A folder without results "
+                    "is refused"});
+  visitor(Parameter{"resume", self.resume, Bounds(), "",
+                    "complete a run with the same settings that was interrupted or killed; nothing "
+                    "to do if it is complete. It begins with the first scan again, for verdicts "
+                    "depend on earlier scans"});
+  visitor(TextParameter{"start", self.window.start, &read_number<std::uint64_t>, "N",
+                        "number of the first scan"});
+  visitor(TextParameter{"end", self.window.end, &read_number<std::uint64_t>, "N",
+                        "number of the last scan (inclusive)"});
+  visitor(
+      TextParameter{"map", self.map, &read_text<std::string>, "FILE",
+                    "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"});
+  visitor(TextParameter{"passes", self.passes, &read_number<int>, "1|2",
+                        "2: after the last scan, scans of the whole recording remove what came or "
+                        "went at any time, and bring back what stands; 1: the verdicts of the "
+                        "stream [2; 1 with decision window]"});
+  visitor(Parameter{"static", self.static_policy, Bounds(), "",
+                    "with two passes: what never came or went, or what stands at last, as a car "
+                    "that has parked"});
+  visitor(Parameter{"view", self.view, Bounds(), "",
+                    "also write the page view.html, which shows the results, and the folder "
+                    "beliefs"});
+  visitor(Parameter{"accept_poses", self.accept_poses, Bounds(), "",
+                    "run even if the scans disagree with the poses, which else ends the run before "
+                    "anything is written"});
+}
+
+template <class Self, class Visitor>
+void RunSettings::visit_more(Self& self, Visitor&& visitor) {
+  constexpr auto kText = &read_text<std::string>;
+  visitor(Parameter{"map_attributes", self.map_attributes, Bounds(), "",
+                    "the map holds intensity, time and label of its points, as far as scans have "
+                    "them; a map of LAS holds its attributes always"});
+  visitor(TextParameter{"crs", self.crs, kText, "EPSG:N",
+                        "coordinate reference system of the poses, for a map of LAS [none]"});
+  visitor(
+      TextParameter{"update", self.update, kText, "CITY",
+                    "also adds the session to this map of many sessions, a folder, when the run "
+                    "is complete"});
+  visitor(TextParameter{"session", self.session, kText, "NAME",
+                        "name of the session in that map [name of the recording]"});
+  visitor(TextParameter{"session_begin", self.session_begin, &read_number<double>, "S",
+                        "time by which sessions are ordered [time of the first scan]"});
+  visitor(Parameter{"align", self.align, Bounds(), "",
+                    "moves the session into the frame of that map: registers scans to its points "
+                    "from a start that is within 2 m and 5 degrees; ends before anything is "
+                    "written if they do not fit"});
+  visitor(TextParameter{"align_start", self.align_start, kText, "POSE",
+                        "start of the alignment, pose of the session's frame in that of the map: "
+                        "\"x y z qx qy qz qw\", or a file [identity]"});
+  visitor(Parameter{"write_online", self.write_online, Bounds(), "",
+                    "also write the verdicts without latency, to the folder online"});
+  visitor(Parameter{"write_clean", self.write_clean, Bounds(), "",
+                    "also write every scan without its moving points, to the folder clean, in the "
+                    "form it has in the recording"});
+  visitor(TextParameter{"write_log", self.log, kText, "FILE",
+                        "also write the log of the recording again, as a file or folder of its "
+                        "kind: all messages as they are, except that clouds of the topic have no "
+                        "moving points"});
+  visitor(Parameter{"mark", self.mark_log, Bounds(), "",
+                    "clouds of that log keep all points and get a field `label` (uint8): 251 "
+                    "moving, 9 static, 0 not judged"});
+  visitor(Parameter{"drop_not_judged", self.drop_not_judged, Bounds(), "",
+                    "clean scans and the log have no points that are not judged, as too near or "
+                    "too far; the map never has them"});
+  visitor(Parameter{"write_beliefs", self.write_beliefs, Bounds(), "",
+                    "also write the probability that a point moves, to the folder beliefs"});
+  visitor(Parameter{"write_mcap", self.write_mcap, Bounds(), "",
+                    "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, "
+                    "instances, beliefs and causes, the poses and the map"});
+  visitor(Parameter{"one_thread", self.one_thread, Bounds(), "",
+                    "after the check of poses, the run works, reads and writes in one thread, for "
+                    "machines on which many runs use all cores"});
+}
 
 /// Passes over the recording: as set, else two. One if the run decides by the window, which is what
 /// the paper does.

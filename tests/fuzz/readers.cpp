@@ -13,7 +13,7 @@
 #include "io/files.hpp"
 #include "io/kitti_files.hpp"
 #include "io/point_format_writer.hpp"
-#include "program/parameter_flags.hpp"
+#include "run/parameter_values.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

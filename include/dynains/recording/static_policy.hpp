@@ -1,6 +1,7 @@
 // The choice of static objects in the second pass of a run.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace dynains {
@@ -10,5 +11,8 @@ enum class StaticPolicy : std::uint8_t {
   kAlways,  ///< nothing that came or went
   kLast     ///< what stands at the last look, in the scans since it stands
 };
+
+/// Names as in options.
+constexpr std::array<const char*, 2> value_names(StaticPolicy) { return {"always", "last"}; }
 
 }  // namespace dynains

@@ -1,4 +1,4 @@
-#include "parameter_flags.hpp"
+#include "parameter_values.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "dynains/parameters.hpp"
-#include "run/nearest_name.hpp"
+#include "nearest_name.hpp"
 
 namespace dynains::program {
 namespace {
@@ -141,16 +141,6 @@ void ParameterValues::refuse(const std::string& name, const std::string& where,
   const std::string like = nearest_name(name, names);
   throw ConfigError(where + ": unknown parameter" +
                     (like.empty() ? "" : "; did you mean " + like + "?") + ", see dynains config");
-}
-
-ParameterValues ParameterFlags::values() const {
-  ParameterValues values;
-  for (const CLI::Option* option : options_) {
-    if (option->count() == 0) continue;
-    const std::string& name = option->get_lnames().front();
-    values.set(name, option->results().empty() ? "" : option->results().back(), "--" + name);
-  }
-  return values;
 }
 
 }  // namespace dynains::program
