@@ -399,13 +399,6 @@ std::uint64_t Recording::point_count(std::size_t i) const {
   return reader_->point_count(address(i));
 }
 
-bool Recording::is_verbatim() const {
-  return format_ == ScanFormat::kBin && frame_ == PointFrame::kSensor && !options_.deskew &&
-         sensor_origin().isZero(0.0) && options_.point_unit == 1.0 &&
-         options_.bin_layout.columns == 4 && !options_.bin_layout.is_double &&
-         options_.self_boxes.empty();
-}
-
 /// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
 std::optional<FileTransform> Recording::T_sensor_file(std::size_t i) const {
   const bool is_in_world = frame_ == PointFrame::kWorld;

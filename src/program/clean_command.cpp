@@ -10,7 +10,6 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "io/point_file_copy.hpp"
 #include "progress.hpp"
@@ -88,9 +87,9 @@ void add_scans(const Recording& recording, const OutputFolder& out, bool quiet, 
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
-    const std::vector<std::uint32_t> labels = read_labels(file, scan.size());
+    const std::vector<std::uint32_t> labels = read_run_labels(file, scan.size());
     for (std::size_t k = 0; k < labels.size(); ++k) {
-      const std::uint32_t label = run_class(labels[k], k, file);
+      const std::uint32_t label = class_of(labels[k]);
       if (label == kRunNotJudged) continue;
       const float* const p = &scan.xyzi[4 * k];
       votes.add(recording.T_world_sensor(i) * Eigen::Vector3d(p[0], p[1], p[2]),

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -11,14 +12,15 @@
 #include <vector>
 
 #include "command.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
-#include "kept_points.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/finished_run.hpp"
 #include "run/interrupt.hpp"
 #include "run/json_file.hpp"
+#include "run/labelled_sequence.hpp"
 #include "run/naming_scan.hpp"
 #include "run/output_folder.hpp"
 #include "run/repose_session.hpp"
@@ -117,6 +119,24 @@ std::optional<Recording> open_original(const RemapOptions& options, const Earlie
   return recording;
 }
 
+/// The points of a scan that `labels`, of `file`, call static. Throws IoError for labels of another
+/// scan, which show by points that are not finite.
+PointBuffer static_points(const RecordedScan& scan, const std::vector<std::uint32_t>& labels,
+                          const fs::path& file) {
+  PointBuffer points;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (class_of(labels[i]) != kRunStatic) continue;
+    const float* const p = &scan.xyzi[4 * i];
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {
+      throw IoError(file.string() +
+                    ": has static points whose coordinates are not finite; expected labels of a "
+                    "run over these scans");
+    }
+    points.push_back(p[0], p[1], p[2]);
+  }
+  return points;
+}
+
 /// Builds the map of the run's verdicts under the poses of `corrected`. Throws Interrupted.
 StaticMapAccumulator build_map(const Recording& corrected, const Recording& original,
                                const std::vector<std::size_t>& scans, const fs::path& labels,
@@ -124,12 +144,14 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   StaticMapAccumulator::Config config;
   config.map_voxel = voxel;
   StaticMapAccumulator map(config);
-  KeptPoints kept(original, labels);
+  RecordedScan scan;
   Progress progress(scans.size(), "scans", quiet);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-    const Pose& pose = corrected.T_world_sensor(scans[k]);
-    kept.insert_into(map, scans[k], orthonormalized(pose));
+    original.read_scan(scans[k], scan);
+    const fs::path file = labels / (original.name(scans[k]) + ".label");
+    map.insert(static_points(scan, read_run_labels(file, scan.size()), file), {},
+               orthonormalized(corrected.T_world_sensor(scans[k])));
     progress.update(k + 1);
   }
   return map;

@@ -93,15 +93,16 @@ void LabelFiles::write(const std::string& name) const {
 void LabelFiles::read(const std::string& name, const RecordedScan& scan,
                       VerdictArrays& verdict) const {
   const std::size_t count = scan.size();
-  const auto labels = read_labels(folder_ / (name + ".label"), count);
-  const auto causes = read_point_bytes(cause_folder_ / (name + ".cause"), count);
+  const auto labels = read_run_labels(folder_ / (name + ".label"), count);
+  auto causes = read_point_bytes(cause_folder_ / (name + ".cause"), count);
+  causes.resize(count);  // without the file: unknown
   verdict.labels.resize(count);
   verdict.causes.resize(count);
   verdict.instances.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     verdict.causes[i] = static_cast<Cause>(causes[i]);
     verdict.instances[i] = labels[i] >> 16U;
-    verdict.labels[i] = point_label(labels[i] & 0xffffU, verdict.causes[i], &scan.xyzi[4 * i]);
+    verdict.labels[i] = point_label(class_of(labels[i]), verdict.causes[i], &scan.xyzi[4 * i]);
   }
   verdict.beliefs.clear();
   if (belief_folder_.empty()) return;

@@ -6,14 +6,19 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
-#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::program {
 namespace fs = std::filesystem;
 
-void refuse_class(std::uint32_t id, std::size_t point, const fs::path& file) {
-  throw IoError(file.string() + ": point " + std::to_string(point) + " has class " +
-                std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
+std::vector<std::uint32_t> read_run_labels(const fs::path& file, std::size_t count) {
+  std::vector<std::uint32_t> labels = read_labels(file, count);
+  for (std::size_t p = 0; p < count; ++p) {
+    const std::uint32_t id = class_of(labels[p]);
+    if (id == kRunStatic || id == kRunMoving || id == kRunNotJudged) continue;
+    throw IoError(file.string() + ": point " + std::to_string(p) + " has class " +
+                  std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
+  }
+  return labels;
 }
 
 LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window,
@@ -85,25 +90,12 @@ void LabelledSequence::load(std::size_t i, Scan& scan) const {
 
 void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& scan) const {
   const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
-  const std::vector<std::uint32_t> labels = read_labels(file, scan.truth.size());
+  const std::vector<std::uint32_t> labels = read_run_labels(file, scan.truth.size());
   if (run == 0) scan.instances.resize(labels.size());
-  unsigned unknown = 0;
-  dynains::detail::with_largest_packs([&](auto) {
-    // Local copies avoid reloads after stores that could alias the originals.
-    const std::size_t size = labels.size(), bit = run;
-    const std::uint32_t* const label = labels.data();
-    std::uint8_t* const in_map = scan.in_map.data();
-    unsigned bad = 0;
-    for (std::size_t p = 0; p < size; ++p) bad |= is_run_class(label[p]) ? 0U : 1U;
-    for (std::size_t p = 0; p < size; ++p) {
-      const unsigned kept = (label[p] & 0xffffU) == kRunStatic ? 1U : 0U;
-      in_map[p] = static_cast<std::uint8_t>(in_map[p] | kept << bit);
-    }
-    unknown = bad;
-  });
-  for (std::size_t p = 0; unknown != 0 && p < labels.size(); ++p) run_class(labels[p], p, file);
-  for (std::size_t p = 0; run == 0 && p < labels.size(); ++p) {
-    scan.instances[p] = labels[p] >> 16U;
+  for (std::size_t p = 0; p < labels.size(); ++p) {
+    const unsigned kept = class_of(labels[p]) == kRunStatic ? 1U : 0U;
+    scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | kept << run);
+    if (run == 0) scan.instances[p] = labels[p] >> 16U;
   }
 }
 

@@ -20,23 +20,12 @@ inline constexpr std::uint32_t kRunNotJudged = 0;
 inline constexpr std::uint32_t kRunStatic = 9;
 inline constexpr std::uint32_t kRunMoving = 251;
 
-/// Throws IoError for a class id that `dynains run` does not write. `point`: index in `file`.
-[[noreturn]] void refuse_class(std::uint32_t id, std::size_t point,
-                               const std::filesystem::path& file);
+/// Labels that `dynains run` wrote for `count` points. Throws IoError for a file of another size or
+/// with labels of another program.
+std::vector<std::uint32_t> read_run_labels(const std::filesystem::path& file, std::size_t count);
 
-/// Whether the class of a label is one of these; without branches.
-constexpr bool is_run_class(std::uint32_t label) {
-  const std::uint32_t id = label & 0xffffU;
-  return (id == kRunStatic) | (id == kRunMoving) | (id == kRunNotJudged);
-}
-
-/// Class id of a label that `dynains run` wrote for `point` in `file`. Throws IoError for a label
-/// of another program.
-inline std::uint32_t run_class(std::uint32_t label, std::size_t point,
-                               const std::filesystem::path& file) {
-  if (!is_run_class(label)) refuse_class(label & 0xffffU, point, file);
-  return label & 0xffffU;
-}
+/// Class id of a label.
+constexpr std::uint32_t class_of(std::uint32_t label) { return label & 0xffffU; }
 
 /// Scan numbers, both inclusive; an empty end is that of the sequence.
 struct ScanWindow {

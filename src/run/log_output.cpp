@@ -12,7 +12,6 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/kitti.hpp"
 #include "interrupt.hpp"
 #include "io/log/cloud_edit.hpp"
 #include "io/log/compress.hpp"
@@ -80,9 +79,9 @@ class CloudEditor final : public MessageEditor {
     std::vector<std::uint8_t> classes(points, static_cast<std::uint8_t>(kRunNotJudged));
     if (name.empty()) return classes;
     const fs::path file = labels_ / (name + ".label");
-    const std::vector<std::uint32_t> labels = read_labels(file, points);
+    const std::vector<std::uint32_t> labels = read_run_labels(file, points);
     for (std::size_t i = 0; i < points; ++i) {
-      classes[i] = static_cast<std::uint8_t>(run_class(labels[i], i, file));
+      classes[i] = static_cast<std::uint8_t>(class_of(labels[i]));
     }
     return classes;
   }

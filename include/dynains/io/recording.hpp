@@ -181,8 +181,6 @@ class Recording {
   bool is_deskewed() const { return options_.deskew; }
   /// Position of the sensor in the frame of the clouds, m.
   const Eigen::Vector3d& sensor_origin() const { return options_.sensor_origin; }
-  /// Whether files hold points as read_scan() gives them: float32 x y z intensity.
-  bool is_verbatim() const;
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
   const std::optional<std::string>& early_end() const { return early_end_; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
