@@ -96,8 +96,10 @@ auto plain_value(T value) {
 template <class Enum>
 std::string all_value_names() {
   std::string result;
-  for (const char* name : value_names(Enum()))
-    result += (result.empty() ? "" : "|") + std::string(name);
+  for (const char* name : value_names(Enum())) {
+    if (!result.empty()) result += '|';
+    result += name;
+  }
   return result;
 }
 

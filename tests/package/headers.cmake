@@ -1,4 +1,5 @@
-# Checks that each of HEADERS compiles alone with COMPILER and without any warning.
+# Checks that each of HEADERS compiles alone with COMPILER and without any warning: as C++17, without
+# code, or with the options MODE, with code.
 #
 # Most of the time would go to what many of them include. A header is compiled in a chain, after
 # headers that it includes anyway, and a chain of headers that include BASE begins with it,
@@ -10,7 +11,12 @@ if(NOT COMPILER)
   return()
 endif()
 
-set(options -std=c++17 ${WARNINGS} -Werror -I${INCLUDE_DIR})
+set(output -S -o /dev/null)
+if(NOT MODE)
+  set(MODE -std=c++17)
+  set(output -fsyntax-only)
+endif()
+set(options ${MODE} ${WARNINGS} -Werror -I${INCLUDE_DIR})
 foreach(dir IN LISTS SYSTEM_INCLUDE_DIRS)
   if(dir)
     list(APPEND options -isystem ${dir})
@@ -121,7 +127,7 @@ foreach(kind with_base without_base)
   chains_of(chains ${${kind}})
   foreach(chain IN LISTS chains)
     string(REPLACE " " ";-include;" includes "${chain}")
-    compile("${chain}" -fsyntax-only ${begin_${kind}} -include ${includes} -x c++ /dev/null)
+    compile("${chain}" ${output} ${begin_${kind}} -include ${includes} -x c++ /dev/null)
     if(NOT compiled)
       list(APPEND failed "${chain}")
     endif()
