@@ -13,7 +13,7 @@ namespace dynains {
 /// Verdict on one input point.
 enum class PointLabel : std::uint8_t {
   kInvalid,     ///< NaN, infinity, or no return (all coordinates zero); never in the map
-  kOutOfRange,  ///< nearer than min_range or farther than max_range; never in the map
+  kOutOfRange,  ///< not between min_range and max_range, or below noise_depth; never in the map
   kGround,      ///< static, and part of the ground
   kStatic,      ///< static, above the ground
   kDynamic,     ///< part of a moving instance; not inserted into the map

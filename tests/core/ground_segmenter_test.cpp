@@ -13,17 +13,18 @@ namespace dynains::test {
 namespace {
 
 // For each point of the scan, whether it is ground. Checks that the split is a permutation of the
-// scan.
+// scan, with the points that are not judged behind all others.
 std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
   GroundSplit split;
   std::vector<std::uint32_t> numbers(scan.size());
   for (std::size_t i = 0; i < scan.size(); ++i) numbers[i] = static_cast<std::uint32_t>(7 * i + 3);
   segmenter.segment(scan, numbers, split);
-  REQUIRE(split.count == scan.size());
+  REQUIRE(split.count <= scan.size());
   REQUIRE(split.ground_count <= split.count);
+  const GroundConfig& config = segmenter.config();
   std::vector<bool> result(scan.size());
   std::vector<bool> seen(scan.size(), false);
-  for (std::size_t i = 0; i < split.count; ++i) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
     REQUIRE(split.input[i] % 7 == 3);
     const std::size_t from = split.input[i] / 7;
     REQUIRE((from < scan.size() && !seen[from]));
@@ -31,6 +32,9 @@ std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
     REQUIRE(split.points.x[i] == scan.x[from]);
     REQUIRE(split.points.y[i] == scan.y[from]);
     REQUIRE(split.points.z[i] == scan.z[from]);
+    const auto lowest = static_cast<float>(-config.noise_depth * config.sensor_height);
+    const bool is_noise = config.noise_depth > 0.0 && scan.z[from] < lowest;
+    REQUIRE(is_noise == (i >= split.count));
     result[from] = i < split.ground_count;
   }
   return result;

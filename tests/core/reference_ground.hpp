@@ -46,6 +46,10 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double range = std::hypot(scan.x[i], scan.y[i]);
     if (range < inner || range > outer) continue;
+    const bool is_noise =
+        config.noise_depth > 0.0 &&
+        static_cast<double>(scan.z[i]) < -config.noise_depth * config.sensor_height;
+    if (is_noise) continue;
     int zone = 3;
     while (range < edges[zone]) --zone;
     const auto z = static_cast<std::size_t>(zone);

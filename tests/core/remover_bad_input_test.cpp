@@ -182,6 +182,17 @@ TEST_CASE("points that are no measurements get a label for this") {
   }
 }
 
+// Patchwork erases reflections below the ground.
+TEST_CASE("points far below the ground are not judged by the paper") {
+  Config config = Config::paper();
+  const auto label_of = [&](float z) { return labels_of(config, {{10.0F, 0.0F, z}})[0]; };
+  const auto lowest = static_cast<float>(-1.8 * config.ground.sensor_height);
+  CHECK(label_of(lowest + 0.01F) == PointLabel::kStatic);
+  CHECK(label_of(lowest - 0.01F) == PointLabel::kOutOfRange);
+  config.ground.noise_depth = 0.0;
+  CHECK(label_of(lowest - 0.01F) == PointLabel::kStatic);
+}
+
 TEST_CASE("bad points do not change the labels of good points") {
   const Config config = any_preset();
   std::vector<Scan> scans = good_scans();

@@ -26,16 +26,19 @@ struct GroundConfig {
   double ground_distance = 0.125;     ///< m, ground points are less than this above the plane
   double ground_uprightness = 0.707;  ///< smallest z of the unit normal
   double ground_below = 0.1;  ///< depth of noise below the ground, as a ratio of sensor_height
+  double noise_depth = 0.0;   ///< depth of noise below the sensor, as a ratio of sensor_height
   double ground_step = 0.5;   ///< m, a patch higher above its neighbours is not ground
   /// By inner ring: largest height (m over ground) of a ground patch that is not flat.
   std::array<double, kCheckedRings> ground_elevation = {0.523, 0.7246, 0.872, 1.118};
   /// By inner ring: flatness below which a patch above ground_elevation is ground.
   std::array<double, kCheckedRings> ground_flatness = {0.0, 1.25e-4, 1.85e-4, 1.85e-4};
 
-  /// The values of the paper: no `ground_step`, and the sensor height of KITTI.
+  /// The values of the paper: no `ground_step`, the sensor height of KITTI, and the `noise_depth`
+  /// of Patchwork.
   static GroundConfig paper() {
     GroundConfig config;
     config.sensor_height = 1.723;
+    config.noise_depth = 1.8;
     config.ground_step = 0.0;
     return config;
   }
@@ -73,6 +76,9 @@ struct GroundConfig {
     visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
                       "depth under the ground, as a ratio of sensor_height, from which points "
                       "of the inner zone do not seed a plane"});
+    visitor(Parameter{"noise_depth", self.noise_depth, closed(0, 100), "",
+                      "points at a larger depth under the sensor, as a ratio of sensor_height, are "
+                      "reflections and not judged (Patchwork); 0: all are judged"});
     visitor(
         Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
                   "a patch more than this above most of its neighbours is not ground, except in "

@@ -56,11 +56,13 @@ class GroundSegmenter {
 
   /// Splits `scan` (m, sensor frame, z up, finite coordinates). `input`: index of each point in the
   /// input of the remover. Points outside the rings and points of patches with few points are not
-  /// ground. Points of `split` are ordered by patch, then as in the scan; only where a patch turned
-  /// out not to be ground, the last ground points take its place.
+  /// ground. Points below `noise_depth` lie behind the last point of `split`. Points of `split` are
+  /// ordered by patch, then as in the scan; only where a patch turned out not to be ground, the
+  /// last ground points take its place.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
     detail::grow(patch_of_, scan.size() + detail::kMaxPackWidth);
     zones_.find_patches(scan, patch_of_.data());
+    if (config_.noise_depth > 0.0) find_noise(scan);
     sorted_.sort(scan, input.data(), patch_of_.data());
     sample_.reserve(std::min(scan.size(), static_cast<std::size_t>(config_.ground_fit_points)));
     heights_.fill(kNoGround);
@@ -82,11 +84,14 @@ class GroundSegmenter {
       for (std::size_t p = 0; p <= kPatches; ++p) {
         out.put(sorted_.records() + sorted_.begin(p), rest[p]);
       }
+      split.count = out.count();
+      out.put(sorted_.records() + sorted_.begin(kNoise), size_of(kNoise));
     });
   }
 
  private:
   static constexpr std::size_t kPatches = detail::ConcentricZones::kPatches;
+  static constexpr std::size_t kNoise = kPatches + 1;  // points below `noise_depth`
   static constexpr float kNoGround = std::numeric_limits<float>::quiet_NaN();
   using PatchCounts = std::array<std::size_t, kPatches + 1>;  // last: points in no patch
 
@@ -145,6 +150,13 @@ class GroundSegmenter {
     float* const z_;
     std::uint32_t* const input_;
   };
+
+  void find_noise(PointsView scan) {
+    const auto lowest = static_cast<float>(-config_.noise_depth * height_);
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      if (scan.z[i] < lowest) patch_of_[i] = static_cast<std::int32_t>(kNoise);
+    }
+  }
 
   std::size_t size_of(std::size_t patch) const { return sorted_.end(patch) - sorted_.begin(patch); }
 
@@ -268,7 +280,7 @@ class GroundSegmenter {
   detail::ConcentricZones zones_;
   double height_ = 0.0;  // m, sensor over the ground
   std::vector<std::int32_t> patch_of_;
-  detail::PatchSort<kPatches + 1> sorted_;
+  detail::PatchSort<kPatches + 2> sorted_;
   detail::PatchSample sample_;                 // of the current patch
   std::array<float, kPatches + 1> heights_{};  // m, ground of each patch; last: none
 };

@@ -17,7 +17,7 @@ struct GroundSplit {
   /// Index of each point in the input of the remover; empty after the push of the scan.
   std::vector<std::uint32_t> input;
   std::size_t ground_count = 0;  ///< number of ground points
-  std::size_t count = 0;         ///< number of all points
+  std::size_t count = 0;         ///< number of all points; those behind them are not judged
 
   PointsView ground() const { return PointsView(points).subview(0, ground_count); }
   PointsView non_ground() const {

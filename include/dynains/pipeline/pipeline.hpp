@@ -226,7 +226,10 @@ FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_s
   }
   const auto cluster = [&] {
     newest.split.input = std::move(split_input_);
-    timed(times.ground, [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
+    timed(times.ground, [&] {
+      ground_.segment(ingest_.points(), ingest_.input(), newest.split);
+      newest.mark_unjudged(ingest_.points().size());
+    });
     timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
     timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
   };

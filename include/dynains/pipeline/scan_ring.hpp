@@ -39,6 +39,11 @@ struct ScanSlot {
   std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
   WindowVotes windows;
 
+  /// Marks the points of the split behind the last one, of `valid` points, as out of range.
+  void mark_unjudged(std::size_t valid) {
+    for (std::size_t i = split.count; i < valid; ++i) unjudged.mark(split.input[i], 1, 1);
+  }
+
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 
   /// Ensures capacity for `points` points and writes to the memory of the points, so that later
