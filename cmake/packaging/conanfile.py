@@ -7,7 +7,7 @@ from conan import ConanFile
 from conan.tools.cmake import CMake, CMakeDeps, CMakeToolchain, cmake_layout
 from conan.tools.files import copy, load
 
-LIBRARIES = ("LZ4", "ZSTD", "BZ2", "PROJ", "EXPAT", "YAML", "Z", "SQLITE3")
+LIBRARIES = ("LZ4", "ZSTD", "BZ2", "PROJ", "Z", "SQLITE3")
 PARTS = ("PROGRAM", "PYTHON", "EXAMPLES", "TESTS")
 
 

@@ -5,13 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <set>
 #include <sstream>
 #include <string_view>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "frame_file.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -29,44 +27,9 @@ std::optional<std::array<double, kCount>> numbers_of(const std::string& text) {
   return numbers;
 }
 
-/// `FILE:BODY:LIDAR`.
-struct NamedFrames {
-  std::string file;
-  std::string body;
-  std::string lidar;
-};
-
-/// Empty if the text names no file of frames. Without frames, both are empty.
-std::optional<NamedFrames> named_frames(const std::string& text) {
-  if (is_frame_file(text)) return NamedFrames{text, "", ""};
-  const std::size_t last = text.rfind(':');
-  if (last == std::string::npos || last == 0) return std::nullopt;
-  const std::size_t before = text.rfind(':', last - 1);
-  if (before == std::string::npos || !is_frame_file(text.substr(0, before))) return std::nullopt;
-  return NamedFrames{text.substr(0, before), text.substr(before + 1, last - before - 1),
-                     text.substr(last + 1)};
-}
-
-/// T_body_lidar of a file with named frames.
-Pose transform_of(const NamedFrames& named) {
-  const TransformTree tree = read_frame_file(named.file);
-  std::set<std::string> known;
-  for (const std::string& frame : tree.frames()) {
-    known.insert(frame);
-    if (const auto root = tree.root_of(frame)) known.insert(*root);
-  }
-  const bool has_both = known.count(named.body) > 0 && known.count(named.lidar) > 0;
-  const auto found = has_both ? tree.find(named.body, named.lidar, 0.0) : std::nullopt;
-  if (found) return *found;
-  throw ConfigError("extrinsic: expected " + named.file +
-                    ":BODY:LIDAR with two frames that the file connects; it has " +
-                    text::listed({known.begin(), known.end()}));
-}
-
 }  // namespace
 
 Pose read_extrinsic(const std::string& text) {
-  if (const auto named = named_frames(text)) return transform_of(*named);
   const auto numbers = numbers_of<7>(text);
   if (!numbers) {
     const bool is_number = text::parse_number(text.substr(0, text.find_first_of(" ,"))).has_value();

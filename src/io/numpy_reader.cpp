@@ -2,7 +2,6 @@
 #include <iterator>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "failure.hpp"
@@ -10,7 +9,6 @@
 #include "npy_array.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
-#include "zip_archive.hpp"
 
 namespace dynains {
 namespace {
@@ -81,11 +79,8 @@ Scalar type_in_ply(Scalar type) {
   return type == Scalar::kInt64 || type == Scalar::kUint64 ? Scalar::kDouble : type;
 }
 
-/// Adds the columns that have no role: fields, or those of an array with a row for each point. A
-/// table of several gives them the name of the array and a number.
-void add_other_columns(const NpyArray& array, const std::string& name, NpyPoints& points,
-                       PointSink& sink) {
-  constexpr std::uint64_t kMostColumns = 1000;
+/// Adds the columns that have no role: fields, or those of a table, named by their number.
+void add_other_columns(const NpyArray& array, NpyPoints& points, PointSink& sink) {
   const auto add = [&](const NpyArray::Field& field, const std::string& column, std::uint64_t begin,
                        std::uint64_t stride) {
     begin += array.data_begin;
@@ -98,18 +93,15 @@ void add_other_columns(const NpyArray& array, const std::string& name, NpyPoints
   };
   if (array.is_structured()) {
     for (const NpyArray::Field& field : array.fields) {
-      if (array.item_count() == points.count) add(field, field.name, field.offset, array.item_size);
+      add(field, field.name, field.offset, array.item_size);
     }
     return;
   }
-  const std::uint64_t columns = array.shape.size() < 2 ? 1 : array.shape.back();
-  const bool has_rows = columns <= kMostColumns && array.item_count() == columns * points.count;
-  if (!has_rows || (array.is_column_major && array.shape.size() > 2)) return;
+  const std::uint64_t columns = array.shape.back();
   const std::uint64_t step = array.is_column_major ? points.count : 1;
   const std::uint64_t stride = array.item_size * (array.is_column_major ? 1 : columns);
   for (std::uint64_t i = 0; i < columns; ++i) {
-    add(array.fields.front(), columns == 1 ? name : name + '_' + std::to_string(i),
-        i * step * array.item_size, stride);
+    add(array.fields.front(), "column_" + std::to_string(i), i * step * array.item_size, stride);
   }
 }
 
@@ -133,8 +125,6 @@ void require_xyz(const std::filesystem::path& path, const PointSink& sink) {
   if (const auto name = sink.missing()) fail(path, "expected arrays x, y and z; found no " + *name);
 }
 
-// .npy
-
 struct NpyFile {
   std::vector<std::uint8_t> bytes;
   NpyPoints points;
@@ -149,66 +139,8 @@ NpyFile open_npy(const std::filesystem::path& path, PointSink& sink, bool with_p
   const NpyArray array = parse_npy_header(bytes, raw.size());
   file.points = points_of_array(bytes, array, sink);
   require_xyz(path, sink);
-  add_other_columns(array, "column", file.points, sink);
+  add_other_columns(array, file.points, sink);
   return file;
-}
-
-// .npz
-
-struct NpzColumns {
-  std::vector<std::uint8_t> bytes;
-  std::string name, stem;
-  NpyArray array;
-  NpyPoints points;
-};
-
-/// The array of an archive that gives points: a structured array, a table, or a single column.
-NpyPoints points_of_member(const Bytes& place, const NpyArray& array, Role role, PointSink& sink) {
-  const bool is_column = !array.is_structured() && array.shape.size() == 1;
-  if (!is_column) return points_of_array(place, array, sink);
-  NpyPoints points{array.item_count(), {}};
-  add_npy_column(place, array, array.fields.front(), role, 0, array.item_size, sink, points);
-  return points;
-}
-
-bool may_be_points(const NpyArray& array, Role role) {
-  if (array.is_structured() || array.shape.size() == 1)
-    return array.is_structured() || role != Role::kNone;
-  return array.shape.size() >= 2 && array.shape.back() >= 3;
-}
-
-std::vector<NpzColumns> open_npz(const std::filesystem::path& path, PointSink& sink) {
-  ZipArchive archive(path);
-  std::vector<NpzColumns> all, others;
-  for (const ZipArchive::Member& member : archive.members()) {
-    const std::filesystem::path member_path(member.name);
-    if (member_path.extension() != ".npy") continue;
-    NpzColumns one;
-    archive.read(member, one.bytes);
-    one.name = path.string() + ": " + member.name;
-    const std::filesystem::path place(one.name);
-    const Bytes bytes(place, 0, one.bytes.data(), one.bytes.size());
-    one.array = parse_npy_header(bytes, one.bytes.size());
-    one.stem = member_path.stem().string();
-    const Role role = role_of(one.stem);
-    if (may_be_points(one.array, role)) {
-      one.points = points_of_member(bytes, one.array, role, sink);
-    }
-    if (one.points.columns.empty()) {
-      if (sink.wants_others()) others.push_back(std::move(one));
-      continue;
-    }
-    if (!all.empty() && one.points.count != all.front().points.count) {
-      bytes.fail("expected " + std::to_string(all.front().points.count) + " items, as in " +
-                 all.front().name + ", found " + std::to_string(one.points.count));
-    }
-    all.push_back(std::move(one));
-  }
-  require_xyz(path, sink);
-  for (NpzColumns& one : others) one.points.count = all.front().points.count;
-  std::move(others.begin(), others.end(), std::back_inserter(all));
-  for (NpzColumns& one : all) add_other_columns(one.array, one.stem, one.points, sink);
-  return all;
 }
 
 }  // namespace
@@ -229,25 +161,5 @@ PointFileHeader read_npy_header(const std::filesystem::path& path) {
 }
 
 void check_npy(const std::filesystem::path& path) { read_npy_header(path); }
-
-void read_npz(const std::filesystem::path& path, PointSink& sink) {
-  const std::vector<NpzColumns> all = open_npz(path, sink);
-  sink.resize(static_cast<std::size_t>(all.front().points.count));
-  for (const NpzColumns& one : all) {
-    const std::filesystem::path name(one.name);
-    const Bytes place(name, 0, one.bytes.data(), one.bytes.size());
-    for (const NpyColumn& column : one.points.columns) {
-      store_column(place, column, one.points.count, one.bytes.data(), sink);
-    }
-  }
-}
-
-PointFileHeader read_npz_header(const std::filesystem::path& path) {
-  PointSink sink;
-  const std::vector<NpzColumns> all = open_npz(path, sink);
-  return {Pose::Identity(), sink.columns(), all.front().points.count};
-}
-
-void check_npz(const std::filesystem::path& path) { read_npz_header(path); }
 
 }  // namespace dynains

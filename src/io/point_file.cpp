@@ -36,8 +36,7 @@ struct PointFileFormat {
 constexpr PointFileFormat kPointFileFormats[] = {
     {".ply", read_ply, read_ply_header, check_ply}, {".pcd", read_pcd, read_pcd_header, check_pcd},
     {".las", read_las, read_las_header, check_las}, {".npy", read_npy, read_npy_header, check_npy},
-    {".npz", read_npz, read_npz_header, check_npz}, {".xyz", read_xyz, read_xyz_header, check_xyz},
-    {".csv", read_xyz, read_xyz_header, check_xyz}};
+    {".xyz", read_xyz, read_xyz_header, check_xyz}, {".csv", read_xyz, read_xyz_header, check_xyz}};
 
 const PointFileFormat& format_to_read(const fs::path& path) {
   const std::string extension = extension_in_lower_case(path);
@@ -45,9 +44,8 @@ const PointFileFormat& format_to_read(const fs::path& path) {
     if (format.extension == extension) return format;
   }
   const std::optional<std::string> conversion = conversion_of(path);
-  fail(path, conversion
-                 ? *conversion
-                 : "expected a name that ends in .ply, .pcd, .las, .npy, .npz, .xyz or .csv");
+  fail(path, conversion ? *conversion
+                        : "expected a name that ends in .ply, .pcd, .las, .npy, .xyz or .csv");
 }
 
 /// Type of a property of PLY; empty: PLY has none.
@@ -194,6 +192,9 @@ std::optional<std::string> conversion_of(const fs::path& path) {
       {".e57",
        "E57 is not read; convert it: pdal translate IN.e57 OUT.las, or save it as PLY by "
        "CloudCompare"},
+      {".npz",
+       "NPZ is not read; save its points as NPY: python3 -c \"import numpy as n; n.save('OUT.npy', "
+       "n.load('IN.npz')['points'])\""},
       {".pcap",
        "PCAP (packets of a sensor) is not read; play it through the ROS driver of the sensor and "
        "record sensor_msgs/PointCloud2 in a log (.mcap, .bag)"}};

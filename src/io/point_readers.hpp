@@ -9,7 +9,7 @@ namespace dynains {
 
 class PointSink;
 
-/// The other columns of a file of read_points(): those of .pcd, .ply, .npy, .npz and named ones of
+/// The other columns of a file of read_points(): those of .pcd, .ply, .npy and named ones of
 /// text; none of LAS. Throws IoError like read_points().
 OtherValues read_other_columns(const std::filesystem::path& path);
 
@@ -17,21 +17,18 @@ void read_ply(const std::filesystem::path& path, PointSink& sink);
 void read_pcd(const std::filesystem::path& path, PointSink& sink);
 void read_las(const std::filesystem::path& path, PointSink& sink);
 void read_npy(const std::filesystem::path& path, PointSink& sink);
-void read_npz(const std::filesystem::path& path, PointSink& sink);
 void read_xyz(const std::filesystem::path& path, PointSink& sink);
 
 PointFileHeader read_ply_header(const std::filesystem::path& path);
 PointFileHeader read_pcd_header(const std::filesystem::path& path);
 PointFileHeader read_las_header(const std::filesystem::path& path);
 PointFileHeader read_npy_header(const std::filesystem::path& path);
-PointFileHeader read_npz_header(const std::filesystem::path& path);
 PointFileHeader read_xyz_header(const std::filesystem::path& path);
 
 void check_ply(const std::filesystem::path& path);
 void check_pcd(const std::filesystem::path& path);
 void check_las(const std::filesystem::path& path);
 void check_npy(const std::filesystem::path& path);
-void check_npz(const std::filesystem::path& path);
 void check_xyz(const std::filesystem::path& path);
 
 }  // namespace dynains

@@ -15,7 +15,6 @@
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
-#include "keyframes.hpp"
 #include "kitti_files.hpp"
 #include "log/log_scans.hpp"
 #include "nuscenes.hpp"
@@ -33,10 +32,9 @@ constexpr double kFarthestSensor = 1000.0;  // m, as RemoverConfig::sensor_origi
 
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
-    ".las, .npy, .npz, .xyz or .csv scans (or with them in pcd/, ply/, scans/, points/, clouds/ or "
-    "lidar/), or a log of ROS "
-    "(.mcap, "
-    ".db3, .bag, or a folder with metadata.yaml)";
+    ".las, .npy, .xyz or .csv scans (or with them in pcd/, ply/, scans/, points/, clouds/ or "
+    "lidar/), "
+    "or a log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)";
 
 /// Beams without a return stay at the origin.
 void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
@@ -108,11 +106,7 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
     } else {
       list_scans();
       reader_ = make_file_reader(format_, options_.bin_layout);
-      if (has_keyframes_) {
-        read_keyframes();
-      } else {
-        options.without_poses ? leave_unplaced() : read_poses();
-      }
+      options.without_poses ? leave_unplaced() : read_poses();
     }
   }
   if (!options.sensor_frame.empty() && format_ != ScanFormat::kLog) {
@@ -258,9 +252,6 @@ bool Recording::find_scan_folder() {
 
 void Recording::list_scans() {
   const std::vector<fs::path> files = scan_files(scan_folder_);
-  const std::vector<fs::path> keyframes =
-      files.empty() ? keyframe_folders(scan_folder_) : std::vector<fs::path>();
-  if (!keyframes.empty()) return list_keyframes(keyframes);
   if (files.empty()) {
     const auto conversion = conversion_of_scans(scan_folder_);
     fail(scan_folder_, conversion ? *conversion : std::string("has no scans; ") + kAccepted);
@@ -300,20 +291,6 @@ void Recording::list_scans() {
            "two scans with one number: " + scans_[i - 1].name + " and " + scans_[i].name);
     }
   }
-}
-
-void Recording::list_keyframes(const std::vector<fs::path>& folders) {
-  has_keyframes_ = true;
-  numbered_ = true;
-  format_ = ScanFormat::kPcd;
-  for (const fs::path& folder : folders) {
-    scans_.emplace_back();
-    scans_.back().file = folder / kKeyframeCloud;
-    scans_.back().name = folder.filename().string();
-    scans_.back().number = std::stoull(scans_.back().name);
-    files_.push_back(scans_.back().file);
-  }
-  check_names();
 }
 
 /// Results of a scan are named like the scan, so no two scans may have one name.

@@ -14,7 +14,6 @@
 #include "dynains/pose.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
-#include "keyframes.hpp"
 #include "kitti_files.hpp"
 #include "point_clock.hpp"
 #include "scan_files.hpp"
@@ -118,11 +117,11 @@ void Recording::read_calibration(const fs::path& poses_file) {
 
 /// Scans without poses: they have times, and count as matched when they get poses.
 void Recording::leave_unplaced() {
-  if (format_ == ScanFormat::kPcd && !has_keyframes_) read_viewpoints();
+  if (format_ == ScanFormat::kPcd) read_viewpoints();
   const bool has_stamps = format_ == ScanFormat::kLog || format_ == ScanFormat::kNuScenes;
-  const auto times = has_stamps || has_keyframes_ ? std::nullopt : find_times({});
+  const auto times = has_stamps ? std::nullopt : find_times({});
   take_times(times);
-  has_times_ = times || has_stamps || has_keyframes_;
+  has_times_ = times || has_stamps;
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     scans_[i].match = i;
     if (!has_times_) scans_[i].time = kKittiPeriod * static_cast<double>(i);
@@ -177,34 +176,6 @@ void Recording::read_poses() {
   read_calibration(file);
   match_scans(file);
   place_scans(has_viewpoints_ ? scan_folder_ : file);
-}
-
-/// Poses and times of keyframes; with --poses, those of the file.
-void Recording::read_keyframes() {
-  std::vector<double> times;
-  for (Scan& scan : scans_) {
-    const fs::path file = scan.file.parent_path() / "data";
-    const Keyframe keyframe = read_keyframe(file);
-    files_.push_back(file);
-    if (!times.empty() && !(keyframe.time > times.back())) {
-      fail(file, "expected a stamp after that of the keyframe before, " + in_seconds(times.back()) +
-                     "; found " + in_seconds(keyframe.time));
-    }
-    times.push_back(keyframe.time);
-    scan.time = keyframe.time;
-    if (options_.without_poses) continue;
-    trajectory_.poses.push_back(keyframe.T_world_sensor);
-  }
-  if (options_.without_poses) return leave_unplaced();
-  notes_.push_back("keyframes with stamps and estimates of hdl_graph_slam");
-  trajectory_.times = times;
-  if (!options_.poses.empty()) {
-    files_.push_back(options_.poses);
-    trajectory_ = read_trajectory(options_.poses);
-  }
-  const fs::path& poses = options_.poses.empty() ? folder_ : options_.poses;
-  trajectory_.times.empty() ? match_rows(poses) : match_times(poses, times);
-  place_scans(poses);
 }
 
 std::optional<std::vector<double>> Recording::times_of_names() const {

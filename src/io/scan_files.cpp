@@ -58,7 +58,6 @@ std::optional<ScanFormat> scan_format_of(const fs::path& path) {
   if (extension == ".ply") return ScanFormat::kPly;
   if (extension == ".las") return ScanFormat::kLas;
   if (extension == ".npy") return ScanFormat::kNpy;
-  if (extension == ".npz") return ScanFormat::kNpz;
   if (extension == ".xyz") return ScanFormat::kXyz;
   if (extension == ".csv") return ScanFormat::kCsv;
   return std::nullopt;

@@ -30,7 +30,7 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       .add_option("SEQ", folder_,
                   what +
                       ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
-                      "times.txt), folder of scans (.pcd, .ply, .bin, .las, .npy, .npz, .xyz or "
+                      "times.txt), folder of scans (.pcd, .ply, .bin, .las, .npy, .xyz or "
                       ".csv) with VIEWPOINT or a file of poses, or log of ROS (.mcap, .db3, .bag, "
                       "or a folder with metadata.yaml)")
       ->required(required)

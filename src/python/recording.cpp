@@ -170,7 +170,7 @@ void bind_recording(py::module_& module) {
   const std::string doc =
       "Recorded scans with poses: recording[i] is scan i, read when it is asked for.\n\n"
       "path: folder of KITTI, SemanticKITTI or nuScenes, folder of .pcd, .ply, .bin, .las, .npy, "
-      ".npz, .xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with "
+      ".xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with "
       "metadata.yaml).\n"
       "What the files mean, by name (dynains.check finds out):\n" +
       describe_settings<program::RecordingSettings>();

@@ -32,7 +32,6 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
     case ScanFormat::kPly:
     case ScanFormat::kLas:
     case ScanFormat::kNpy:
-    case ScanFormat::kNpz:
     case ScanFormat::kXyz:
     case ScanFormat::kCsv:
     case ScanFormat::kNuScenes:

@@ -43,22 +43,6 @@ std::string text_of(const Mounting& mounting) {
   return text;
 }
 
-/// Robot descriptions and static transforms in the folder of a recording, in the order of names.
-std::vector<std::string> frame_files(const Recording& recording) {
-  std::vector<std::string> files;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(recording.folder(), error)) {
-    const std::string name = entry.path().filename().string();
-    const bool is_description = entry.path().extension() == ".urdf";
-    const bool is_static = name.find("static_transforms") == 0 || name.find("tf_static") == 0;
-    if (is_description || (is_static && name.find(".y") != std::string::npos)) {
-      files.push_back(entry.path().string());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 /// Possible problems of a run other than poses.
 void add_remarks(std::ostream& text, const Diagnosis& d) {
   if (d.invalid_share > 0.5) {
@@ -139,12 +123,6 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
     add_line(text, "", to_text(d.readings[i].agreement));
   }
   text << '\n';
-  if (recording.convention().T_body_sensor.isApprox(Pose::Identity(), 0.0)) {
-    for (const std::string& file : frame_files(recording)) {
-      text << "note: for poses of another frame than the lidar: --extrinsic " << file
-           << ":BODY:LIDAR\n";
-    }
-  }
   add_remarks(text, d);
   add_findings_in_scans(recording, d, text);
   return text.str();

@@ -119,7 +119,6 @@ void run_pcd(Bytes bytes) { read_point_file("cloud.pcd", bytes); }
 
 void run_las(Bytes bytes) { read_point_file("cloud.las", bytes); }
 void run_npy(Bytes bytes) { read_point_file("cloud.npy", bytes); }
-void run_npz(Bytes bytes) { read_point_file("cloud.npz", bytes); }
 void run_xyz(Bytes bytes) { read_point_file("cloud.xyz", bytes); }
 
 void run_config(Bytes bytes) {
@@ -181,15 +180,6 @@ std::vector<std::string> npy_seeds() {
   return {test::npy_file("'<f4'", "(1, 4)", xyzi), test::npy_file("'>f4'", "(1, 4)", xyzi, "True"),
           test::npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('label', '|u1', (4,))]",
                          "(1,)", xyzi)};
-}
-
-std::vector<std::string> npz_seeds() {
-  const auto column = [](const std::string& name) {
-    return test::ZipMember{name, test::npy_file("'<f4'", "(1,)", floats({1.0F}))};
-  };
-  test::ZipMember deflated{"points.npy", "\x03", 0, 8, 1};
-  return {test::zip_file({column("x.npy"), column("y.npy"), column("z.npy")}),
-          test::zip_file({deflated})};
 }
 
 std::vector<std::string> xyz_seeds() {

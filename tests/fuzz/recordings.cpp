@@ -10,7 +10,6 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"
-#include "io/frame_file.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
@@ -119,21 +118,6 @@ std::string ply() {
          "property float z\nend_header\n1 2 3\n";
 }
 
-/// All pairs of frames of the file have a rigid transform, or none.
-void run_frame_file(const char* name, Bytes bytes) {
-  static const test::TemporaryFolder folder;
-  const fs::path path = folder / name;
-  test::write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  expect_value_or_place(path, [&] {
-    const TransformTree tree = read_frame_file(path);
-    const std::vector<std::string> frames = tree.frames();
-    for (std::size_t i = 0; i < std::min<std::size_t>(frames.size(), 20); ++i) {
-      const auto T = tree.find(frames.front(), frames[i], 0.0);
-      if (T) require_rigid(*T);
-    }
-  });
-}
-
 }  // namespace
 
 void run_trajectory(Bytes bytes) {
@@ -185,26 +169,6 @@ std::vector<std::string> trajectory_seeds() {
           "w x y z qw qx qy qz\n1;2;3;4;1;0;0;0\n",
           "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1\n",
           "0.5 1 0 0 0 0 1 0 0 0 0 1 0\n1.5 0 -1 0 1 1 0 0 0 0 0 1 0\n"};
-}
-
-void run_urdf(Bytes bytes) { run_frame_file("robot.urdf", bytes); }
-void run_transforms(Bytes bytes) { run_frame_file("static_transforms.yaml", bytes); }
-
-std::vector<std::string> urdf_seeds() {
-  return {
-      "<?xml version='1.0'?>\n<robot name='r'><link name='a'/><joint name='j' type='fixed'>"
-      "<origin xyz='1 0 2' rpy='0 0 1.57'/><parent link='a'/><child link='b'/></joint>"
-      "<joint><parent link='b'/><child link='a'/></joint></robot>",
-      "<!DOCTYPE r [<!ENTITY e 'a'>]><robot><joint><parent link='&e;'/></joint></robot>"};
-}
-
-std::vector<std::string> transforms_seeds() {
-  return {
-      "- {parent: a, child: b, x: 1, y: 2, z: 3, roll: 0, pitch: 0.1, yaw: 1}\n"
-      "- {frame_id: b, child_frame_id: c, x: 1, y: 2, z: 3, qx: 0, qy: 0, qz: 0, qw: 1}\n",
-      "transforms:\n- header: {frame_id: a}\n  child_frame_id: b\n  transform:\n"
-      "    translation: &t {x: 1, y: 0, z: 0}\n    rotation: {x: 0, y: 0, z: 0, w: 1}\n",
-      "- &a [*a, 1]\n"};
 }
 
 std::vector<std::string> recording_seeds() {

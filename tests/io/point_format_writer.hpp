@@ -23,48 +23,6 @@ inline std::string npy_file(const std::string& descr, const std::string& shape,
       .text();
 }
 
-struct ZipMember {
-  std::string name;
-  std::string content;
-  std::uint32_t crc = 0;
-  std::uint16_t method = 0;
-  std::uint32_t size = 0;  ///< 0: that of the content
-};
-
-/// An archive of members as they are.
-inline std::string zip_file(const std::vector<ZipMember>& members) {
-  ByteWriter file;
-  ByteWriter directory;
-  for (const ZipMember& member : members) {
-    const auto position = static_cast<std::uint32_t>(file.size());
-    const auto stored = static_cast<std::uint32_t>(member.content.size());
-    const auto name_size = static_cast<std::uint16_t>(member.name.size());
-    const std::uint32_t size = member.size == 0 ? stored : member.size;
-    const auto shared = [&](ByteWriter& out) {
-      out.number(std::uint16_t{20}).number(std::uint16_t{0}).number(member.method).number(0U);
-      out.number(member.crc).number(stored).number(size);
-      out.number(name_size).number(std::uint16_t{0});
-    };
-    file.number(0x04034B50U);
-    shared(file);
-    file.raw(member.name + member.content);
-    directory.number(0x02014B50U).number(std::uint16_t{20});
-    shared(directory);
-    directory.number(std::uint16_t{0}).raw(std::string(8, '\0')).number(position).raw(member.name);
-  }
-  const auto begin = static_cast<std::uint32_t>(file.size());
-  const auto count = static_cast<std::uint16_t>(members.size());
-  return file.raw(directory.text())
-      .number(0x06054B50U)
-      .number(0U)
-      .number(count)
-      .number(count)
-      .number(static_cast<std::uint32_t>(directory.size()))
-      .number(begin)
-      .number(std::uint16_t{0})
-      .text();
-}
-
 struct LasParts {
   std::uint8_t minor = 2;
   std::uint8_t format = 1;

@@ -7,7 +7,6 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
-#include "io/log/decompress.hpp"
 #include "io/point_readers.hpp"
 #include "point_format_writer.hpp"
 #include "support/catch.hpp"
@@ -189,7 +188,7 @@ TEST_CASE("PLY: other columns keep their values in each encoding") {
         expected);
 }
 
-TEST_CASE("NumPy: other columns have the names of fields and arrays") {
+TEST_CASE("NumPy: other columns have the names of fields") {
   const Others structured =
       others("a.npy", npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('name', '<U2'), "
                                "('stamp', '>i8'), ('hue', '|u1')]",
@@ -200,20 +199,6 @@ TEST_CASE("NumPy: other columns have the names of fields and arrays") {
   const std::string six = bytes_of<float>({1, 2, 3, 0.5F, 7, 8});
   CHECK(others("a.npy", npy_file("'<f4'", "(1, 6)", six)) ==
         Others("column_4 F4 1,column_5 F4 1,", six.substr(16)));
-  const auto member = [](const std::string& name, const std::string& content) {
-    return ZipMember{name, content,
-                     crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size())};
-  };
-  const std::string normals = bytes_of<float>({0, 0, 1, 0, 1, 0});
-  const Others archive = others(
-      "a.npz",
-      zip_file({member("pose.npy", npy_file("'<f8'", "(16,)", std::string(128, 'p'))),
-                member("ambient.npy", npy_file("'<u2'", "(2,)", bytes_of<std::uint16_t>({5, 6}))),
-                member("points.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)),
-                member("normals.npy", npy_file("'<f4'", "(2, 3)", normals))}));
-  CHECK(archive == Others("ambient U2 1,normals_0 F4 1,normals_1 F4 1,normals_2 F4 1,",
-                          "\5" + std::string(1, '\0') + normals.substr(0, 12) + "\6" +
-                              std::string(1, '\0') + normals.substr(12)));
 }
 
 TEST_CASE("Other columns are written behind the known ones") {
@@ -260,66 +245,6 @@ TEST_CASE("NumPy: a structured array has columns by name") {
   CHECK(points.ring == std::vector<std::uint16_t>{5, 6});
   CHECK(points.time == std::vector<double>{-3.0, 4503599627370496.0});
   CHECK(points.label == std::vector<std::uint32_t>{9, 0});
-}
-
-TEST_CASE("NumPy: archives of a table, or of columns") {
-  const auto member = [](const std::string& name, const std::string& content) {
-    return ZipMember{name, content,
-                     crc32(reinterpret_cast<const std::uint8_t*>(content.data()), content.size())};
-  };
-  const auto x = member("x.npy", npy_file("'<f4'", "(2,)", bytes_of<float>({1, 4})));
-  const auto y = member("y.npy", npy_file("'<f8'", "(2,)", bytes_of<double>({2, 5})));
-  const auto z = member("z.npy", npy_file("'<i2'", "(2,)", bytes_of<std::int16_t>({3, 6})));
-  const auto intensity = member("i.npy", npy_file("'<f4'", "(2,)", bytes_of<float>({0.5F, 0.25F})));
-  const auto other = member("colours.npy", npy_file("'<f4'", "(7,)", std::string(28, 'x')));
-  const auto text = member("meta.json", "{}");
-  const auto object = member("info.npy", npy_file("'|O'", "()", "pickled"));
-  check_two_points(read("a.npz", zip_file({other, x, text, y, z, object, intensity})));
-  const auto table = member("points.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints));
-  check_two_points(read("a.npz", zip_file({table})));
-  const auto labels =
-      member("label.npy", npy_file("'<u4'", "(2,)", bytes_of<std::uint32_t>({9, 251})));
-  CHECK(read("a.npz", zip_file({table, labels})).label == std::vector<std::uint32_t>{9, 251});
-
-  CHECK_THAT(error("a.npz", zip_file({x, y})), ContainsSubstring("found no z"));
-  const auto three = member("label.npy", npy_file("'<u4'", "(3,)", std::string(12, '\0')));
-  CHECK_THAT(error("a.npz", zip_file({table, three})),
-             ContainsSubstring("label.npy: byte 0: expected 2 items, as in ") &&
-                 ContainsSubstring("points.npy, found 3"));
-  ZipMember changed = table;
-  changed.content.back() ^= 1;
-  if (has_crc32()) {
-    CHECK_THAT(error("a.npz", zip_file({changed})), ContainsSubstring("checksum of the member"));
-  }
-  changed = table;
-  changed.method = 8;
-  changed.content = "no deflate";
-  CHECK_THAT(error("a.npz", zip_file({changed})),
-             ContainsSubstring(has_crc32() ? "deflate" : "zlib1g-dev"));
-  changed.method = 9;
-  CHECK_THAT(error("a.npz", zip_file({changed})), ContainsSubstring("found method 9"));
-  const std::string whole = zip_file({x, y, z});
-  CHECK_THAT(error("a.npz", "no archive"), ContainsSubstring("expected the end of a ZIP archive"));
-  for (std::size_t size = 0; size < whole.size(); size += 7) error("a.npz", whole.substr(0, size));
-}
-
-TEST_CASE("NumPy: deflated members") {
-  if (!has_crc32()) return;
-  // Deflate holds a stored block of any bytes: last block, length, its complement.
-  const std::string array = npy_file("'<f4'", "(2, 4)", kTwoPoints);
-  const auto size = static_cast<std::uint16_t>(array.size());
-  ZipMember member{"arr_0.npy",
-                   ByteWriter()
-                       .number(std::uint8_t{1})
-                       .number(size)
-                       .number(static_cast<std::uint16_t>(~size))
-                       .raw(array)
-                       .text(),
-                   crc32(reinterpret_cast<const std::uint8_t*>(array.data()), array.size()), 8,
-                   size};
-  check_two_points(read("a.npz", zip_file({member})));
-  member.size = 0x7FFFFFFF;
-  CHECK_THAT(error("a.npz", zip_file({member})), ContainsSubstring("expected 2147483647 bytes"));
 }
 
 TEST_CASE("NumPy: malformed arrays are refused with the reason") {
@@ -458,11 +383,13 @@ TEST_CASE("Scans of a recording can be LAS, NumPy or text; poses.csv is none") {
 }
 
 TEST_CASE("A known format that is not read gets its name and the way to convert it") {
-  for (const std::string name : {"scan.laz", "scan.E57", "drive.pcap"}) {
+  for (const auto& [name, expected] :
+       {std::pair<std::string, std::string>("scan.laz", "pdal translate"),
+        {"scan.E57", "pdal translate"},
+        {"scan.npz", "n.load('IN.npz')"},
+        {"drive.pcap", "sensor_msgs/PointCloud2"}}) {
     const TemporaryFolder folder;
     write_text(folder / name, "content");
-    const std::string expected =
-        fs::path(name).extension() == ".pcap" ? "sensor_msgs/PointCloud2" : "pdal translate";
     const auto of_folder = message_of<IoError>([&] { Recording recording(folder.path()); });
     CHECK_THAT(of_folder, ContainsSubstring(name + ": ") && ContainsSubstring(expected));
     const auto of_file = message_of<IoError>([&] { Recording recording(folder / name); });

@@ -556,7 +556,7 @@ TEST_CASE("Names of 19 digits are times") {
   CHECK(recording.T_world_sensor(1).translation().x() == 2.0);
 }
 
-TEST_CASE("Folders of SC-LIO-SAM, KITTI raw and hdl_graph_slam are read") {
+TEST_CASE("Folders of SC-LIO-SAM and KITTI raw are read") {
   const TemporaryFolder folder;
   write_text(folder / "sc/Scans/000000.pcd", pcd({1, 0, 0}));
   write_text(folder / "sc/optimized_poses.txt", row12(3));
@@ -565,26 +565,4 @@ TEST_CASE("Folders of SC-LIO-SAM, KITTI raw and hdl_graph_slam are read") {
   write_text(folder / "raw/velodyne_points/data/0000000000.bin", std::string(16, 'B'));
   write_text(folder / "raw/poses.txt", row12(4));
   CHECK(Recording(folder / "raw").T_world_sensor(0).translation().x() == 4.0);
-
-  const auto data = [](int nanoseconds, double x) {
-    return "stamp 1700000000 " + std::to_string(nanoseconds) + "\nestimate\n1 0 0 " +
-           std::to_string(x) +
-           "\n0 1 0 2\n0 0 1 3\n0 0 0 1\nodom\n1 0 0 99\n0 1 0 0\n0 0 1 0\n0 0 "
-           "0 1\naccum_distance -1\nid 1\n";
-  };
-  const fs::path dump = folder / "dump";
-  write_text(dump / "000000/cloud.pcd", pcd({1, 0, 0}));
-  write_text(dump / "000000/data", data(0, 5));
-  write_text(dump / "000001/cloud.pcd", pcd({1, 0, 0}));
-  write_text(dump / "000001/data", data(500000000, 6));
-  const Recording recording(dump);
-  REQUIRE(recording.size() == 2);
-  CHECK(recording.name(1) == "000001");
-  CHECK(recording.time(1) == 1700000000.5);
-  CHECK(recording.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(6, 2, 3)));
-  CHECK(recording.read_scan(1).size() == 3);
-  write_text(dump / "000001/data", "stamp 1700000001 0\n");
-  CHECK_THAT(error_of(dump), StartsWith((dump / "000001/data").string() + ": expected a line"));
-  write_text(dump / "000001/data", "stamp 1700000001 0\nestimate\n1 0 0\n");
-  CHECK_THAT(error_of(dump), ContainsSubstring("data:3: expected 4 finite numbers"));
 }

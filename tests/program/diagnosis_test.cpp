@@ -168,18 +168,6 @@ TEST_CASE("check estimates the place of the lidar in the body whose poses are gi
   CHECK_THAT(healed.out, ContainsSubstring("agree as they are"));
 }
 
-TEST_CASE("check names a robot description beside the recording") {
-  const Street street(dense());
-  const std::string file = street.path() / "robot.urdf";
-  write_text(file, "<robot/>");
-  const std::string seq = street.path();
-  CHECK_THAT(start({"check", seq}).out,
-             ContainsSubstring("\nnote: for poses of another frame than the lidar: --extrinsic " +
-                               file + ":BODY:LIDAR\n"));
-  CHECK_THAT(start({"check", seq, "--extrinsic", "0 0 1 0 0 0 1"}).out,
-             !ContainsSubstring("robot.urdf"));
-}
-
 TEST_CASE("check estimates the offset of the clocks") {
   const Street street(dense());
   std::string scan_times;

@@ -59,7 +59,6 @@ def test_columns_and_poses_of_pcd_files(tmp_path):
     "name, write",
     [
         ("npy", lambda file, points: np.save(file, points)),
-        ("npz", lambda file, points: np.savez(file, points=points)),
         ("xyz", lambda file, points: np.savetxt(file, points)),
         (
             "csv",

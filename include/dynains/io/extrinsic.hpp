@@ -12,10 +12,6 @@ namespace dynains {
 /// commas between the numbers, or the path of a file with one pose in a form of read_trajectory().
 /// Throws ConfigError for seven values that are no pose, IoError for a file that has no pose or
 /// more than one.
-///
-/// Or `FILE:BODY:LIDAR`, for example "robot.urdf:base_link:velodyne": two frames of a robot
-/// description (.urdf), or of static transforms (.yaml, .yml). Throws ConfigError that lists the
-/// frames of the file if it does not connect the two.
 Pose read_extrinsic(const std::string& text);
 
 /// Position of the sensor in the frame of the clouds, m. `text` is `x y z`, with blanks or commas,

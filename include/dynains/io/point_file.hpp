@@ -80,7 +80,6 @@ struct PointFile {
 ///               `label` are extra bytes
 ///   .npy        a structured array with fields of these names, or one row for each point: x y z
 ///               intensity, others ignored
-///   .npz        one such array, or one array for each column, named like it
 ///   .xyz, .csv  text with a point on each line, separated by blanks, commas or semicolons: x y z
 ///               intensity, others ignored; or with names of the columns in the first line
 ///

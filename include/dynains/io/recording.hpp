@@ -94,7 +94,7 @@ struct RecordedScan {
 };
 
 /// Format of the scans: one file per scan, or messages of a log.
-enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kNpz, kXyz, kCsv, kNuScenes, kLog };
+enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kXyz, kCsv, kNuScenes, kLog };
 
 class LogScans;
 class ScanReader;
@@ -110,9 +110,6 @@ struct ScanAddress;
 ///   .bin files, files of the other formats are no scans. Scans are ordered by name, with numbers
 ///   in names by value.
 /// - Folder of .bin files in the format of KITTI, or with RecordingOptions::bin_layout.
-/// - Folder of keyframes as hdl_graph_slam dumps them: a folder NNNNNN for each scan, with
-/// cloud.pcd
-///   and `data` (stamp and estimate).
 /// - nuScenes: a folder with samples/, sweeps/ and v1.0-*/, or the folder of its tables. Scans are
 ///   the .pcd.bin files of one scene; poses and times are those of sample_data.json, ego_pose.json
 ///   and calibrated_sensor.json.
@@ -215,8 +212,8 @@ class Recording {
   /// for each scan. Other scans are left out.
   void take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor);
 
-  /// The columns of scan i beside x y z, those of RecordedScan and labels: of .pcd, .ply, .npy,
-  /// .npz and clouds of logs.
+  /// The columns of scan i beside x y z, those of RecordedScan and labels: of .pcd, .ply, .npy
+  /// and clouds of logs.
   OtherValues read_other_values(std::size_t i) const;
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
@@ -259,12 +256,10 @@ class Recording {
   void take_sensor_frame(const LogScans& log);
   void open_nuscenes(const std::filesystem::path& tables);
   void list_scans();
-  void list_keyframes(const std::vector<std::filesystem::path>& folders);
   bool find_scan_folder();
   void check_names() const;
   void read_poses();
   void read_viewpoints();
-  void read_keyframes();
   void read_calibration(const std::filesystem::path& poses_file);
   std::filesystem::path find_poses() const;
   std::filesystem::path find_beside(const std::filesystem::path& poses_file,
@@ -300,9 +295,8 @@ class Recording {
   PointFrame frame_ = PointFrame::kSensor;
   Labels labels_ = Labels::kNone;
   PointColumns columns_;
-  bool numbered_ = false;       ///< all names are numbers
-  bool has_times_ = true;       ///< times of scans are measured; else scans count as 0.1 s apart
-  bool has_keyframes_ = false;  ///< each scan lies in a folder with its pose
+  bool numbered_ = false;  ///< all names are numbers
+  bool has_times_ = true;  ///< times of scans are measured; else scans count as 0.1 s apart
   bool has_viewpoints_ = false;
   bool has_calibration_ = false;
   Pose Tr_ = Pose::Identity();  ///< of calib.txt

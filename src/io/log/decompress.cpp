@@ -128,33 +128,6 @@ std::string decompress_bz2(const std::vector<std::uint8_t>& input, std::uint64_t
 }
 #endif
 
-#if defined(DYNAINS_HAS_Z)
-std::string decompress_deflate(const std::vector<std::uint8_t>& input, std::uint64_t size,
-                               std::vector<std::uint8_t>& output) {
-  constexpr std::size_t kMost = std::size_t{1} << 30U;  // the library counts in 32 bits
-  z_stream stream{};
-  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) return "zlib cannot be initialised";
-  const auto step = [&](const Room& room) {
-    const std::size_t input_size = std::min(room.input_size, kMost);
-    const std::size_t output_size = std::min(room.output_size, kMost);
-    stream.next_in = const_cast<std::uint8_t*>(room.input);
-    stream.avail_in = static_cast<unsigned>(input_size);
-    stream.next_out = room.output;
-    stream.avail_out = static_cast<unsigned>(output_size);
-    const int result = inflate(&stream, Z_NO_FLUSH);
-    Step made{
-        input_size - stream.avail_in, output_size - stream.avail_out, result == Z_STREAM_END, {}};
-    if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR) {
-      made.error = "no valid deflate data";
-    }
-    return made;
-  };
-  const std::string error = run(step, input, size, output);
-  inflateEnd(&stream);
-  return error;
-}
-#endif
-
 }  // namespace
 
 std::string decompress(const std::string& method,
@@ -169,11 +142,6 @@ std::string decompress(const std::string& method,
 #endif
 #if defined(DYNAINS_HAS_BZ2)
   if (method == "bz2") return decompress_bz2(input, size, output);
-#endif
-#if defined(DYNAINS_HAS_Z)
-  if (method == "deflate") return decompress_deflate(input, size, output);
-#else
-  if (method == "deflate") return "this build has no zlib (Debian: zlib1g-dev)";
 #endif
   for (const std::string known : {"lz4", "zstd", "bz2"}) {
     if (method == known) return "this build has no " + known + " (Debian: lib" + known + "-dev)";

@@ -9,7 +9,7 @@
 namespace dynains {
 
 /// Decompresses all of `input` into `output`, which ends with exactly `size` bytes. `method` is
-/// "lz4" (frame format), "zstd", "bz2" or "deflate" (raw). Memory grows with the bytes that are
+/// "lz4" (frame format), "zstd" or "bz2". Memory grows with the bytes that are
 /// really there, not with `size`. Returns an empty text, or the reason why that is not possible.
 std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
                        std::uint64_t size, std::vector<std::uint8_t>& output);
