@@ -23,6 +23,7 @@ except ImportError as error:
 SCANS = 40  # a scan enters the map 30 scans later
 STATIC, MOVING = 9, 251
 PATIENCE = 60.0  # s
+WRITER = pathlib.Path(__file__).parents[2] / "tests" / "program" / "write_bag.py"
 
 
 def free_port():
@@ -54,11 +55,12 @@ def counts_of(labels):
 def main(program, node, work):
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
-    bag = work / "log" / "drive.bag"
-    subprocess.run([program, "simulate", work / "log", "--format", "bag", "--sensor", "vlp16",
-                    "--scans", str(SCANS), "--quiet"], check=True)
+    bag = work / "drive.bag"
+    subprocess.run([program, "simulate", work / "seq", "--sensor", "vlp16", "--scans", str(SCANS),
+                    "--quiet"], check=True)
+    subprocess.run([sys.executable, WRITER, work / "seq", bag, "none"], check=True)
     subprocess.run([program, "run", bag, "--out", work / "out", "--min-range", "2.5",
-                    "--write-online", "--quiet"], check=True)
+                    "--pose-topic", "/tf", "--write-online", "--quiet"], check=True)
     expected = [counts_of(file) for file in sorted((work / "out" / "online").iterdir())]
     assert len(expected) == SCANS and sum(moving for _, moving in expected) > 0
 
@@ -79,7 +81,7 @@ def main(program, node, work):
             rospy.Subscriber("/dynains/" + topic, PointCloud2, messages.append)
         residuals = []
         rospy.Subscriber("/dynains/residual", PoseWithCovarianceStamped, residuals.append)
-        start(node, "_fixed_frame:=map", "_map_period:=0.3", "_queue:=100", "_tf_timeout:=10",
+        start(node, "points:=/velodyne", "_fixed_frame:=odom", "_map_period:=0.3", "_queue:=100", "_tf_timeout:=10",
               "_min_range:=2.5")
         start("rosbag", "play", "--quiet", "--wait-for-subscribers", "--delay=1", "--rate=2",
               bag)
@@ -95,7 +97,7 @@ def main(program, node, work):
               for still, moving in zip(received["static"], received["dynamic"])]
     assert counts == expected, f"expected {expected}, found {counts}"
     map_message = received["map"][-1]
-    assert map_message.header.frame_id == "map" and map_message.width > 1000
+    assert map_message.header.frame_id == "odom" and map_message.width > 1000
     assert len(map_message.data) == 12 * map_message.width
     assert len(residuals) > SCANS / 2, f"{len(residuals)} residuals"
     way = sum((r.pose.pose.position.x ** 2 + r.pose.pose.position.y ** 2) ** 0.5

@@ -23,9 +23,8 @@ namespace {
 
 constexpr const char* kFolder = "kitti";
 constexpr const char* kRandom = "random";  // everything is drawn from the seed
-constexpr const char* kLogs[] = {"mcap", "bag", "db3"};
-
-std::string log_name(const std::string& format) { return "drive." + format; }
+constexpr const char* kLog = "mcap";
+constexpr const char* kLogName = "drive.mcap";
 
 struct SimulateOptions {
   std::string out;
@@ -56,19 +55,19 @@ simulation::Config make_config(const SimulateOptions& options) {
   config.validate();
   if (config.rolling_shutter && config.deskewed <= 0 && options.format == kFolder) {
     throw ConfigError(
-        "--rolling-shutter needs --format mcap, bag or db3, or --deskewed: a folder as of "
+        "--rolling-shutter needs --format mcap, or --deskewed: a folder as of "
         "KITTI has no times of points");
   }
   return config;
 }
 
 const OutputKind& simulation_output_kind() {
-  static const OutputKind kind = {"simulate",
-                                  "simulation.json",
-                                  {"poses.txt", "poses_true.txt", "times.txt", "calib.txt",
-                                   log_name(kLogs[0]), log_name(kLogs[1]), log_name(kLogs[2])},
-                                  false,
-                                  {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
+  static const OutputKind kind = {
+      "simulate",
+      "simulation.json",
+      {"poses.txt", "poses_true.txt", "times.txt", "calib.txt", kLogName},
+      false,
+      {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
   return kind;
 }
 
@@ -76,7 +75,7 @@ OutputListing listing_of(const simulation::Simulator& simulator, const std::stri
   const simulation::Config& config = simulator.config();
   OutputListing listing;
   if (format != kFolder) {
-    listing.files = {log_name(format)};
+    listing.files = {kLogName};
     return listing;
   }
   listing.files = {"poses.txt", "times.txt", "calib.txt"};
@@ -119,9 +118,8 @@ bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& 
     progress.update(done);
     return InterruptGuard::signal() == 0;
   };
-  return options.format == kFolder
-             ? simulation::write_sequence(simulator, folder, count)
-             : simulation::write_log(simulator, folder / log_name(options.format), count);
+  return options.format == kFolder ? simulation::write_sequence(simulator, folder, count)
+                                   : simulation::write_log(simulator, folder / kLogName, count);
 }
 
 void simulate(const SimulateOptions& options) {
@@ -148,7 +146,7 @@ void simulate(const SimulateOptions& options) {
   change.put_in_place();
   change.finish(describe(options, config, true), listing);
   const std::filesystem::path sequence =
-      options.format == kFolder ? out.path() : out.path() / log_name(options.format);
+      options.format == kFolder ? out.path() : out.path() / kLogName;
   if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
@@ -182,10 +180,9 @@ void add_simulate_command(CLI::App& app) {
   add_choice("--labelling", options->labelling, simulation::labelling_names());
   command
       .add_option("--format", options->format,
-                  "a folder as of KITTI, or a log: OUT/drive.mcap or OUT/drive.db3 (ROS 2), or "
-                  "OUT/drive.bag (ROS 1) [kitti]")
-      ->check(CLI::IsMember({kFolder, kLogs[0], kLogs[1], kLogs[2]}))
-      ->type_name("kitti|mcap|bag|db3");
+                  "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap [kitti]")
+      ->check(CLI::IsMember({kFolder, kLog}))
+      ->type_name("kitti|mcap");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
   command.footer(

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -14,10 +14,8 @@
 #include "dynains/io/atomic_file.hpp"
 #include "interrupt.hpp"
 #include "io/log/cloud_edit.hpp"
-#include "io/log/compress.hpp"
-#include "io/log/log_folder.hpp"
+#include "io/log/log_copy.hpp"
 #include "io/log/log_scans.hpp"
-#include "io/log/message_editor.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {
@@ -31,7 +29,7 @@ using Place = std::tuple<std::uint32_t, std::uint64_t, std::uint64_t>;
 Place place_of(const LogMessage& message) { return {message.part, message.block, message.offset}; }
 
 /// Replaces clouds by the labels of a run.
-class CloudEditor final : public MessageEditor {
+class CloudEditor {
  public:
   /// `labels`: the folder of labels of the scans in `range`.
   CloudEditor(const Recording& recording, const ScanRange& range, fs::path labels, bool adds_labels,
@@ -52,26 +50,16 @@ class CloudEditor final : public MessageEditor {
 
   std::size_t unjudged() const { return unjudged_; }
 
-  void pause() override {
+  std::optional<std::string> operator()(const LogMessage& message,
+                                        const SerialisedMessage& cloud) const {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-  }
-  bool changes(const LogMessage& place) override {
-    const auto name = names_.find(place_of(place));
-    return name != names_.end() && (adds_labels_ || !name->second.empty());
-  }
-  std::string edited(const LogMessage& place, const std::vector<std::uint8_t>& message) override {
-    const LogTopic& topic = log_.log().topics()[log_.cloud_topic()];
-    const std::string& name = names_.at(place_of(place));
-    std::vector<std::uint8_t> bytes = message;
-    std::vector<std::uint8_t> spare;
-    const SerialisedMessage cloud = unpacked(log_.log(), topic, place.time, bytes, spare);
-    const bool was_compressed = bytes != message;
+    const auto name = names_.find(place_of(message));
+    if (name == names_.end() || (!adds_labels_ && name->second.empty())) return std::nullopt;
+    const std::string& type = log_.log().topics()[log_.cloud_topic()].type;
     const std::vector<std::uint8_t> classes =
-        classes_of(name, inspect_cloud(topic.type, cloud).points);
-    const std::vector<std::uint8_t> stay = kept(classes);
-    std::string result = adds_labels_ ? with_labels(topic.type, cloud, classes)
-                                      : without_points(topic.type, cloud, stay);
-    return compress(was_compressed ? "zstd" : "", std::move(result));
+        classes_of(name->second, inspect_cloud(type, cloud).points);
+    return adds_labels_ ? with_labels(type, cloud, classes)
+                        : without_points(type, cloud, kept(classes));
   }
 
  private:
@@ -113,7 +101,6 @@ LogOutput::LogOutput(const RunPlan& plan, bool may_replace)
   check_place(plan.inputs, may_replace);
   const fs::path folder = target_.parent_path();
   lock_.emplace(folder, FolderLock::Mode::kShared);
-  if (recording_.log()->log().is_folder()) return;
   remove_leftovers(folder, [&](const std::string& name) { return name == target_.filename(); });
   const AtomicFile trial(target_);
   if (count_writers(target_) > 1) {
@@ -126,16 +113,11 @@ void LogOutput::check_kind() const {
   if (recording_.log() == nullptr) {
     throw ConfigError(flag + "the recording is no log; --write-clean writes its scans");
   }
-  const LogFile& log = recording_.log()->log();
-  const std::string kind = log_extension(log.path());
-  if (log.is_folder() && !log_extension(target_).empty()) {
-    throw ConfigError(flag + "expected the name of a folder, for the log is one");
-  }
-  if (!log.is_folder() && (log_extension(target_) != kind || target_.extension() != kind)) {
-    throw ConfigError(flag + "expected a name that ends in " + kind + ", as that of the log");
-  }
+  if (target_.extension() != ".mcap")
+    throw ConfigError(flag + "expected a name that ends in .mcap");
   if (!adds_labels_) return;
-  const std::string& type = log.topics()[recording_.log()->cloud_topic()].type;
+  const LogScans& log = *recording_.log();
+  const std::string& type = log.log().topics()[log.cloud_topic()].type;
   if (!can_have_labels(type)) throw ConfigError("--mark: clouds of " + type + " have no labels");
   if (recording_.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
@@ -147,26 +129,17 @@ void LogOutput::check_place(const InputFiles& inputs, bool may_replace) const {
   if (identity_of(folder) == identity_of(recording_.scan_folder())) {
     throw IoError(target_.string() + ": the log is there; choose another folder for --write-log");
   }
-  if (!fs::exists(fs::symlink_status(target_))) return;
-  if (!may_replace) {
+  if (!may_replace && fs::exists(fs::symlink_status(target_))) {
     throw IoError(target_.string() +
                   ": exists; choose another name for --write-log, or replace it by --force");
-  }
-  if (!recording_.log()->log().is_folder()) return;
-  std::set<fs::path> names;
-  for (const fs::path& file : recording_.log()->log().files()) names.insert(file.filename());
-  for (const fs::directory_entry& entry : fs::directory_iterator(target_)) {
-    if (names.count(entry.path().filename()) > 0 && entry.is_regular_file()) continue;
-    throw IoError(target_.string() + ": holds " + entry.path().filename().string() +
-                  ", which is no part of the log; choose another folder for --write-log");
   }
 }
 
 std::optional<std::size_t> LogOutput::write(const fs::path& results) const {
-  CloudEditor editor(recording_, range_, results / "labels", adds_labels_, drops_not_judged_);
+  const CloudEditor editor(recording_, range_, results / "labels", adds_labels_, drops_not_judged_);
   try {
-    open_log(recording_.log()->log().path(), recording_.options().accept_missing)
-        ->copy(target_, editor);
+    const auto log = open_log(recording_.log()->log().path(), recording_.options().accept_missing);
+    copy_log(*log, target_, std::cref(editor));
   } catch (const Interrupted&) {
     return std::nullopt;
   }

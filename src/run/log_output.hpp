@@ -15,8 +15,8 @@ namespace dynains::program {
 /// results are complete, or not at all.
 class LogOutput {
  public:
-  /// `outputs.log` is not empty. Throws ConfigError if the recording is no log, or none of the kind
-  /// of the target; IoError if the run reads the target or must not replace it; UsageError if
+  /// `outputs.log` is not empty. Throws ConfigError if the recording is no log, or the target no
+  /// MCAP; IoError if the run reads the target or must not replace it; UsageError if
   /// another run writes it.
   LogOutput(const RunPlan& plan, bool may_replace);
 

@@ -138,9 +138,8 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
                     "also write every scan without its moving points, to the folder clean, in the "
                     "form it has in the recording"});
   visitor(TextParameter{"write_log", self.log, kText, "FILE",
-                        "also write the log of the recording again, as a file or folder of its "
-                        "kind: all messages as they are, except that clouds of the topic have no "
-                        "moving points"});
+                        "also write the log of the recording again, as MCAP: all messages as they "
+                        "are, except that clouds of the topic have no moving points"});
   visitor(Parameter{"mark", self.mark_log, Bounds(), "",
                     "clouds of that log keep all points and get a field `label` (uint8): 251 "
                     "moving, 9 static, 0 not judged"});

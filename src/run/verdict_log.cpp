@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/log/log_writer.hpp"
+#include "io/log/mcap_writer.hpp"
+#include "io/log/message_types.hpp"
 #include "io/log/message_writer.hpp"
 #include "io/scalar.hpp"
 #include "label_writer.hpp"
@@ -39,12 +40,12 @@ CloudLayout map_layout(bool is_far) {
 VerdictLog::VerdictLog(const std::filesystem::path& file, const Recording& recording,
                        std::size_t first_scan, bool is_far)
     : recording_(recording),
-      writer_(create_log(file)),
+      writer_(std::make_unique<McapWriter>(file)),
       origin_(std::min(0.0, recording.time(first_scan))),
       is_far_(is_far) {
-  transforms_ = writer_->add_channel("/tf", transforms_type());
-  clouds_ = writer_->add_channel("/points", point_cloud2_type());
-  maps_ = writer_->add_channel("/static_map", point_cloud2_type());
+  transforms_ = writer_->add_channel(transforms_topic("/tf"));
+  clouds_ = writer_->add_channel(cloud_topic("/points"));
+  maps_ = writer_->add_channel(cloud_topic("/static_map"));
 }
 
 VerdictLog::~VerdictLog() = default;
@@ -68,12 +69,10 @@ void VerdictLog::add(const RecordedScan& scan, const ScanVerdict& verdict) {
     append_number(verdict.causes[i], points_);
   }
   last_time_ = nanoseconds(verdict.time);
-  const MessageEncoding encoding = writer_->encoding();
-  writer_->write(
-      transforms_, last_time_,
-      transform_message(encoding, last_time_, kMapFrame, kSensorFrame, verdict.T_world_sensor));
+  writer_->write(transforms_, last_time_,
+                 transform_message(last_time_, kMapFrame, kSensorFrame, verdict.T_world_sensor));
   writer_->write(clouds_, last_time_,
-                 cloud_message(encoding, last_time_, kSensorFrame, scan_layout(columns), points_));
+                 cloud_message(last_time_, kSensorFrame, scan_layout(columns), points_));
   points_.clear();
 }
 
@@ -86,9 +85,8 @@ void VerdictLog::add_map_point(const Eigen::Vector3d& point) {
 }
 
 void VerdictLog::write_map() {
-  writer_->write(
-      maps_, last_time_,
-      cloud_message(writer_->encoding(), last_time_, kMapFrame, map_layout(is_far_), points_));
+  writer_->write(maps_, last_time_,
+                 cloud_message(last_time_, kMapFrame, map_layout(is_far_), points_));
   points_.clear();
   map_points_ = 0;
 }

@@ -13,7 +13,7 @@
 
 namespace dynains {
 
-class LogWriter;
+class McapWriter;
 
 namespace program {
 
@@ -41,7 +41,7 @@ class VerdictLog {
   void write_map();
 
   const Recording& recording_;
-  std::unique_ptr<LogWriter> writer_;
+  std::unique_ptr<McapWriter> writer_;
   std::uint16_t transforms_ = 0, clouds_ = 0, maps_ = 0;  ///< channels
   double origin_;                                         ///< s; log times are not negative
   std::uint64_t last_time_ = 0;                           ///< ns

@@ -2,11 +2,10 @@
 
 #include <cmath>
 #include <cstdint>
-#include <memory>
 #include <string>
-#include <vector>
 
-#include "io/log/log_writer.hpp"
+#include "io/log/mcap_writer.hpp"
+#include "io/log/message_types.hpp"
 #include "io/log/message_writer.hpp"
 #include "io/scalar.hpp"
 
@@ -15,7 +14,7 @@ namespace {
 
 constexpr const char* kFrame = "lidar";
 
-std::string cloud_of(const SimulatedScan& scan, MessageEncoding encoding, std::uint64_t time) {
+std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
   CloudLayout layout{{{"x", CloudLayout::kFloat32, 4},
                       {"y", CloudLayout::kFloat32, 4},
                       {"z", CloudLayout::kFloat32, 4},
@@ -30,28 +29,25 @@ std::string cloud_of(const SimulatedScan& scan, MessageEncoding encoding, std::u
     append_number(scan.labels[i], points);
     if (has_times) append_number(scan.times[i], points);
   }
-  return cloud_message(encoding, time, kFrame, layout, points);
+  return cloud_message(time, kFrame, layout, points);
 }
 
 }  // namespace
 
 bool write_log(Simulator& simulator, const std::filesystem::path& file,
                const std::function<bool(std::size_t, std::size_t)>& progress) {
-  const std::unique_ptr<LogWriter> writer = create_log(file);
-  const MessageEncoding encoding = writer->encoding();
-  // ROS 1 takes time 0 for a time that is not known.
-  const double begin = encoding == MessageEncoding::kRos1 ? 1.0 : 0.0;  // s
-  const std::uint16_t clouds = writer->add_channel("/points", point_cloud2_type());
-  const std::uint16_t transforms = writer->add_channel("/tf", transforms_type());
+  McapWriter writer(file);
+  const std::uint16_t clouds = writer.add_channel(cloud_topic("/points"));
+  const std::uint16_t transforms = writer.add_channel(transforms_topic("/tf"));
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedScan scan = simulator.scan(i);
-    const auto time = static_cast<std::uint64_t>(std::llround((begin + scan.time) * 1e9));
-    writer->write(transforms, time,
-                  transform_message(encoding, time, "map", kFrame, scan.T_world_sensor_noisy));
-    writer->write(clouds, time, cloud_of(scan, encoding, time));
+    const auto time = static_cast<std::uint64_t>(std::llround(scan.time * 1e9));
+    writer.write(transforms, time,
+                 transform_message(time, "map", kFrame, scan.T_world_sensor_noisy));
+    writer.write(clouds, time, cloud_of(scan, time));
     if (progress && !progress(i + 1, simulator.size())) return false;
   }
-  writer->commit();
+  writer.commit();
   return true;
 }
 

@@ -1,11 +1,13 @@
-// Logs of ROS: any bytes give scans with poses, or an IoError that names the log.
+// Logs of ROS: any bytes give scans with poses and a copy, or an IoError that names the log.
 #include <cmath>
 #include <filesystem>
 #include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
+#include "io/db3_writer.hpp"
 #include "io/files.hpp"
+#include "io/log/log_copy.hpp"
 #include "io/log_writer.hpp"
 #include "targets.hpp"
 
@@ -71,8 +73,13 @@ void run_log(Bytes bytes) {
   static const test::TemporaryFolder folder;
   const fs::path log = folder / kLogNames[bytes[0] % 3];
   test::write_text(log, {reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1});
+  const fs::path copy = folder / "copy.mcap";
   try {
     read_whole(log, bytes.size());
+    const auto file = open_log(log);
+    copy_log(*file, copy, [](const LogMessage&, const SerialisedMessage&) { return std::nullopt; });
+    require(open_log(copy)->messages().size() == file->messages().size(),
+            "a copy has all messages");
   } catch (const IoError& error) {
     require(std::string(error.what()).rfind(log.string(), 0) == 0, "the error names the log");
   }
@@ -91,6 +98,11 @@ std::vector<std::string> log_seeds() {
                                         {true, true, "none"}));
   seeds.push_back('\1' + test::bag_file(channels(true), drive(MessageEncoding::kRos1, true),
                                         {false, false, "lz4"}));
+#if defined(DYNAINS_HAS_SQLITE3)
+  const test::TemporaryFolder folder;
+  test::write_db3(folder / "log.db3", channels(true), drive(MessageEncoding::kCdr, true));
+  seeds.push_back('\2' + test::read_text(folder / "log.db3"));
+#endif
   return seeds;
 }
 

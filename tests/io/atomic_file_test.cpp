@@ -9,7 +9,6 @@
 #include "dynains/io/folder_lock.hpp"
 #include "io/files.hpp"
 #include "io/folder_exchange.hpp"
-#include "io/log/staged_folder.hpp"
 #include "support/catch.hpp"
 
 namespace fs = std::filesystem;
@@ -187,32 +186,4 @@ TEST_CASE("A folder is put in place in one step, or not at all") {
              ContainsSubstring("none/target: cannot be put in place"));
   CHECK(read_text(folder / "target/a.txt") == "newer");
   CHECK(read_text(folder / "newer/a.txt") == "new");
-}
-
-TEST_CASE("StagedFolder replaces its target, and leftovers of a killed process do not stop it") {
-  const TemporaryFolder folder;
-  const fs::path target = folder / "log";
-  write_text(target / "old.txt", "old");
-  const auto replace = [&](const std::string& text) {
-    StagedFolder staged(target);
-    CHECK(count_entries(staged.path()) == 0);
-    write_text(staged.path() / "new.txt", text);
-    CHECK(count_entries(target) == 1);
-    staged.commit();
-  };
-  // Killed while it wrote, or when the target was complete and the earlier folder was left.
-  write_text(folder / ".log.dynains_staging/inner/half.txt", "half");
-  write_text(folder / ".log.dynains_earlier/old.txt", "old");
-  replace("new");
-  CHECK(read_text(target / "new.txt") == "new");
-  CHECK(count_entries(target) == 1);
-  CHECK_FALSE(fs::exists(folder / ".log.dynains_staging"));
-  replace("newer");
-  CHECK(read_text(target / "new.txt") == "newer");
-  {
-    const StagedFolder given_up(target);
-    CHECK_THROWS_AS(StagedFolder(target), UsageError);
-  }
-  CHECK(read_text(target / "new.txt") == "newer");
-  CHECK(count_entries(folder.path()) == 2);
 }

@@ -9,6 +9,7 @@
 #include "dynains/errors.hpp"
 #include "files.hpp"
 #include "io/log/decompress.hpp"
+#include "io/log/log_copy.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 #if defined(DYNAINS_HAS_ZSTD)
@@ -155,6 +156,38 @@ TEST_CASE("A database of rosbag2 gives its messages, by time") {
 }
 
 #if defined(DYNAINS_HAS_SQLITE3)
+TEST_CASE("A database with a journal is refused, and nothing is written beside it") {
+  const TemporaryFolder folder;
+  const TemporaryFolder recorder;
+  const fs::path path = recorder / "log.db3";
+  write_db3(path, kChannels, seven_messages());
+  sqlite3* database = nullptr;
+  REQUIRE(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
+  execute(database, "PRAGMA journal_mode = WAL; DELETE FROM messages WHERE id = 7");
+  fs::copy(recorder.path(), folder / "killed", fs::copy_options::recursive);
+  const std::string killed = folder / "killed" / "log.db3";
+  const std::size_t entries = count_entries(folder / "killed");
+  CHECK(read_error(killed) == killed +
+                                  ": is incomplete without log.db3-wal, which its recorder left; "
+                                  "join them: sqlite3 FILE 'PRAGMA journal_mode = DELETE'");
+  CHECK(count_entries(folder / "killed") == entries);
+  // What the advice does.
+  sqlite3* joined = nullptr;
+  REQUIRE(sqlite3_open(killed.c_str(), &joined) == SQLITE_OK);
+  execute(joined, "PRAGMA journal_mode = DELETE");
+  sqlite3_close(joined);
+  CHECK(open_log(killed)->messages().size() == 6);
+  CHECK(count_entries(folder / "killed") == 1);
+
+  // A recorder that ended leaves a database of this mode, or an empty journal.
+  execute(database, "PRAGMA wal_checkpoint(TRUNCATE)");
+  fs::copy(recorder.path(), folder / "ended", fs::copy_options::recursive);
+  fs::permissions(folder / "ended", fs::perms::owner_read | fs::perms::owner_exec);
+  CHECK(open_log(folder / "ended" / "log.db3")->messages().size() == 6);
+  fs::permissions(folder / "ended", fs::perms::owner_all);
+  sqlite3_close(database);
+}
+
 TEST_CASE("No SQL of a database runs, and tables are real ones") {
   const TemporaryFolder folder;
   const fs::path path = folder / "log.db3";
@@ -286,11 +319,57 @@ TEST_CASE("A small file of MCAP takes little memory, even if its chunks unpack t
   write_text(path, mcap_of(zstd_chunk(empty, "")));
   REQUIRE(fs::file_size(path) < 100000);
   CHECK_THAT(read_error(path), StartsWith(path.string() + ": byte ") &&
-                                   ContainsSubstring("expected at most one message for each byte"));
+                                   ContainsSubstring("expected at most one record for each byte"));
 
   const std::string zeros(std::size_t{40} << 20U, '\0');
   write_text(path, mcap_of(zstd_chunk(zeros, "")));
   CHECK_THAT(read_error(path), ContainsSubstring("expected a chunk of at most 16777216 bytes"));
+}
+
+TEST_CASE("A message that is packed by itself unpacks to as much as a chunk may") {
+  const TemporaryFolder folder;
+  for (const std::size_t size : {std::size_t{15} << 20U, std::size_t{40} << 20U}) {
+    write_text(folder / "log.mcap", mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"}},
+                                              {{0, 1, zstd(std::string(size, '\0'))}}, {}));
+    const auto log = open_log(folder / "log.mcap");
+    const auto copy = [&] {
+      copy_log(*log, folder / "copy.mcap",
+               [](const LogMessage&, const SerialisedMessage&) { return std::nullopt; });
+    };
+    if (size < std::size_t{16} << 20U) {
+      copy();
+      CHECK(contents(*open_log(folder / "copy.mcap")).size() > size);
+    } else {
+      CHECK_THAT(message_of<IoError>(copy),
+                 StartsWith((folder / "log.mcap").string()) &&
+                     ContainsSubstring("expected a frame of zstd of at most 16777216 bytes"));
+    }
+  }
+}
+
+TEST_CASE("Work on a small file is bounded, even if the messages of many chunks alternate") {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "log.mcap";
+  std::string chunks;
+  const std::string rest =
+      mcap_record(0x90, ByteWriter().raw(std::string(std::size_t{15} << 20U, '\0')));
+  constexpr std::uint64_t kChunks = 20;
+  for (std::uint64_t chunk = 0; chunk < kChunks; ++chunk) {
+    std::string records = rest;
+    ByteWriter entries;
+    for (std::uint64_t i = 0; i < 10; ++i) {
+      entries.number(kChunks * i + chunk).number(std::uint64_t{records.size()});
+      records += mcap_message({0, kChunks * i + chunk, "m"});
+    }
+    chunks += zstd_chunk(records, mcap_record(7, ByteWriter()
+                                                     .number(std::uint16_t{0})
+                                                     .number(std::uint32_t(entries.size()))
+                                                     .raw(entries.text())));
+  }
+  write_text(path, mcap_of(chunks));
+  const auto log = open_log(path);
+  CHECK_THAT(message_of<IoError>([&] { contents(*log); }),
+             StartsWith(path.string()) && ContainsSubstring("found messages that alternate"));
 }
 
 TEST_CASE("Chunks whose messages alternate in time are unpacked once") {

@@ -148,7 +148,9 @@ inline std::string bag_file(const std::vector<LogChannel>& channels,
   std::string definitions;
   for (std::uint32_t i = 0; i < channels.size(); ++i) {
     definitions += record(7, field("conn", bytes(i)) + field("topic", channels[i].topic),
-                          field("topic", channels[i].topic) + field("type", channels[i].type));
+                          field("topic", channels[i].topic) + field("type", channels[i].type) +
+                              field("latching", "1") +
+                              field("message_definition", "std_msgs/Header header\n"));
   }
   std::string chunks;
   std::string infos;

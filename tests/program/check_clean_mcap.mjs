@@ -38,12 +38,14 @@ async function all(messages) {
 
 const a = await open(log);
 const b = await open(copy);
-assert.deepStrictEqual(b.header, a.header);
-assert.deepStrictEqual(b.schemasById, a.schemasById);
-assert.deepStrictEqual(b.channelsById, a.channelsById);
-assert.deepStrictEqual(b.statistics, a.statistics);
-const compressions = (reader) => reader.chunkIndexes.map((chunk) => chunk.compression);
-assert.deepStrictEqual(compressions(b), compressions(a));
+assert.strictEqual(b.header.profile, a.header.profile);
+assert.strictEqual(b.statistics.messageCount, a.statistics.messageCount);
+// Ids may differ.
+function channel(reader, id) {
+  const { id: ignored, schemaId, ...rest } = reader.channelsById.get(id);
+  const { id: alsoIgnored, ...schema } = reader.schemasById.get(schemaId);
+  return { ...rest, schema };
+}
 const before = await all(a.readMessages());
 const after = await all(b.readMessages());
 assert.strictEqual(after.length, before.length);
@@ -51,10 +53,11 @@ assert.strictEqual(after.length, before.length);
 const labels = fs.readdirSync(folder).sort();
 let moving = 0;
 for (let i = 0; i < before.length; ++i) {
-  const { data, ...head } = before[i];
-  const { data: cleanData, ...cleanHead } = after[i];
+  const { data, channelId, ...head } = before[i];
+  const { data: cleanData, channelId: cleanId, ...cleanHead } = after[i];
   assert.deepStrictEqual(cleanHead, head);
-  const schema = a.schemasById.get(a.channelsById.get(head.channelId).schemaId);
+  const { schema } = channel(a, channelId);
+  assert.deepStrictEqual(channel(b, cleanId), channel(a, channelId));
   if (schema.name !== "sensor_msgs/msg/PointCloud2") {
     assert.ok(Buffer.from(data).equals(Buffer.from(cleanData)));
     continue;

@@ -1,6 +1,7 @@
 """write_bag.py SEQUENCE BAG COMPRESSION: a KITTI folder as a bag of ROS 1, by python3-rosbag.
 
-Odometry is that of a frame base_link; a static transform leads from there to the frame of the clouds.
+Odometry is that of a frame base_link, as transforms, too; a static transform leads from there to the
+frame of the clouds.
 """
 
 import pathlib
@@ -87,6 +88,12 @@ def main(sequence, bag_file, compression):
             set_pose(odometry.pose.pose.position, odometry.pose.pose.orientation,
                      product(world_from_lidar, lidar_from_base))
             bag.write("/odom", odometry, stamp)
+            transform = TransformStamped()
+            transform.header = odometry.header
+            transform.child_frame_id = "base_link"
+            set_pose(transform.transform.translation, transform.transform.rotation,
+                     product(world_from_lidar, lidar_from_base))
+            bag.write("/tf", TFMessage([transform]), stamp)
             bag.write("/velodyne", cloud_of(sequence / "velodyne" / ("%06d.bin" % i), stamp), stamp)
 
 

@@ -9,17 +9,9 @@
 namespace dynains {
 namespace {
 
-/// Recorders write chunks of some megabytes. Also the memory for the chunks that are kept.
-constexpr std::uint64_t kLargestChunk = std::uint64_t{1} << 28;
-/// Chunks of this size need not be larger in the file; of others, each byte gives at most as many.
-constexpr std::uint64_t kSmallChunk = std::uint64_t{1} << 24;
-constexpr std::uint64_t kLargestRatio = 1000;
+/// For the chunks that are kept, bytes.
+constexpr std::uint64_t kMostMemory = std::uint64_t{1} << 28;
 constexpr std::size_t kMostChunks = 16;  // that are kept if their messages alternate
-
-std::uint64_t most_bytes_of(std::uint64_t compressed_size) {
-  const std::uint64_t most = std::min(compressed_size, kLargestChunk) * kLargestRatio;
-  return std::clamp(most, kSmallChunk, kLargestChunk);
-}
 
 }  // namespace
 
@@ -57,10 +49,10 @@ void ChunkedLog::add_chunk(std::uint64_t position, Chunk header) {
                  "expected a chunk of at most " + std::to_string(file_.size() - header.content) +
                      " bytes, found the size " + std::to_string(header.compressed_size));
   }
-  if (header.uncompressed_size > most_bytes_of(header.compressed_size)) {
+  if (header.uncompressed_size > most_decompressed(header.compressed_size)) {
     fail_at_byte(path_, position,
                  "expected a chunk of at most " +
-                     std::to_string(most_bytes_of(header.compressed_size)) +
+                     std::to_string(most_decompressed(header.compressed_size)) +
                      " bytes, found the size " + std::to_string(header.uncompressed_size));
   }
   chunks_[position] = std::move(header);
@@ -68,18 +60,18 @@ void ChunkedLog::add_chunk(std::uint64_t position, Chunk header) {
   first_of_last_ = entries_.size();
 }
 
-/// The times of messages alone take more than a byte each, also in compressed chunks.
-void ChunkedLog::add_entry(const Entry& entry) {
-  if (entries_.size() >= file_.size()) {
-    fail_at_byte(path_, entry.block, "expected at most one message for each byte of the log");
+/// Records take more than a byte each, also in compressed chunks.
+void ChunkedLog::count_record(std::uint64_t block) {
+  if (++records_ > file_.size()) {
+    fail_at_byte(path_, block, "expected at most one record for each byte of the log");
   }
-  entries_.push_back(entry);
 }
 
 void ChunkedLog::add_indexed(std::uint32_t channel, std::uint64_t time, std::uint64_t offset) {
   if (last_chunk_ == 0) return;
   chunks_[last_chunk_].has_index = true;
-  add_entry({time, last_chunk_, offset, channel});
+  count_record(last_chunk_);
+  entries_.push_back({time, last_chunk_, offset, channel});
 }
 
 /// Some of the index may be missing at the end of a file.
@@ -101,9 +93,9 @@ void ChunkedLog::read_chunk_records(std::uint64_t chunk, bool with_messages) {
   while (rest.remaining() > 0) {
     const std::uint64_t offset = rest.position();
     const std::optional<Message> message = parse_record(rest);
-    if (message && with_messages) {
-      add_entry({message->time, chunk, offset, message->channel});
-    }
+    if (!with_messages) continue;
+    count_record(chunk);
+    if (message) entries_.push_back({message->time, chunk, offset, message->channel});
   }
 }
 
@@ -133,7 +125,7 @@ void ChunkedLog::make_messages() {
   entries_ = {};
 }
 
-void ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
+MessageStamp ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
   const auto chunk = chunks_.find(message.block);
   const bool is_lone = chunk == chunks_.end();
   if (is_lone) {
@@ -148,6 +140,8 @@ void ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_t>& byte
   if (!found) record.fail("expected a message");
   const std::uint8_t* const data = found->payload.here();
   bytes.assign(data, data + found->payload.remaining());
+  delivered_ += bytes.size();
+  return found->stamp;
 }
 
 /// The uncompressed records of a chunk; the last ones are kept.
@@ -174,7 +168,7 @@ ChunkedLog::LoadedChunk& ChunkedLog::make_room(std::uint64_t size) {
   std::uint64_t kept = 0;
   for (const LoadedChunk& loaded : loaded_) kept += loaded.records.capacity();
   std::optional<LoadedChunk> reused;
-  while (!loaded_.empty() && (kept + size > kLargestChunk || loaded_.size() >= wanted_chunks_)) {
+  while (!loaded_.empty() && (kept + size > kMostMemory || loaded_.size() >= wanted_chunks_)) {
     const auto oldest = std::min_element(loaded_.begin(), loaded_.end(), is_older);
     kept -= oldest->records.capacity();
     if (oldest->records.capacity() <= 2 * size) reused = std::move(*oldest);
@@ -187,6 +181,11 @@ ChunkedLog::LoadedChunk& ChunkedLog::make_room(std::uint64_t size) {
 void ChunkedLog::decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& records) {
   Chunk& header = chunks_.at(chunk);
   ++decompressions_;
+  // Chunks are decompressed again if the messages of many alternate.
+  decompressed_ += header.uncompressed_size;
+  if (decompressed_ > kMostMemory + kLargestRatio * (file_.size() + delivered_)) {
+    fail_at_byte(path_, chunk, "expected chunks one after another, found messages that alternate");
+  }
   const std::uint64_t before = std::exchange(header.decompression, decompressions_);
   if (before != 0 && decompressions_ - before <= kMostChunks) wanted_chunks_ = kMostChunks;
   file_.read(header.content, header.compressed_size, "a chunk", compressed_);

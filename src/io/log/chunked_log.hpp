@@ -19,11 +19,11 @@ namespace dynains {
 /// messages. So a file is read in the same way whether its summary was written or not.
 ///
 /// Memory is bounded by the size of the file: 100 bytes of index for each byte, and 256 MiB of
-/// uncompressed chunks, of which each is at most 1,000 times its compressed size (16 MiB for small
-/// ones).
+/// uncompressed chunks, of which each is at most most_decompressed() of its size. Work, too: 1,000
+/// decompressed bytes for each byte of the file and of messages that are read.
 class ChunkedLog : public LogFile {
  public:
-  void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
+  MessageStamp read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override;
   void release() override {
     loaded_.clear();
     compressed_ = {};
@@ -43,6 +43,7 @@ class ChunkedLog : public LogFile {
   struct Message {
     std::uint32_t channel = 0;
     std::uint64_t time = 0;  ///< ns
+    MessageStamp stamp;
     Bytes payload;
   };
 
@@ -74,13 +75,6 @@ class ChunkedLog : public LogFile {
   }
   void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
 
-  // For copies.
-  /// The uncompressed records of the chunk, in memory until the next one.
-  const std::vector<std::uint8_t>& load(std::uint64_t chunk);
-  const std::string& compression_of(std::uint64_t chunk) const {
-    return chunks_.at(chunk).compression;
-  }
-
   RawFile file_;
 
  private:
@@ -99,11 +93,12 @@ class ChunkedLog : public LogFile {
     std::vector<std::uint8_t> records;
   };
 
-  void add_entry(const Entry& entry);
+  void count_record(std::uint64_t block);
   void drop_index_of_last_chunk();
   void read_chunk_records(std::uint64_t chunk, bool with_messages);
   void find_missing_channels();
   void make_messages();
+  const std::vector<std::uint8_t>& load(std::uint64_t chunk);
   LoadedChunk& make_room(std::uint64_t size);
   void decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& records);
 
@@ -117,6 +112,9 @@ class ChunkedLog : public LogFile {
   std::size_t wanted_chunks_ = 1;  ///< more if the messages of chunks alternate in time
   std::uint64_t loads_ = 0;
   std::uint64_t decompressions_ = 0;
+  std::uint64_t decompressed_ = 0;  ///< bytes
+  std::uint64_t delivered_ = 0;     ///< bytes of messages
+  std::uint64_t records_ = 0;       ///< that the index has met
   std::vector<std::uint8_t> compressed_;
   std::filesystem::path chunk_place_;  ///< path and byte of the last chunk, for errors
 };

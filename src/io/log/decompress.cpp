@@ -130,6 +130,12 @@ std::string decompress_bz2(const std::vector<std::uint8_t>& input, std::uint64_t
 
 }  // namespace
 
+std::uint64_t most_decompressed(std::uint64_t compressed) {
+  constexpr std::uint64_t kSmall = std::uint64_t{1} << 24U;
+  constexpr std::uint64_t kLargest = std::uint64_t{1} << 28U;
+  return std::clamp(std::min(compressed, kLargest) * kLargestRatio, kSmall, kLargest);
+}
+
 std::string decompress(const std::string& method,
                        [[maybe_unused]] const std::vector<std::uint8_t>& input,
                        [[maybe_unused]] std::uint64_t size, std::vector<std::uint8_t>& output) {
@@ -159,6 +165,11 @@ std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::
   const auto size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
   if (size == ZSTD_CONTENTSIZE_ERROR) return "expected a frame of zstd";
   if (size == ZSTD_CONTENTSIZE_UNKNOWN) return "expected a frame of zstd that tells its size";
+  const std::uint64_t most = most_decompressed(bytes.size());
+  if (size > most) {
+    return "expected a frame of zstd of at most " + std::to_string(most) + " bytes, found " +
+           std::to_string(size);
+  }
   std::string error = decompress("zstd", bytes, size, spare);
   bytes.swap(spare);
   return error;

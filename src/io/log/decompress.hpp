@@ -8,14 +8,22 @@
 
 namespace dynains {
 
+/// Most decompressed bytes of each compressed one.
+inline constexpr std::uint64_t kLargestRatio = 1000;
+
+/// Largest size, bytes, of a block that takes `compressed` bytes in a file: 1,000 times as many,
+/// within 16 MiB and 256 MiB. Recorders write some megabytes.
+std::uint64_t most_decompressed(std::uint64_t compressed);
+
 /// Decompresses all of `input` into `output`, which ends with exactly `size` bytes. `method` is
 /// "lz4" (frame format), "zstd" or "bz2". Memory grows with the bytes that are
 /// really there, not with `size`. Returns an empty text, or the reason why that is not possible.
 std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
                        std::uint64_t size, std::vector<std::uint8_t>& output);
 
-/// Replaces a whole frame of zstd by its content, as rosbag2 compresses messages; `spare` is memory
-/// for that. Other bytes stay. Returns an empty text, or the reason why that is not possible.
+/// Replaces a whole frame of zstd by its content, as rosbag2 compresses messages, of at most
+/// most_decompressed() bytes; `spare` is memory for that. Other bytes stay. Returns an empty text,
+/// or the reason why that is not possible.
 std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare);
 
 /// Whether this build has zlib, and with it crc32().

@@ -4,13 +4,9 @@
 
 #include "../failure.hpp"
 #include "../input_file.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "log_folder.hpp"
 #include "mcap.hpp"
-#include "message_editor.hpp"
-#include "raw_file.hpp"
 #include "ros_bag.hpp"
-#include "staged_folder.hpp"
 #if defined(DYNAINS_HAS_SQLITE3)
 #include "sqlite_bag.hpp"
 #endif
@@ -35,36 +31,6 @@ std::unique_ptr<LogFile> open_file(const fs::path& path) {
   fail(path, "expected a log with the name *.mcap, *.db3 or *.bag");
 }
 
-/// Tells the editor of a log the part of each message.
-class PartEditor final : public MessageEditor {
- public:
-  PartEditor(MessageEditor& whole, std::uint32_t part) : whole_(whole), part_(part) {}
-
-  void pause() override { whole_.pause(); }
-  bool changes(const LogMessage& place) override { return whole_.changes(in_part(place)); }
-  std::string edited(const LogMessage& place, const std::vector<std::uint8_t>& message) override {
-    return whole_.edited(in_part(place), message);
-  }
-
- private:
-  LogMessage in_part(LogMessage place) const {
-    place.part = part_;
-    return place;
-  }
-
-  MessageEditor& whole_;
-  std::uint32_t part_;
-};
-
-void copy_text(const fs::path& source, const fs::path& target) {
-  RawFile input(source);
-  const auto bytes = input.read(0, input.size(), "a file");
-  AtomicFile file(target);
-  file.stream().write(reinterpret_cast<const char*>(bytes.data()),
-                      static_cast<std::streamsize>(bytes.size()));
-  file.commit();
-}
-
 /// A log that rosbag2 split into several files.
 class SplitLog final : public LogFile {
  public:
@@ -79,33 +45,26 @@ class SplitLog final : public LogFile {
     finish_index();
   }
 
-  bool is_folder() const override { return true; }
   std::vector<fs::path> files() const override {
     std::vector<fs::path> files;
     if (metadata_) files.push_back(*metadata_);
     for (const auto& part : parts_) files.push_back(part->path());
     return files;
   }
-  void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override {
+  MessageStamp read(const LogMessage& message, std::vector<std::uint8_t>& bytes) override {
     if (message.part != last_part_) parts_[last_part_]->release();
     last_part_ = message.part;
-    parts_[message.part]->read(message, bytes);
+    return parts_[message.part]->read(message, bytes);
   }
-  void copy(const fs::path& target, MessageEditor& editor) override {
-    StagedFolder folder(target);
-    if (metadata_) copy_text(*metadata_, folder.path() / metadata_->filename());
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      PartEditor part(editor, static_cast<std::uint32_t>(i));
-      parts_[i]->copy(folder.path() / parts_[i]->path().filename(), part);
-      parts_[i]->release();
-    }
-    folder.commit();
+  void copy_others(McapWriter& writer) override {
+    for (const auto& part : parts_) part->copy_others(writer);
   }
   void release() override { parts_[last_part_]->release(); }
 
  private:
   void add(const LogFile& part, std::uint32_t number) {
     if (part.early_end()) early_end_ = part.early_end();
+    profile_ = part.profile();
     std::vector<std::uint32_t> topic_of;
     for (const LogTopic& topic : part.topics()) topic_of.push_back(add_topic(topic));
     for (LogMessage message : part.messages()) {
@@ -122,13 +81,13 @@ class SplitLog final : public LogFile {
 
 }  // namespace
 
-std::uint32_t LogFile::add_topic(const LogTopic& topic) {
-  const auto same = std::find_if(topics_.begin(), topics_.end(), [&](const LogTopic& other) {
-    return other.name == topic.name && other.type == topic.type && other.encoding == topic.encoding;
-  });
-  const auto index = static_cast<std::uint32_t>(same - topics_.begin());
-  if (same == topics_.end()) topics_.push_back({topic.name, topic.type, topic.encoding, 0});
-  return index;
+std::uint32_t LogFile::add_topic(LogTopic topic) {
+  const auto [known, is_new] =
+      topic_index_.emplace(std::tuple(topic.name, topic.type, topic.message_encoding),
+                           static_cast<std::uint32_t>(topics_.size()));
+  topic.message_count = 0;
+  if (is_new) topics_.push_back(std::move(topic));
+  return known->second;
 }
 
 void LogFile::finish_index() {

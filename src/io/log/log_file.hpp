@@ -4,15 +4,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 namespace dynains {
 
-class MessageEditor;
+class McapWriter;
 
 /// How the fields of a message are serialised.
 enum class MessageEncoding : std::uint8_t {
@@ -21,12 +23,29 @@ enum class MessageEncoding : std::uint8_t {
   kOther  ///< not readable here
 };
 
+/// What decodes the messages of a topic, in the terms of MCAP.
+struct LogSchema {
+  std::string name;      ///< of the type, as in the file
+  std::string encoding;  ///< of the definition, for example "ros2msg"; empty without one
+  std::string definition;
+};
+
 /// One stream of messages of one type.
 struct LogTopic {
   std::string name;  ///< for example "/points"
   std::string type;  ///< package and name, for example "sensor_msgs/PointCloud2"
   MessageEncoding encoding = MessageEncoding::kOther;
   std::uint64_t message_count = 0;
+  // For copies.
+  std::string message_encoding;                 ///< as in the file, for example "cdr"
+  std::shared_ptr<const LogSchema> schema;      ///< may be null
+  std::map<std::string, std::string> metadata;  ///< for example the quality of service
+};
+
+/// What a message of MCAP has beside its data and log time.
+struct MessageStamp {
+  std::uint64_t publish_time = 0;  ///< ns
+  std::uint32_t sequence = 0;
 };
 
 /// Address of one message.
@@ -48,8 +67,6 @@ class LogFile {
   virtual ~LogFile() = default;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Whether the log is a folder of files.
-  virtual bool is_folder() const { return false; }
   /// Every file that belongs to the log.
   virtual std::vector<std::filesystem::path> files() const { return {path_}; }
   const std::vector<LogTopic>& topics() const { return topics_; }
@@ -60,20 +77,20 @@ class LogFile {
   /// Which parts are missing, if the log has several and some are not there.
   const std::optional<std::string>& missing_parts() const { return missing_parts_; }
 
+  /// "ros1", "ros2", or as an MCAP file says.
+  const std::string& profile() const { return profile_; }
+
   /// Replaces `bytes` by the serialised message. Memory of `bytes` is reused.
-  virtual void read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
-  /// Writes the log with the same messages, except those that `editor` replaces: with their topics,
-  /// times and definitions, the attachments, chunks and compression. `target` appears whole or not
-  /// at all; it is a folder if the log is one, and is replaced if it is there. A log that ends
-  /// early is copied up to its end; one in SQLite is an error then.
-  virtual void copy(const std::filesystem::path& target, MessageEditor& editor) = 0;
+  virtual MessageStamp read(const LogMessage& message, std::vector<std::uint8_t>& bytes) = 0;
+  /// Copies what is no message: attachments and metadata of MCAP.
+  virtual void copy_others(McapWriter&) {}
   /// Gives memory back that the next read() would reuse.
   virtual void release() {}
 
  protected:
   explicit LogFile(std::filesystem::path path) : path_(std::move(path)) {}
   /// The index of a topic of this name, type and encoding, which is added if it is new.
-  std::uint32_t add_topic(const LogTopic& topic);
+  std::uint32_t add_topic(LogTopic topic);
   /// Sorts the messages and counts them by topic.
   void finish_index();
 
@@ -82,6 +99,10 @@ class LogFile {
   std::vector<LogMessage> messages_;
   std::optional<std::string> early_end_;
   std::optional<std::string> missing_parts_;
+  std::string profile_;
+
+ private:
+  std::map<std::tuple<std::string, std::string, std::string>, std::uint32_t> topic_index_;
 };
 
 /// Whether `path` is a log by its name: *.mcap, *.bag, *.bag.active, *.db3, one of these compressed

@@ -6,7 +6,6 @@
 #include "../scalar.hpp"
 #include "mcap_format.hpp"
 #include "mcap_writer.hpp"
-#include "message_editor.hpp"
 
 namespace dynains {
 namespace {
@@ -16,30 +15,6 @@ constexpr std::uint64_t kRecordHead = 9;  // opcode and length
 MessageEncoding encoding_of(const std::string& name) {
   if (name == "ros1") return MessageEncoding::kRos1;
   return name == "cdr" ? MessageEncoding::kCdr : MessageEncoding::kOther;
-}
-
-/// Copies the records of a chunk, or one of them. `block`: the byte of the chunk or record.
-void copy_records(Bytes records, std::uint64_t block, MessageEditor& editor, McapWriter& writer) {
-  while (records.remaining() > 0) {
-    LogMessage place;
-    place.block = block;
-    place.offset = records.position();
-    const auto* const begin = reinterpret_cast<const char*>(records.here());
-    const auto opcode = records.number<std::uint8_t>("an opcode");
-    Bytes fields = records.block(records.number<std::uint64_t>("a length"), "a record");
-    if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
-      writer.define(std::string(begin, kRecordHead + fields.remaining()));
-    }
-    if (opcode != mcap::kMessage) continue;
-    McapWriter::MessageHead head;
-    head.channel = fields.number<std::uint16_t>("a channel id");
-    head.sequence = fields.number<std::uint32_t>("a sequence number");
-    head.log_time = fields.number<std::uint64_t>("a log time");
-    head.publish_time = fields.number<std::uint64_t>("a publish time");
-    place.time = head.log_time;
-    write_edited(editor, place, fields.here(), fields.remaining(),
-                 [&](const char* data, std::size_t size) { writer.write(head, data, size); });
-  }
 }
 
 /// The fields of an index record of an attachment that follow its position and size.
@@ -105,8 +80,19 @@ bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
     Bytes bytes(path_, position, record.data(), record.size());
     parse_record(bytes);
   }
+  if (opcode == mcap::kAttachment || opcode == mcap::kMetadata || opcode >= mcap::kFirstPrivate) {
+    others_.push_back(position);
+  }
+  if (opcode == mcap::kHeader) take_header(position, size);
   has_footer_ = opcode == mcap::kFooter;
   return !has_footer_;
+}
+
+void McapFile::take_header(std::uint64_t position, std::uint64_t size) {
+  const auto record = file_.read(position, size, "a header");
+  Bytes fields(path_, position, record.data(), record.size());
+  fields.skip(kRecordHead, "a record");
+  profile_ = fields.string("a profile");
 }
 
 void McapFile::take_chunk(std::uint64_t position, std::uint64_t size) {
@@ -144,66 +130,56 @@ std::optional<ChunkedLog::Message> McapFile::parse_record(Bytes& records) {
     return std::nullopt;
   }
   const auto channel = fields.number<std::uint16_t>("a channel id");
-  fields.skip(4, "a sequence number");
+  MessageStamp stamp;
+  stamp.sequence = fields.number<std::uint32_t>("a sequence number");
   const auto time = fields.number<std::uint64_t>("a log time");
-  fields.skip(8, "a publish time");
-  return Message{channel, time, fields};
+  stamp.publish_time = fields.number<std::uint64_t>("a publish time");
+  return Message{channel, time, stamp, fields};
 }
 
 void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
   if (opcode == mcap::kSchema) {
-    const auto id = fields.number<std::uint16_t>("a schema id");
-    schemas_[id] = plain_type(fields.string("a schema name"));
+    auto& schema = schemas_[fields.number<std::uint16_t>("a schema id")];
+    const std::string name = fields.string("a schema name");
+    const std::string encoding = fields.string("a schema encoding");
+    schema = std::make_shared<LogSchema>(
+        LogSchema{name, encoding, fields.string("the definition of a schema")});
   }
   if (opcode != mcap::kChannel) return;
   const auto id = fields.number<std::uint16_t>("a channel id");
   const auto schema = schemas_.find(fields.number<std::uint16_t>("a schema id"));
   LogTopic topic;
-  if (schema != schemas_.end()) topic.type = schema->second;
+  if (schema != schemas_.end()) {
+    topic.schema = schema->second;
+    topic.type = plain_type(topic.schema->name);
+  }
   topic.name = fields.string("a topic");
-  topic.encoding = encoding_of(fields.string("a message encoding"));
+  topic.message_encoding = fields.string("a message encoding");
+  topic.encoding = encoding_of(topic.message_encoding);
+  Bytes metadata =
+      fields.block(fields.number<std::uint32_t>("the length of metadata"), "metadata of a channel");
+  while (metadata.remaining() > 0) {
+    const std::string name = metadata.string("a name");
+    topic.metadata[name] = metadata.string("a value");
+  }
   add_channel(id, std::move(topic));
 }
 
-void McapFile::copy(const std::filesystem::path& target, MessageEditor& editor) {
-  std::uint64_t position = mcap::kMagic.size();
-  const auto head = file_.read(position, record_size(position).value_or(0), "a header");
-  if (head.empty() || head.front() != mcap::kHeader) {
-    fail_at_byte(path_, position, "expected a header");
-  }
-  McapWriter writer(target, std::string(head.begin(), head.end()));
-  position += head.size();
-  while (const auto size = record_size(position)) {
-    copy_record(position, *size, editor, writer);
-    position += *size;
-  }
-  writer.commit();
-}
-
-void McapFile::copy_record(std::uint64_t position, std::uint64_t size, MessageEditor& editor,
-                           McapWriter& writer) {
+void McapFile::copy_others(McapWriter& writer) {
   constexpr std::uint64_t kLongestHead = std::uint64_t{1} << 16;  // names are short
-  const auto opcode = file_.read(position, 1, "an opcode").front();
-  if (opcode == mcap::kChunk) {
-    const std::vector<std::uint8_t>& records = load(position);
-    copy_records(Bytes(path_, 0, records.data(), records.size()), position, editor, writer);
-    writer.finish_chunk(compression_of(position));
-    return;
-  }
-  if (opcode == mcap::kMessage || opcode == mcap::kSchema || opcode == mcap::kChannel) {
-    const auto record = file_.read(position, size, "a record");
-    copy_records(Bytes(path_, position, record.data(), record.size()), position, editor, writer);
-    return;
-  }
-  const auto begin = file_.read(position, std::min(size, kLongestHead), "a record");
-  Bytes fields(path_, position, begin.data(), begin.size());
-  fields.skip(kRecordHead, "a record");
-  if (opcode == mcap::kAttachment) {
-    writer.copy_record(file_, position, size, mcap::kAttachmentIndex, attachment_index(fields));
-  } else if (opcode == mcap::kMetadata) {
-    writer.copy_record(file_, position, size, mcap::kMetadataIndex, metadata_index(fields));
-  } else if (opcode >= mcap::kFirstPrivate) {
-    writer.copy_record(file_, position, size, std::nullopt, "");
+  for (const std::uint64_t position : others_) {
+    const std::uint64_t size = record_size(position).value_or(0);
+    const auto begin = file_.read(position, std::min(size, kLongestHead), "a record");
+    Bytes fields(path_, position, begin.data(), begin.size());
+    const auto opcode = fields.number<std::uint8_t>("an opcode");
+    fields.skip(kRecordHead - 1, "a length");
+    if (opcode == mcap::kAttachment) {
+      writer.copy_record(file_, position, size, mcap::kAttachmentIndex, attachment_index(fields));
+    } else if (opcode == mcap::kMetadata) {
+      writer.copy_record(file_, position, size, mcap::kMetadataIndex, metadata_index(fields));
+    } else {
+      writer.copy_record(file_, position, size, std::nullopt, "");
+    }
   }
 }
 

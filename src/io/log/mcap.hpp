@@ -3,18 +3,17 @@
 
 #include <cstdint>
 #include <map>
-#include <string>
+#include <memory>
+#include <vector>
 
 #include "chunked_log.hpp"
 
 namespace dynains {
 
-class McapWriter;
-
 class McapFile final : public ChunkedLog {
  public:
   explicit McapFile(const std::filesystem::path& path);
-  void copy(const std::filesystem::path& target, MessageEditor& editor) override;
+  void copy_others(McapWriter& writer) override;
 
  private:
   std::optional<std::uint64_t> record_size(std::uint64_t position) override;
@@ -25,10 +24,10 @@ class McapFile final : public ChunkedLog {
   void take_chunk(std::uint64_t position, std::uint64_t size);
   void take_message_index(std::uint64_t position, std::uint64_t size);
   void take_definition(std::uint8_t opcode, Bytes fields);
-  void copy_record(std::uint64_t position, std::uint64_t size, MessageEditor& editor,
-                   McapWriter& writer);
+  void take_header(std::uint64_t position, std::uint64_t size);
 
-  std::map<std::uint16_t, std::string> schemas_;  ///< type by id
+  std::map<std::uint16_t, std::shared_ptr<const LogSchema>> schemas_;  ///< by id
+  std::vector<std::uint64_t> others_;  ///< positions of records that belong to no channel
   bool has_footer_ = false;
 };
 

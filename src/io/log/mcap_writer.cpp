@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "../scalar.hpp"
-#include "compress.hpp"
 #include "decompress.hpp"
+#if defined(DYNAINS_HAS_ZSTD)
+#include <zstd.h>
+#endif
 
 namespace dynains {
 namespace {
@@ -38,6 +40,21 @@ std::string record(mcap::Opcode opcode, const Fields& content) {
          content.bytes();
 }
 
+/// Compresses `bytes` if this build has zstd. Returns the name of the compression, empty for none.
+std::string compress([[maybe_unused]] std::string& bytes) {
+#if defined(DYNAINS_HAS_ZSTD)
+  std::string result(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size =
+      ZSTD_compress(result.data(), result.size(), bytes.data(), bytes.size(), ZSTD_CLEVEL_DEFAULT);
+  if (ZSTD_isError(size) == 0) {
+    result.resize(size);
+    bytes = std::move(result);
+    return "zstd";
+  }
+#endif
+  return {};
+}
+
 /// A list of pairs with the number of its bytes.
 template <class Pairs>
 Fields list(const Pairs& pairs) {
@@ -48,64 +65,66 @@ Fields list(const Pairs& pairs) {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::filesystem::path& path)
-    : McapWriter(path, record(mcap::kHeader, Fields().string("ros2").string("dynains"))) {}
-
-McapWriter::McapWriter(const std::filesystem::path& path, const std::string& header) : file_(path) {
-  append(mcap::kMagic + header);
+McapWriter::McapWriter(const std::filesystem::path& path, const std::string& profile,
+                       bool compresses)
+    : file_(path), compresses_(compresses) {
+  append(mcap::kMagic + record(mcap::kHeader, Fields().string(profile).string("dynains")));
 }
 
-std::uint16_t McapWriter::add_channel(const std::string& topic, const MessageType& type) {
+std::uint16_t McapWriter::add_channel(const LogTopic& topic) {
   const auto channel = static_cast<std::uint16_t>(counts_.size());
-  const auto schema = static_cast<std::uint16_t>(channel + 1);  // 0 is no schema
-  define(record(mcap::kSchema, Fields()
-                                   .number(schema)
-                                   .string(type.ros2_name())
-                                   .string("ros2msg")
-                                   .string(type.definition(encoding()))));
-  define(record(mcap::kChannel,
-                Fields().number(channel).number(schema).string(topic).string("cdr").string("")));
+  const std::uint16_t schema = topic.schema ? add_schema(*topic.schema) : std::uint16_t{0};
+  Fields metadata;
+  for (const auto& [name, value] : topic.metadata) metadata.string(name).string(value);
+  define(record(mcap::kChannel, Fields()
+                                    .number(channel)
+                                    .number(schema)
+                                    .string(topic.name)
+                                    .string(topic.message_encoding)
+                                    .string(metadata.bytes())));
   counts_[channel] = 0;
   return channel;
 }
 
+std::uint16_t McapWriter::add_schema(const LogSchema& schema) {
+  const Fields content =
+      Fields().string(schema.name).string(schema.encoding).string(schema.definition);
+  const auto id = static_cast<std::uint16_t>(schemas_.size() + 1);  // 0 is no schema
+  const auto [known, is_new] = schemas_.emplace(content.bytes(), id);
+  if (is_new) define(record(mcap::kSchema, Fields().number(id).raw(content.bytes())));
+  return known->second;
+}
+
 void McapWriter::define(const std::string& record) {
-  if (defined_.insert(record).second) definitions_ += record;
+  definitions_ += record;
   records_ += record;
 }
 
-void McapWriter::write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
-  const auto sequence = static_cast<std::uint32_t>(counts_.at(channel));
-  write({channel, sequence, time, time}, message.data(), message.size());
-  if (records_.size() >= kChunkSize) finish_chunk("");
-}
-
-void McapWriter::write(const MessageHead& head, const char* data, std::size_t size) {
+void McapWriter::write(std::uint16_t channel, std::uint64_t time, const MessageStamp& stamp,
+                       Span<const char> message) {
   const bool is_first = index_.empty();
-  first_time_ = is_first ? head.log_time : std::min(first_time_, head.log_time);
-  last_time_ = is_first ? head.log_time : std::max(last_time_, head.log_time);
-  index_[head.channel].push_back({head.log_time, records_.size()});
-  ++counts_[head.channel];
-  const Fields fields = Fields()
-                            .number(head.channel)
-                            .number(head.sequence)
-                            .number(head.log_time)
-                            .number(head.publish_time);
+  first_time_ = is_first ? time : std::min(first_time_, time);
+  last_time_ = is_first ? time : std::max(last_time_, time);
+  index_[channel].push_back({time, records_.size()});
+  ++counts_[channel];
+  const Fields fields =
+      Fields().number(channel).number(stamp.sequence).number(time).number(stamp.publish_time);
   records_ += Fields()
                   .number(mcap::kMessage)
-                  .number(std::uint64_t{fields.bytes().size() + size})
+                  .number(std::uint64_t{fields.bytes().size() + message.size()})
                   .raw(fields.bytes())
                   .bytes();
-  records_.append(data, size);
+  records_.append(message.data(), message.size());
+  if (records_.size() >= kChunkSize) finish_chunk();
 }
 
-void McapWriter::finish_chunk(const std::string& compression) {
+void McapWriter::finish_chunk() {
   if (index_.empty()) return;
   const std::uint64_t records_size = records_.size();
   const std::uint32_t checksum =
       crc32(reinterpret_cast<const std::uint8_t*>(records_.data()), records_.size());
-  const std::string compressed = compress(compression, std::move(records_));
-  ChunkPlace chunk{first_time_,  last_time_,  position_, 0, compressed.size(),
+  const std::string compression = compresses_ ? compress(records_) : std::string();
+  ChunkPlace chunk{first_time_,  last_time_,  position_, 0, records_.size(),
                    records_size, compression, {},        0};
   append(record(mcap::kChunk, Fields()
                                   .number(first_time_)
@@ -113,8 +132,8 @@ void McapWriter::finish_chunk(const std::string& compression) {
                                   .number(records_size)
                                   .number(checksum)
                                   .string(compression)
-                                  .number(std::uint64_t{compressed.size()})
-                                  .raw(compressed)));
+                                  .number(std::uint64_t{records_.size()})
+                                  .raw(records_)));
   chunk.size = position_ - chunk.position;
   for (const auto& [channel, entries] : index_) {
     chunk.indexes[channel] = position_;
@@ -128,7 +147,7 @@ void McapWriter::finish_chunk(const std::string& compression) {
 
 void McapWriter::copy_record(RawFile& source, std::uint64_t position, std::uint64_t size,
                              std::optional<mcap::Opcode> index_opcode, const std::string& index) {
-  finish_chunk("");
+  finish_chunk();
   if (index_opcode) {
     (*index_opcode == mcap::kAttachmentIndex ? attachments_ : metadata_) += 1;
     other_indexes_ += record(*index_opcode, Fields().number(position_).number(size).raw(index));
@@ -143,10 +162,6 @@ void McapWriter::copy_record(RawFile& source, std::uint64_t position, std::uint6
 
 std::string McapWriter::summary() const {
   std::string bytes = definitions_;
-  const auto schemas = static_cast<std::uint16_t>(
-      std::count_if(defined_.begin(), defined_.end(), [](const std::string& definition) {
-        return definition.front() == static_cast<char>(mcap::kSchema);
-      }));
   std::uint64_t messages = 0;
   for (const auto& [channel, count] : counts_) messages += count;
   std::uint64_t begin = chunks_.empty() ? 0 : chunks_.front().begin_time;
@@ -157,7 +172,7 @@ std::string McapWriter::summary() const {
   }
   bytes += record(mcap::kStatistics, Fields()
                                          .number(messages)
-                                         .number(schemas)
+                                         .number(static_cast<std::uint16_t>(schemas_.size()))
                                          .number(static_cast<std::uint32_t>(counts_.size()))
                                          .number(attachments_)
                                          .number(metadata_)
@@ -181,7 +196,7 @@ std::string McapWriter::summary() const {
 }
 
 void McapWriter::commit() {
-  finish_chunk("");
+  finish_chunk();
   append(record(mcap::kDataEnd, Fields().number(std::uint32_t{0})));
   const std::uint64_t summary_begin = position_;
   append(summary());

@@ -1,48 +1,44 @@
-// Writer of MCAP files with messages of ROS 2.
+// Writer of MCAP files.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "dynains/io/atomic_file.hpp"
-#include "log_writer.hpp"
+#include "dynains/points.hpp"
+#include "log_file.hpp"
 #include "mcap_format.hpp"
 #include "raw_file.hpp"
 
 namespace dynains {
 
-/// Writes chunks of some megabytes with their index, without compression, and a summary.
-class McapWriter final : public LogWriter {
+/// Writes chunks of some megabytes with their index, and a summary. The file appears whole, at
+/// `commit()`, or not at all. All members throw IoError.
+class McapWriter {
  public:
-  explicit McapWriter(const std::filesystem::path& path);
-  /// For a copy, with the record `header` of the other file.
-  McapWriter(const std::filesystem::path& path, const std::string& header);
+  /// `profile`: "ros1" or "ros2". Chunks are compressed by zstd if `compresses` and this build has
+  /// it.
+  explicit McapWriter(const std::filesystem::path& path, const std::string& profile = "ros2",
+                      bool compresses = false);
 
-  MessageEncoding encoding() const override { return MessageEncoding::kCdr; }
-  std::uint16_t add_channel(const std::string& topic, const MessageType& type) override;
-  void write(std::uint16_t channel, std::uint64_t time, const std::string& message) override;
-  void commit() override;
-
-  // For copies, which keep ids, times, chunks and compression.
-  struct MessageHead {
-    std::uint16_t channel = 0;
-    std::uint32_t sequence = 0;
-    std::uint64_t log_time = 0, publish_time = 0;  ///< ns
-  };
-  /// Adds the record of a schema or channel to the chunk at work.
-  void define(const std::string& record);
-  void write(const MessageHead& head, const char* data, std::size_t size);
-  void finish_chunk(const std::string& compression);
-  /// Copies a record outside of chunks. `index` is what its entry in the summary has behind its
-  /// place; without opcode, it has none.
+  /// At most 65,535 times.
+  std::uint16_t add_channel(const LogTopic& topic);
+  /// `time`: ns, when the message was recorded.
+  void write(std::uint16_t channel, std::uint64_t time, const MessageStamp& stamp,
+             Span<const char> message);
+  void write(std::uint16_t channel, std::uint64_t time, const std::string& message) {
+    write(channel, time, {time, 0}, message);
+  }
+  /// Copies a record that belongs to no channel. `index` is what its entry in the summary has
+  /// behind its place; without `index_opcode`, it has none.
   void copy_record(RawFile& source, std::uint64_t position, std::uint64_t size,
                    std::optional<mcap::Opcode> index_opcode, const std::string& index);
+  void commit();
 
  private:
   struct Entry {
@@ -57,14 +53,18 @@ class McapWriter final : public LogWriter {
     std::uint64_t indexes_size;
   };
 
+  std::uint16_t add_schema(const LogSchema& schema);
+  void define(const std::string& record);
+  void finish_chunk();
   void append(const std::string& bytes);
   std::string summary() const;
 
   AtomicFile file_;
+  bool compresses_;
   std::uint64_t position_ = 0;
-  std::string definitions_;        ///< records of schemas and channels
-  std::set<std::string> defined_;  ///< the same, each once
-  std::string records_;            ///< of the chunk at work
+  std::string definitions_;                       ///< records of schemas and channels
+  std::map<std::string, std::uint16_t> schemas_;  ///< id by content
+  std::string records_;                           ///< of the chunk at work
   std::map<std::uint16_t, std::vector<Entry>> index_;
   std::uint64_t first_time_ = 0;  ///< of the chunk at work
   std::uint64_t last_time_ = 0;   ///< of the chunk at work

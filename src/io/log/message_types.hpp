@@ -1,24 +1,20 @@
 // Types of the messages that are written.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "log_file.hpp"
 
 namespace dynains {
 
-struct MessageType {
-  std::string name;  ///< as in ROS 1, for example "tf2_msgs/TFMessage"
-  std::string md5;   ///< of the definition in ROS 1
-  std::string body;  ///< definition without std_msgs/Header
+/// Schema of a message of ROS 2, for example "tf2_msgs/msg/TFMessage"; with its definition if it is
+/// one of the types below.
+std::shared_ptr<const LogSchema> ros2_schema(const std::string& name);
 
-  /// Name in ROS 2, for example "tf2_msgs/msg/TFMessage".
-  std::string ros2_name() const;
-  /// The definition with those of all types in it.
-  std::string definition(MessageEncoding encoding) const;
-};
-
-const MessageType& point_cloud2_type();
-const MessageType& transforms_type();
+/// A topic of sensor_msgs/msg/PointCloud2.
+LogTopic cloud_topic(const std::string& name);
+/// A topic of tf2_msgs/msg/TFMessage.
+LogTopic transforms_topic(const std::string& name);
 
 }  // namespace dynains

@@ -47,11 +47,10 @@ class MessageWriter {
   std::string bytes_;
 };
 
-/// tf2_msgs/TFMessage with one transform; `time`: ns.
-inline std::string transform_message(MessageEncoding encoding, std::uint64_t time,
-                                     const std::string& parent, const std::string& child,
-                                     const Pose& T_parent_child) {
-  MessageWriter out(encoding);
+/// tf2_msgs/msg/TFMessage with one transform; `time`: ns.
+inline std::string transform_message(std::uint64_t time, const std::string& parent,
+                                     const std::string& child, const Pose& T_parent_child) {
+  MessageWriter out(MessageEncoding::kCdr);
   out.number(std::uint32_t{1});
   out.header(time, parent);
   out.string(child);
@@ -83,13 +82,12 @@ struct CloudLayout {
   }
 };
 
-/// sensor_msgs/PointCloud2 with one row; `points`: packed as in the layout; `time`: ns.
-inline std::string cloud_message(MessageEncoding encoding, std::uint64_t time,
-                                 const std::string& frame, const CloudLayout& layout,
-                                 const std::string& points) {
+/// sensor_msgs/msg/PointCloud2 with one row; `points`: packed as in the layout; `time`: ns.
+inline std::string cloud_message(std::uint64_t time, const std::string& frame,
+                                 const CloudLayout& layout, const std::string& points) {
   const std::uint32_t step = layout.point_size();
   const auto size = static_cast<std::uint32_t>(points.size());
-  MessageWriter out(encoding);
+  MessageWriter out(MessageEncoding::kCdr);
   out.header(time, frame);
   out.number(std::uint32_t{1});  // height
   out.number(size / step);

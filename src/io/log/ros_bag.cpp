@@ -5,8 +5,6 @@
 #include <utility>
 
 #include "../failure.hpp"
-#include "bag_writer.hpp"
-#include "message_editor.hpp"
 
 namespace dynains {
 namespace {
@@ -66,34 +64,10 @@ std::uint64_t read_time(Bytes& in) {
   return kSecond * seconds + in.number<std::uint32_t>("nanoseconds");
 }
 
-/// Copies the records of a chunk, or one of them. `block`: the byte of the chunk or record.
-void copy_records(Bytes records, std::uint64_t block, MessageEditor& editor, BagWriter& writer) {
-  while (records.remaining() > 0) {
-    LogMessage place;
-    place.block = block;
-    place.offset = records.position();
-    const auto* const begin = reinterpret_cast<const char*>(records.here());
-    const Bytes header = next_header(records);
-    const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
-    const auto opcode = number_in<std::uint8_t>(header, "op");
-    if (opcode != bag::kConnection && opcode != bag::kMessageData) continue;
-    const auto connection = number_in<std::uint32_t>(header, "conn");
-    if (opcode == bag::kConnection) {
-      writer.define(connection, std::string(begin, records.position() - place.offset));
-      continue;
-    }
-    Bytes time = field_of(header, "time");
-    place.time = read_time(time);
-    write_edited(editor, place, content.here(), content.remaining(),
-                 [&](const char* data, std::size_t size) {
-                   writer.write(connection, place.time, data, size);
-                 });
-  }
-}
-
 }  // namespace
 
 RosBag::RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
+  profile_ = "ros1";
   read_index(bag::kMagic, "expected \"#ROSBAG V2.0\" and the end of a line");
 }
 
@@ -175,7 +149,8 @@ std::optional<ChunkedLog::Message> RosBag::parse_record(Bytes& records) {
   if (opcode == bag::kConnection) take_connection(header, content);
   if (opcode != bag::kMessageData) return std::nullopt;
   Bytes time = field_of(header, "time");
-  return Message{number_in<std::uint32_t>(header, "conn"), read_time(time), content};
+  const std::uint64_t recorded = read_time(time);
+  return Message{number_in<std::uint32_t>(header, "conn"), recorded, {recorded, 0}, content};
 }
 
 void RosBag::take_connection(const Bytes& header, Bytes content) {
@@ -183,28 +158,15 @@ void RosBag::take_connection(const Bytes& header, Bytes content) {
   topic.name = text_in(header, "topic");
   topic.type = text_in(content, "type");
   topic.encoding = MessageEncoding::kRos1;
-  add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
-}
-
-void RosBag::copy(const std::filesystem::path& target, MessageEditor& editor) {
-  BagWriter writer(target);
-  std::uint64_t position = bag::kMagic.size();
-  while (const auto size = record_size(position)) {
-    constexpr std::uint64_t kLongestHead = 4096;
-    const auto head = file_.read(position, std::min(*size, kLongestHead), "a record");
-    Bytes rest(path_, position, head.data(), head.size());
-    const auto opcode = number_in<std::uint8_t>(next_header(rest), "op");
-    if (opcode == bag::kChunk) {
-      const std::vector<std::uint8_t>& records = load(position);
-      copy_records(Bytes(path_, 0, records.data(), records.size()), position, editor, writer);
-      writer.finish_chunk(compression_of(position));
-    } else if (opcode == bag::kConnection || opcode == bag::kMessageData) {
-      const auto record = file_.read(position, *size, "a record");
-      copy_records(Bytes(path_, position, record.data(), record.size()), position, editor, writer);
-    }
-    position += *size;
+  topic.message_encoding = "ros1";
+  const std::optional<Bytes> definition = find_field(content, "message_definition");
+  topic.schema = std::make_shared<LogSchema>(
+      LogSchema{topic.type, "ros1msg", definition ? definition->rest_as_text() : std::string()});
+  for (const std::string name : {"callerid", "latching", "md5sum"}) {
+    const std::optional<Bytes> value = find_field(content, name);
+    if (value) topic.metadata[name] = value->rest_as_text();
   }
-  writer.commit();
+  add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
 }
 
 }  // namespace dynains

@@ -10,7 +10,6 @@ namespace dynains {
 class RosBag final : public ChunkedLog {
  public:
   explicit RosBag(const std::filesystem::path& path);
-  void copy(const std::filesystem::path& target, MessageEditor& editor) override;
 
  private:
   std::optional<std::uint64_t> record_size(std::uint64_t position) override;

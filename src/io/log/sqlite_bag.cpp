@@ -10,9 +10,7 @@
 #include <utility>
 
 #include "../failure.hpp"
-#include "../input_file.hpp"
-#include "dynains/io/atomic_file.hpp"
-#include "message_editor.hpp"
+#include "message_types.hpp"
 #include "raw_file.hpp"
 
 namespace dynains {
@@ -23,7 +21,7 @@ std::string text_of(sqlite3_stmt* statement, int column) {
   return text == nullptr ? std::string() : reinterpret_cast<const char*>(text);
 }
 
-/// Without a journal beside it, the database is opened such that SQLite writes no file.
+/// Opened in this way, the database is read as it is, and SQLite writes no file beside it.
 std::string uri_of(const std::filesystem::path& path) {
   constexpr const char* kDigits = "0123456789ABCDEF";
   std::string uri = "file:";
@@ -35,8 +33,19 @@ std::string uri_of(const std::filesystem::path& path) {
       uri = uri + '%' + kDigits[byte / 16] + kDigits[byte % 16];
     }
   }
-  const bool has_journal = is_there(path.string() + "-wal") || is_there(path.string() + "-journal");
-  return uri + (has_journal ? "?mode=ro" : "?mode=ro&immutable=1");
+  return uri + "?mode=ro&immutable=1";
+}
+
+/// A recorder that was killed leaves a journal, without which its database is not consistent.
+void refuse_journal(const std::filesystem::path& path) {
+  for (const char* const suffix : {"-wal", "-journal"}) {
+    std::error_code error;
+    const std::filesystem::path journal = path.string() + suffix;
+    if (std::filesystem::file_size(journal, error) == 0 || error) continue;
+    fail(path, "is incomplete without " + journal.filename().string() +
+                   ", which its recorder left; join them: sqlite3 FILE 'PRAGMA journal_mode = "
+                   "DELETE'");
+  }
 }
 
 /// Whether the file has fewer bytes than the pages that its header counts.
@@ -63,32 +72,41 @@ int spend(void* budget) { return --*static_cast<std::int64_t*>(budget) < 0 ? 1 :
 
 std::string row_of(std::int64_t row) { return "row " + std::to_string(row) + " of messages: "; }
 
-constexpr const char* kUnreadable = "cannot be read";
-constexpr const char* kNotWritable = "cannot be written";
+const std::string kExpected = "expected the tables of rosbag2: ";
 
-/// SQL that is stored in the database does not run.
-void refuse_programs(sqlite3* database) {
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+[[noreturn]] void fail_by_database(const SqliteDatabase& database,
+                                   const std::filesystem::path& path) {
+  fail(path, std::string("cannot be read: ") + sqlite3_errmsg(database.get()));
 }
 
-void execute(const SqliteDatabase& database, const char* sql, const std::filesystem::path& path) {
-  if (sqlite3_exec(database.get(), sql, nullptr, nullptr, nullptr) == SQLITE_OK) return;
-  fail_by_database(database, path, kNotWritable);
+SqliteDatabase open_database(const std::filesystem::path& path) {
+  sqlite3* database = nullptr;
+  const int result = sqlite3_open_v2(uri_of(path).c_str(), &database,
+                                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  SqliteDatabase owner(database);
+  if (result != SQLITE_OK) fail(path, std::string("cannot be opened: ") + sqlite3_errstr(result));
+  return owner;
 }
 
 }  // namespace
 
+void CloseDatabase::operator()(sqlite3* database) const { sqlite3_close(database); }
+void FinishStatement::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
 SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
+  profile_ = "ros2";
   const bool is_cut_off = is_shorter_than_announced(path);
-  database_ =
-      open_database(uri_of(path), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, path, "cannot be opened");
+  refuse_journal(path);
+  database_ = open_database(path);
   limit(RawFile(path).size());
   // Lets SQLite read a database that is shorter than its header says. Nothing is written.
   step(prepare("PRAGMA writable_schema = ON").get());
-  check_table("topics");
-  check_table("messages");
+  const auto columns = columns_of("messages");
+  if (columns.empty()) fail(path_, kExpected + "messages is no table");
+  const auto key = columns.find("id");
+  if (key == columns.end() || !key->second) {
+    fail(path_, kExpected + "id is no primary key of messages");
+  }
   select_message_ = prepare("SELECT data FROM messages WHERE id = ?");
   read_topics();
   read_messages();
@@ -103,35 +121,36 @@ void SqliteBag::limit(std::uint64_t size) {
   constexpr std::uint64_t kLeast = 1U << 20U;
   constexpr std::uint64_t kMost = 1U << 30U;
   sqlite3* const database = database_.get();
-  refuse_programs(database);
+  for (const int program : {SQLITE_DBCONFIG_ENABLE_VIEW, SQLITE_DBCONFIG_ENABLE_TRIGGER,
+                            SQLITE_DBCONFIG_TRUSTED_SCHEMA}) {
+    sqlite3_db_config(database, program, 0, nullptr);
+  }
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::clamp(size, kLeast, kMost)));
   most_rows_ = size;
   budget_ = static_cast<std::int64_t>(100 + size / 1000);
   sqlite3_progress_handler(database, kStepsOfProgress, spend, &budget_);
 }
 
-/// Throws unless `table` is a table with stored columns and, if it has messages, found by id.
-void SqliteBag::check_table(const std::string& table) {
-  const SqliteStatement kind = prepare(
-      ("SELECT sql FROM sqlite_master WHERE type = 'table' AND name = '" + table + "'").c_str());
-  const bool is_table = step(kind.get());
+/// Names of the columns of a table, and whether each is the primary key; none without such a
+/// table. Throws unless it is one of stored columns.
+std::map<std::string, bool> SqliteBag::columns_of(const std::string& table) {
+  const SqliteStatement kind =
+      prepare("SELECT type, sql FROM sqlite_master WHERE name = '" + table + "'");
+  if (!step(kind.get())) return {};
   constexpr std::string_view kVirtual = "CREATE VIRTUAL";
-  const std::string sql = is_table ? text_of(kind.get(), 0) : std::string();
-  if (!is_table || sql.compare(0, kVirtual.size(), kVirtual) == 0) {
-    fail(path_, "expected the tables of rosbag2: " + table + " is no table");
+  if (text_of(kind.get(), 0) != "table" ||
+      text_of(kind.get(), 1).compare(0, kVirtual.size(), kVirtual) == 0) {
+    fail(path_, kExpected + table + " is no table");
   }
-  const SqliteStatement columns = prepare(("PRAGMA table_xinfo(" + table + ")").c_str());
-  bool has_key = false;
-  while (step(columns.get())) {
-    const std::string column = text_of(columns.get(), 1);
-    has_key = has_key || (column == "id" && sqlite3_column_int(columns.get(), 5) == 1);
-    if (sqlite3_column_int(columns.get(), 6) == 0) continue;
-    fail(path_,
-         "expected the tables of rosbag2: column " + column + " of " + table + " is computed");
+  const SqliteStatement rows = prepare("PRAGMA table_xinfo(" + table + ")");
+  std::map<std::string, bool> columns;
+  while (step(rows.get())) {
+    const std::string column = text_of(rows.get(), 1);
+    columns[column] = sqlite3_column_int(rows.get(), 5) == 1;
+    if (sqlite3_column_int(rows.get(), 6) == 0) continue;
+    fail(path_, kExpected + "column " + column + " of " + table + " is computed");
   }
-  if (table == "messages" && !has_key) {
-    fail(path_, "expected the tables of rosbag2: id is no primary key of messages");
-  }
+  return columns;
 }
 
 /// Counts a row that was read. A file with loops or links among its pages has rows without end.
@@ -139,15 +158,42 @@ void SqliteBag::count_row() {
   if (most_rows_-- == 0) fail(path_, "has more rows than its size allows");
 }
 
+/// Definitions by type, which ROS 2 writes since Iron.
+std::map<std::string, std::shared_ptr<const LogSchema>> SqliteBag::read_schemas() {
+  std::map<std::string, std::shared_ptr<const LogSchema>> schemas;
+  if (columns_of("message_definitions").empty()) return schemas;
+  const SqliteStatement rows =
+      prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions");
+  while (step(rows.get())) {
+    count_row();
+    const std::string type = text_of(rows.get(), 0);
+    schemas[type] = std::make_shared<LogSchema>(
+        LogSchema{type, text_of(rows.get(), 1), text_of(rows.get(), 2)});
+  }
+  return schemas;
+}
+
 void SqliteBag::read_topics() {
-  const SqliteStatement topics = prepare("SELECT id, name, type, serialization_format FROM topics");
+  const auto columns = columns_of("topics");
+  if (columns.empty()) fail(path_, kExpected + "topics is no table");
+  const auto schemas = read_schemas();
+  constexpr const char* kQos = "offered_qos_profiles";
+  const bool has_qos = columns.count(kQos) > 0;
+  const SqliteStatement topics =
+      prepare(std::string("SELECT id, name, type, serialization_format, ") +
+              (has_qos ? kQos : "''") + " FROM topics");
   while (step(topics.get())) {
     count_row();
     LogTopic topic;
     topic.name = text_of(topics.get(), 1);
-    topic.type = plain_type(text_of(topics.get(), 2));
+    const std::string type = text_of(topics.get(), 2);
+    topic.type = plain_type(type);
+    topic.message_encoding = text_of(topics.get(), 3);
     topic.encoding =
-        text_of(topics.get(), 3) == "cdr" ? MessageEncoding::kCdr : MessageEncoding::kOther;
+        topic.message_encoding == "cdr" ? MessageEncoding::kCdr : MessageEncoding::kOther;
+    const auto schema = schemas.find(type);
+    topic.schema = schema == schemas.end() ? ros2_schema(type) : schema->second;
+    if (has_qos) topic.metadata[kQos] = text_of(topics.get(), 4);
     topic_of_[sqlite3_column_int64(topics.get(), 0)] = add_topic(topic);
   }
 }
@@ -166,7 +212,7 @@ void SqliteBag::read_messages() {
                          static_cast<std::uint64_t>(row), 0, topic->second, 0});
   }
   if (result == SQLITE_DONE) return;
-  if (result != SQLITE_CORRUPT) fail_by_database(database_, path_, kUnreadable);
+  if (result != SQLITE_CORRUPT) fail_by_database(database_, path_);
   early_end_ = path_.string() + ": " + row_of(row) + "the log ends early behind it";
 }
 
@@ -187,79 +233,31 @@ int SqliteBag::select(const LogMessage& message) {
   return sqlite3_step(select_message_.get());
 }
 
-void SqliteBag::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
+MessageStamp SqliteBag::read(const LogMessage& message, std::vector<std::uint8_t>& bytes) {
   const int result = select(message);
   if (result == SQLITE_DONE) {
     fail(path_, row_of(static_cast<std::int64_t>(message.block)) + "expected a message");
   }
-  if (result != SQLITE_ROW) fail_by_database(database_, path_, kUnreadable);
+  if (result != SQLITE_ROW) fail_by_database(database_, path_);
   sqlite3_stmt* const statement = select_message_.get();
   const auto* const data = static_cast<const std::uint8_t*>(sqlite3_column_blob(statement, 0));
   bytes.assign(data, data + sqlite3_column_bytes(statement, 0));
+  return {message.time, 0};
 }
 
-SqliteStatement SqliteBag::prepare(const char* sql) {
-  return prepare_statement(database_, sql, path_, "expected the tables of rosbag2");
+SqliteStatement SqliteBag::prepare(const std::string& sql) {
+  sqlite3_stmt* statement = nullptr;
+  if (sqlite3_prepare_v2(database_.get(), sql.c_str(), -1, &statement, nullptr) != SQLITE_OK) {
+    fail(path_, kExpected + sqlite3_errmsg(database_.get()));
+  }
+  return SqliteStatement(statement);
 }
 
 bool SqliteBag::step(sqlite3_stmt* statement) {
   const int result = sqlite3_step(statement);
   if (result == SQLITE_ROW) return true;
-  if (result != SQLITE_DONE) fail_by_database(database_, path_, kUnreadable);
+  if (result != SQLITE_DONE) fail_by_database(database_, path_);
   return false;
-}
-
-/// Copies all pages, so that every table stays as it is, and replaces messages afterwards.
-void SqliteBag::copy(const std::filesystem::path& target, MessageEditor& editor) {
-  if (early_end_) fail(path_, "ends early; expected a whole database for a copy");
-  AtomicFile file(target);
-  SqliteDatabase copy =
-      open_database(file.temporary_path(), SQLITE_OPEN_READWRITE, target, kNotWritable);
-  refuse_programs(copy.get());
-  copy_pages(copy, target, editor);
-  // The file takes its name when it is whole: a journal would have no use. What leaves a message
-  // is overwritten by zeros.
-  for (const char* const sql : {"PRAGMA journal_mode = OFF", "PRAGMA synchronous = OFF",
-                                "PRAGMA secure_delete = ON", "BEGIN"}) {
-    execute(copy, sql, target);
-  }
-  SqliteStatement update =
-      prepare_statement(copy, "UPDATE messages SET data = ? WHERE id = ?", target, kNotWritable);
-  std::vector<std::uint8_t> bytes;
-  for (const LogMessage& message : messages_) {
-    if (!editor.changes(message)) continue;
-    read(message, bytes);
-    const std::string edited = editor.edited(message, bytes);
-    sqlite3_reset(update.get());
-    sqlite3_bind_blob64(update.get(), 1, edited.data(), edited.size(), SQLITE_STATIC);
-    sqlite3_bind_int64(update.get(), 2, static_cast<std::int64_t>(message.block));
-    if (sqlite3_step(update.get()) != SQLITE_DONE) fail_by_database(copy, target, kNotWritable);
-    sqlite3_clear_bindings(update.get());
-  }
-  update.reset();
-  execute(copy, "COMMIT", target);
-  if (sqlite3_close(copy.release()) != SQLITE_OK) fail(target, "cannot be written to the end");
-  file.commit();
-}
-
-void SqliteBag::copy_pages(const SqliteDatabase& copy, const std::filesystem::path& target,
-                           MessageEditor& editor) {
-  constexpr int kPages = 4096;
-  sqlite3_backup* const backup = sqlite3_backup_init(copy.get(), "main", database_.get(), "main");
-  if (backup == nullptr) fail_by_database(copy, target, kNotWritable);
-  int result = SQLITE_OK;
-  const auto finish = [&] { return sqlite3_backup_finish(backup); };
-  try {
-    while (result == SQLITE_OK) {
-      editor.pause();
-      budget_ = std::max<std::int64_t>(budget_, 100);
-      result = sqlite3_backup_step(backup, kPages);
-    }
-  } catch (...) {
-    finish();
-    throw;
-  }
-  if (finish() != SQLITE_OK || result != SQLITE_DONE) fail_by_database(copy, target, kNotWritable);
 }
 
 }  // namespace dynains
