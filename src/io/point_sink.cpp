@@ -17,6 +17,9 @@ constexpr Alias kAliases[] = {
     {"x", Role::kX},
     {"y", Role::kY},
     {"z", Role::kZ},
+    {"points_m_xyz:0", Role::kX},  // tables of VeloView
+    {"points_m_xyz:1", Role::kY},
+    {"points_m_xyz:2", Role::kZ},
     {"intensity", Role::kIntensity},
     {"i", Role::kIntensity},
     {"reflectivity", Role::kIntensity},

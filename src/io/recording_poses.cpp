@@ -179,13 +179,9 @@ void Recording::read_poses() {
 }
 
 std::optional<std::vector<double>> Recording::times_of_names() const {
-  std::vector<double> times;
-  for (const Scan& scan : scans_) {
-    const std::optional<double> time = time_of_name(scan.name);
-    if (!time) return std::nullopt;
-    times.push_back(*time);
-  }
-  return times;
+  std::vector<std::string> names;
+  for (const Scan& scan : scans_) names.push_back(scan.name);
+  return dynains::times_of_names(names);
 }
 
 /// Times of the scan files from a file of times or from their names.

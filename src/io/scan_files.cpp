@@ -48,6 +48,28 @@ bool is_before(const std::string& a, const std::string& b) {
   return a_ends == b_ends ? a < b : a_ends;
 }
 
+/// Time that a name is: seconds with a decimal point, of which the fraction counts nanoseconds if
+/// `counts_nanoseconds`; 10 to 19 digits for s, ms, us or ns since 1970; or SECONDS_NANOSECONDS.
+std::optional<double> time_of_name(const std::string& name, bool counts_nanoseconds) {
+  const auto digits = [](std::string_view text) {
+    return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+  };
+  const std::size_t separator = name.find_first_of("._-");
+  if (separator == std::string::npos) {
+    if (!digits(name) || name.size() < 10 || name.size() > 19 || name.front() == '0') {
+      return std::nullopt;
+    }
+    return to_seconds(*text::parse_number(name));
+  }
+  const std::string whole = name.substr(0, separator);
+  const std::string part = name.substr(separator + 1);
+  if (!digits(whole) || !digits(part) || whole.size() > 12 || part.size() > 9) return std::nullopt;
+  if (name[separator] == '.' && !counts_nanoseconds) return text::parse_number(name);
+  // SECONDS_NANOSECONDS, as the stamps of ROS have it.
+  if (name[separator] != '.' && whole.size() != 10) return std::nullopt;
+  return *text::parse_number(whole) + 1e-9 * *text::parse_number(part);
+}
+
 }  // namespace
 
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
@@ -104,27 +126,30 @@ std::optional<std::string> conversion_of_scans(const fs::path& folder) {
 }
 
 bool is_number(const std::string& name) {
-  return name.size() <= 9 && std::all_of(name.begin(), name.end(), is_digit);
+  const std::size_t zeros = std::min(name.find_first_not_of('0'), name.size());
+  return name.size() - zeros <= 9 && std::all_of(name.begin(), name.end(), is_digit);
 }
 
-std::optional<double> time_of_name(const std::string& name) {
-  const auto digits = [](std::string_view text) {
-    return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names) {
+  const auto fraction_of = [](const std::string& name) {
+    const std::size_t point = name.find('.');
+    return point == std::string::npos ? std::string() : name.substr(point + 1);
   };
-  const std::size_t separator = name.find_first_of("._-");
-  if (separator == std::string::npos) {
-    if (!digits(name) || name.size() < 10 || name.size() > 19 || name.front() == '0') {
-      return std::nullopt;
-    }
-    return to_seconds(*text::parse_number(name));
+  constexpr std::size_t kDigits = 9;  // of nanoseconds
+  const bool are_long = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return fraction_of(name).size() == kDigits;
+  });
+  const bool have_zeros = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    const std::string fraction = fraction_of(name);
+    return fraction.size() > 1 && fraction.front() == '0';
+  });
+  std::vector<double> times;
+  for (const std::string& name : names) {
+    const std::optional<double> time = time_of_name(name, are_long && !have_zeros);
+    if (!time) return std::nullopt;
+    times.push_back(*time);
   }
-  const std::string whole = name.substr(0, separator);
-  const std::string part = name.substr(separator + 1);
-  if (!digits(whole) || !digits(part) || whole.size() > 12 || part.size() > 9) return std::nullopt;
-  if (name[separator] == '.') return text::parse_number(name);
-  // SECONDS_NANOSECONDS, as the stamps of ROS have it.
-  if (whole.size() != 10) return std::nullopt;
-  return *text::parse_number(whole) + 1e-9 * *text::parse_number(part);
+  return times;
 }
 
 }  // namespace dynains

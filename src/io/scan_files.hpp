@@ -26,11 +26,13 @@ std::vector<std::filesystem::path> scan_files(const std::filesystem::path& folde
 /// The file name without extensions.
 std::string name_of_scan(const std::filesystem::path& file);
 
-/// Whether a name is a number, of at most 9 digits.
+/// Whether a name is a number, of at most 9 digits behind leading zeros.
 bool is_number(const std::string& name);
 
-/// Time in seconds of a name that is a time.
-std::optional<double> time_of_name(const std::string& name);
+/// Times in seconds of names that all are times: seconds with a decimal point; at least 10 digits:
+/// s, ms, us or ns since 1970; SECONDS_NANOSECONDS. Behind a decimal point, up to nine digits of
+/// which none begin with 0 count nanoseconds, as some recorders write them without leading zeros.
+std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names);
 
 /// For a folder whose only scans are in known formats that are not read: how to convert them.
 std::optional<std::string> conversion_of_scans(const std::filesystem::path& folder);

@@ -23,7 +23,8 @@ constexpr const char* kExpectedColumns =
 struct Columns {
   std::size_t count = 0;
   std::size_t time = kNoColumn;
-  std::size_t matrix = kNoColumn;  ///< first of 12 or 16 numbers
+  std::size_t nanoseconds = kNoColumn;  ///< beside seconds
+  std::size_t matrix = kNoColumn;       ///< first of 12 or 16 numbers
   std::array<std::size_t, 3> position{kNoColumn, kNoColumn, kNoColumn};
   std::array<std::size_t, 4> rotation{kNoColumn, kNoColumn, kNoColumn, kNoColumn};  ///< x y z w
   QuaternionOrder order = QuaternionOrder::kNone;
@@ -69,7 +70,9 @@ void add_column(const std::string& cell, std::size_t index, Columns& columns) {
   const auto claim = [index](std::size_t& column) {
     if (column == kNoColumn) column = index;
   };
-  if (name == "t" || contains(name, "time") || contains(name, "stamp") || name == "sec") {
+  if (name == "nsec" || name == "nanosec" || name == "nsecs") return claim(columns.nanoseconds);
+  if (name == "t" || contains(name, "time") || contains(name, "stamp") || name == "sec" ||
+      name == "secs") {
     claim(columns.time);
     return;
   }
@@ -187,7 +190,10 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
     }
     trajectory.poses.push_back(pose_of(reader, cells, columns));
     if (columns.time == kNoColumn) continue;
-    const double time = to_seconds(number_in(reader, cells, columns.time));
+    double time = to_seconds(number_in(reader, cells, columns.time));
+    if (columns.nanoseconds != kNoColumn) {
+      time += 1e-9 * number_in(reader, cells, columns.nanoseconds);
+    }
     if (!trajectory.times.empty() && !(time > trajectory.times.back())) {
       reader.fail_on_line("expected a time after that of the row before");
     }

@@ -331,6 +331,8 @@ TEST_CASE("Text: columns by order or by name, with any separator") {
   check_two_points(read("a.csv", "1,2,3,0.5,9\r\n4, 5, 6, 0.25, 9"));
   check_two_points(
       read("a.csv", "\"X\";\"Y\";\"Z\";\"colour\";\"Intensity\"\n1;2;3;9;0.5\n4;5;6;9;0.25\n"));
+  check_two_points(read(
+      "a.csv", "Points_m_XYZ:0,Points_m_XYZ:1,Points_m_XYZ:2,intensity\n1,2,3,0.5\n4,5,6,0.25\n"));
   check_two_points(read("a.xyz", "# x y z i\n# a comment\n1 2 3 0.5\n4 5 6 0.25\n"));
   check_two_points(read("a.xyz", "//X Y Z intensity\n1 2 3 0.5\n4 5 6 0.25\n"));
   check_two_points(read("a.xyz", "# from a scanner\n1 2 3 0.5\n4 5 6 0.25\n"));

@@ -529,8 +529,9 @@ TEST_CASE("Poses may begin with a mark of UTF-8") {
 
 TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
   const TemporaryFolder folder;
+  const std::string scans = GENERATE("velodyne", "velodyne_points/data");
   for (const char* name : {"0000000001", "0000000002", "0000000004"}) {
-    write_text(folder / "velodyne" / (std::string(name) + ".bin"), std::string(16, 'B'));
+    write_text(folder / scans / (std::string(name) + ".bin"), std::string(16, 'B'));
   }
   write_text(folder / "poses.txt", "1 " + row12(10) + "3 " + row12(30) + "4 " + row12(40));
   const Recording recording(folder.path());
@@ -541,6 +542,28 @@ TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
   // Times of a matrix are no numbers of scans.
   write_text(folder / "poses.txt", "0.5 " + row12(10) + "1.5 " + row12(30) + "4 " + row12(40));
   CHECK(Recording(folder.path()).time(2) == 4.0);
+}
+
+TEST_CASE("Digits behind the point of a name are decimals, or nanoseconds without leading zeros") {
+  const auto times = [](const std::vector<std::string>& names) {
+    const TemporaryFolder folder;
+    for (const std::string& name : names) write_text(folder / (name + ".pcd"), pcd({1, 0, 0}));
+    RecordingOptions options;
+    options.without_poses = true;
+    const Recording recording(folder.path(), options);
+    REQUIRE(recording.size() == 2);
+    return std::pair(recording.time(0), recording.time(1));
+  };
+  constexpr double kSecond = 1700000000.0;
+  const auto check = [&](const std::vector<std::string>& names, double first, double second) {
+    const auto [a, b] = times(names);
+    CHECK(a - kSecond == Approx(first).margin(1e-6));
+    CHECK(b - kSecond == Approx(second).margin(1e-6));
+  };
+  check({"1700000000.11149430", "1700000000.111494300"}, 0.01114943, 0.1114943);
+  check({"1700000000.011149430", "1700000000.111494300"}, 0.01114943, 0.1114943);
+  check({"1700000000.25", "1700000001.5"}, 0.25, 1.5);
+  check({"1700000000.011149430", "1700000001.5"}, 0.01114943, 1.5);
 }
 
 TEST_CASE("Names of 19 digits are times") {

@@ -124,6 +124,7 @@ TEST_CASE("Clouds may be big-endian, and their row step may be that of another c
 TEST_CASE("Absolute times of points become relative to the stamp") {
   ByteWriter data;
   for (int i = 0; i < 2; ++i) data.raw(xyz_of({1, 2, 3})).number(1000.0 + 0.05 * i);
+  data.raw(xyz_of({0, 0, 0})).number(0.0);  // without a return
   std::vector<CloudField> fields = kXyz;
   fields.push_back({"timestamp", 12, 8});
   const RecordedScan scan =

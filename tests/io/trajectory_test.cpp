@@ -49,6 +49,8 @@ TEST_CASE("Every form of a trajectory gives the same pose") {
       {"#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y "
        "[], q_RS_z [], v_x [m/s]\n5.5,1,2,3,0.70710678,0,0,0.70710678,9\n",
        true, QuaternionOrder::kWxyz},
+      {"#sec,nsec,x,y,z,qx,qy,qz,qw\n5,500000000,1,2,3,0,0,0.70710678,0.70710678\n", true,
+       QuaternionOrder::kXyzw},
       {"name;pos_x;pos_y;pos_z;orientation.x;orientation.y;orientation.z;orientation.w\n"
        "a;1;2;3;0;0;0.70710678;0.70710678\n",
        false, QuaternionOrder::kXyzw},

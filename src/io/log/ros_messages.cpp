@@ -66,9 +66,9 @@ StampedPose read_transform(MessageReader& in) {
 PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
   constexpr double kLongestOffset = 10.0;  // s
   constexpr double kNanoseconds = 1e14;    // of an absolute time; as seconds it is in year 3170000
-  double least = std::numeric_limits<double>::infinity();
+  double least = 0.0;                      // of points with a return; others may have the time 0
   for (const double time : times) {
-    if (std::isfinite(time)) least = std::min(least, time);
+    if (std::isfinite(time) && time != 0.0 && (least == 0.0 || time < least)) least = time;
   }
   PointClock clock;
   clock.unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
