@@ -1,6 +1,7 @@
 #include "byte_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <system_error>
 
 #include "failure.hpp"
@@ -36,11 +37,18 @@ bool ByteReader::read_line(std::string& text) {
 }
 
 void ByteReader::read(char* target, std::size_t count, const char* purpose) {
-  file_.read(target, static_cast<std::streamsize>(count));
-  const auto got = static_cast<std::uint64_t>(file_.gcount());
-  position_ += got;
-  if (got != count && position_ < size_) fail_to_read(file_, path_, position_, size_);
-  if (got != count) fail_here(std::string("file ends, expected ") + purpose);
+  // Some processors copy from files to unaligned memory four times slower than to aligned memory.
+  alignas(64) std::array<char, std::size_t{1} << 16U> piece;
+  while (count > 0) {
+    const std::size_t wanted = std::min(piece.size(), count);
+    file_.read(piece.data(), static_cast<std::streamsize>(wanted));
+    const auto got = static_cast<std::size_t>(file_.gcount());
+    position_ += got;
+    if (got != wanted && position_ < size_) fail_to_read(file_, path_, position_, size_);
+    if (got != wanted) fail_here(std::string("file ends, expected ") + purpose);
+    target = std::copy_n(piece.data(), wanted, target);
+    count -= wanted;
+  }
 }
 
 std::string ByteReader::read_block(std::uint64_t count, const char* purpose) {

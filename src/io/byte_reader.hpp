@@ -26,6 +26,11 @@ class ByteReader {
 
   /// Reads exactly `count` bytes. Throws IoError with `purpose` if the file ends before.
   void read(char* target, std::size_t count, const char* purpose);
+  /// Reads `count` numbers.
+  template <class Number>
+  void read(Number* values, std::size_t count, const char* purpose) {
+    read(reinterpret_cast<char*>(values), count * sizeof(Number), purpose);
+  }
   std::string read_block(std::uint64_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
 

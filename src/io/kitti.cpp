@@ -2,9 +2,9 @@
 
 #include <system_error>
 
+#include "byte_reader.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "failure.hpp"
-#include "sequential_file.hpp"
 #include "text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
@@ -28,7 +28,7 @@ std::uintmax_t size_of(const fs::path& path) {
 /// Fills `values` from a file that must have exactly that size.
 template <class T>
 void read_all(const fs::path& path, std::vector<T>& values) {
-  SequentialFile(path, values.size() * sizeof(T)).read(values.data(), values.size());
+  ByteReader(path).read(values.data(), values.size(), "its size");
 }
 
 template <class T>
