@@ -16,8 +16,8 @@ inline constexpr std::uint64_t kLargestRatio = 1000;
 std::uint64_t most_decompressed(std::uint64_t compressed);
 
 /// Decompresses all of `input` into `output`, which ends with exactly `size` bytes. `method` is
-/// "lz4" (frame format), "zstd" or "bz2". Memory grows with the bytes that are
-/// really there, not with `size`. Returns an empty text, or the reason why that is not possible.
+/// "lz4" (frame format), "zstd" or "bz2". Returns an empty text, or the reason why that is not
+/// possible: a `size` above most_decompressed() is one.
 std::string decompress(const std::string& method, const std::vector<std::uint8_t>& input,
                        std::uint64_t size, std::vector<std::uint8_t>& output);
 
