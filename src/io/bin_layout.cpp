@@ -86,14 +86,15 @@ std::string to_text(const BinLayout& layout) {
   return std::to_string(layout.columns) + " columns of " + type;
 }
 
-std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout) {
+std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout,
+                               bool names_others) {
   std::error_code error;
   const std::uint64_t bytes = std::filesystem::file_size(file, error);
   if (error) fail(file, "cannot be read: " + error.message());
   if (bytes % point_size(layout) == 0) return bytes / point_size(layout);
   std::string fitting;
   for (const BinLayout& other : kOthers) {
-    if (bytes % point_size(other) != 0) continue;
+    if (!names_others || bytes % point_size(other) != 0) continue;
     fitting += (fitting.empty() ? "; if it is whole: " : ", ") +
                std::to_string(bytes / point_size(other)) + " points of " + to_text(other) + " by " +
                option_of(other);
@@ -103,7 +104,7 @@ std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayou
 }
 
 void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
-                     std::vector<float>& xyzi) {
+                     std::vector<float>& xyzi, std::vector<std::uint16_t>* ring) {
   const std::uint64_t count = count_bin_points(file, layout);
   const auto bytes = RawFile(file).read(0, count * point_size(layout), "points");
   const auto columns = std::min<std::size_t>(4, static_cast<std::size_t>(layout.columns));
@@ -112,6 +113,10 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
     for (std::size_t column = 0; column < columns; ++column) {
       xyzi[4 * i + column] = static_cast<float>(value_at(bytes, layout, i, column));
     }
+    if (ring == nullptr) continue;
+    const double value = value_at(bytes, layout, i, columns);
+    ring->push_back(value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value)
+                                                     : std::uint16_t{0});
   }
 }
 

@@ -21,13 +21,15 @@ inline std::size_t point_size(const BinLayout& layout) {
 /// "float32 x y z intensity", "5 columns of float32".
 std::string to_text(const BinLayout& layout);
 
-/// Number of points by the size of the file. Throws IoError, which names other layouts that fit,
-/// unless the size is a multiple of that of a point.
-std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout);
+/// Number of points by the size of the file. Throws IoError, which names other layouts that fit if
+/// `names_others`, unless the size is a multiple of that of a point.
+std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout,
+                               bool names_others = true);
 
 /// Reads x y z intensity of each point, interleaved; without a fourth column, intensities are 0.
+/// `ring`: the fifth column, if it is one.
 void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
-                     std::vector<float>& xyzi);
+                     std::vector<float>& xyzi, std::vector<std::uint16_t>* ring = nullptr);
 
 /// Throws IoError if the content of the file does not look like float32 x y z intensity, and for
 /// another layout: numbers are as points have them only as float64, or neighbours in the file are

@@ -1,6 +1,5 @@
 #include "scan_reader.hpp"
 
-#include <cstring>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -10,7 +9,6 @@
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
 #include "log/log_scans.hpp"
-#include "log/raw_file.hpp"
 #include "point_readers.hpp"
 
 namespace dynains {
@@ -24,26 +22,28 @@ void transform(const FileTransform* T_target_file, RecordedScan& points) {
   }
 }
 
-/// .bin: float32 x y z intensity, or other columns.
+/// .bin: float32 x y z intensity, or other columns; .pcd.bin of nuScenes has a ring behind them.
 class BinReader final : public ScanReader {
  public:
-  explicit BinReader(const BinLayout& layout) : layout_(layout) {}
+  BinReader(const BinLayout& layout, bool has_ring) : layout_(layout), has_ring_(has_ring) {}
 
   PointColumns columns(const ScanAddress&) const override {
     PointColumns columns;
     columns.intensity = layout_.columns > 3;
+    columns.ring = has_ring_;
     return columns;
   }
-  void check(const ScanAddress& scan) const override { count_bin_points(scan.file, layout_); }
+  void check(const ScanAddress& scan) const override { point_count(scan); }
   std::uint64_t point_count(const ScanAddress& scan) const override {
-    return count_bin_points(scan.file, layout_);
+    return count_bin_points(scan.file, layout_, !has_ring_);
   }
   void read(const ScanAddress& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     points.ring.clear();
     points.time.clear();
     const bool is_usual = layout_.columns == 4 && !layout_.is_double;
-    is_usual ? read_scan(scan.file, points.xyzi) : read_bin_points(scan.file, layout_, points.xyzi);
+    is_usual ? read_scan(scan.file, points.xyzi)
+             : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
     transform(T_target_file, points);
   }
   OtherValues read_other_values(const ScanAddress&) const override { return {}; }
@@ -53,47 +53,7 @@ class BinReader final : public ScanReader {
 
  private:
   BinLayout layout_;
-};
-
-/// .pcd.bin: float32 x y z intensity ring.
-class NuScenesReader final : public ScanReader {
- public:
-  PointColumns columns(const ScanAddress&) const override {
-    PointColumns columns;
-    columns.intensity = true;
-    columns.ring = true;
-    return columns;
-  }
-  void check(const ScanAddress& scan) const override { point_count(scan); }
-  std::uint64_t point_count(const ScanAddress& scan) const override {
-    const std::uint64_t bytes = RawFile(scan.file).size();
-    if (bytes % kPoint == 0) return bytes / kPoint;
-    fail(scan.file, "has " + std::to_string(bytes) +
-                        " bytes, expected a multiple of 20: float32 x y z intensity ring");
-  }
-  void read(const ScanAddress& scan, const FileTransform* T_target_file,
-            RecordedScan& points) const override {
-    const std::uint64_t count = point_count(scan);
-    const auto bytes = RawFile(scan.file).read(0, count * kPoint, "points");
-    points.xyzi.resize(4 * count);
-    points.ring.resize(count);
-    points.time.clear();
-    for (std::size_t i = 0; i < count; ++i) {
-      float ring;
-      std::memcpy(points.xyzi.data() + 4 * i, bytes.data() + kPoint * i, 4 * sizeof(float));
-      std::memcpy(&ring, bytes.data() + kPoint * i + 4 * sizeof(float), sizeof(float));
-      points.ring[i] =
-          ring >= 0.0F && ring <= 65535.0F ? static_cast<std::uint16_t>(ring) : std::uint16_t{0};
-    }
-    transform(T_target_file, points);
-  }
-  OtherValues read_other_values(const ScanAddress&) const override { return {}; }
-  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
-    fail(scan.file, "has no labels");
-  }
-
- private:
-  static constexpr std::uint64_t kPoint = 5 * sizeof(float);  // bytes
+  bool has_ring_;
 };
 
 /// Files of read_points().
@@ -168,8 +128,9 @@ class LogReader final : public ScanReader {
 }  // namespace
 
 std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout) {
-  if (format == ScanFormat::kBin) return std::make_unique<BinReader>(layout);
-  if (format == ScanFormat::kNuScenes) return std::make_unique<NuScenesReader>();
+  constexpr BinLayout kNuScenes{5, false};
+  if (format == ScanFormat::kBin) return std::make_unique<BinReader>(layout, false);
+  if (format == ScanFormat::kNuScenes) return std::make_unique<BinReader>(kNuScenes, true);
   return std::make_unique<PointFileReader>();
 }
 std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans) {
