@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "dynains/evidence/symmetric_eigen.hpp"
+#include "symmetric_eigen.hpp"
 
 namespace dynains::odometry {
 namespace {

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dynains/evidence/normal_equations.hpp"
-#include "dynains/evidence/symmetric_eigen.hpp"
+#include "dynains/registration/normal_equations.hpp"
+#include "symmetric_eigen.hpp"
 
 namespace dynains::odometry {
 namespace {
 
-using detail::NormalEquations;
+using NormalEquations = detail::NormalEquations<6>;
 using Vector = NormalEquations::Vector;
 
 constexpr double kFinest = 0.1;  // m, scale at which alignments are compared
@@ -75,9 +75,7 @@ Step solve(const NormalEquations& equations) {
   detail::SymmetricEigen<6>::Matrix matrix = {};
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) {
-      Vector a = {}, b = {};
-      a[i] = b[j] = 1.0;
-      matrix[i][j] = equations.product(a, b);
+      matrix[i][j] = equations.matrix()[std::max(i, j)][std::min(i, j)];
     }
   }
   const Vector right = equations.right();

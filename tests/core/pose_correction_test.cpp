@@ -1,6 +1,6 @@
 // Correction of poses for comparisons, against known perturbations of the exact poses of simulated
 // scans.
-#include "dynains/evidence/pose_correction.hpp"
+#include "dynains/registration/pose_correction.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/evidence/symmetric_eigen.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/random.hpp"
@@ -99,6 +98,62 @@ TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
   CHECK(median(rotations) < 0.02);
   CHECK(*std::max_element(translations.begin(), translations.end()) < 0.03);
   CHECK(*std::max_element(rotations.begin(), rotations.end()) < 0.06);
+}
+
+// A point as a sensor measures it whose elevations (rad), ranges (m) and mounting (rad, about the
+// axes x and y) are wrong. `of_beam`: rad, standard deviation of the elevation of each beam.
+struct SensorFault {
+  double elevation, range, roll, pitch, of_beam;
+  static const std::vector<double> kErrors;  // of beams, standard normal
+
+  Eigen::Vector3f operator()(const Eigen::Vector3f& point) const {
+    const Eigen::Vector3d p = point.cast<double>();
+    const double distance = p.head<2>().norm();
+    const double right = std::atan2(p.z(), distance);
+    const auto beam = static_cast<std::uint64_t>(1000.0 + std::floor(right / (0.4 * kDegrees)));
+    const double angle = right + elevation + of_beam * kErrors[beam % kErrors.size()];
+    const double scale = (p.norm() + range) / std::max(distance, 1e-9);
+    const Eigen::Vector3d measured(scale * std::cos(angle) * p.x(), scale * std::cos(angle) * p.y(),
+                                   (p.norm() + range) * std::sin(angle));
+    const Eigen::AngleAxisd about_x(roll, Eigen::Vector3d::UnitX());
+    const Eigen::AngleAxisd about_y(pitch, Eigen::Vector3d::UnitY());
+    return (about_y * about_x * measured).cast<float>();
+  }
+};
+
+const std::vector<double> SensorFault::kErrors = [] {
+  Random random(17);
+  std::vector<double> errors(1000);
+  for (double& error : errors) error = random.normal();
+  return errors;
+}();
+
+// Such errors show in all scans alike. Taken for errors of poses, they would add up.
+TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor are wrong") {
+  const double elevation = GENERATE(-0.4, 0.4);
+  const SensorFault fault =
+      GENERATE_COPY(SensorFault{elevation * kDegrees, 0.0, 0.0, 0.0, 0.0},
+                    SensorFault{0.0, 0.075 * elevation, 0.0, 0.0, 0.0},
+                    SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
+                    SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
+  static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 60);
+  PoseCorrection correction(0.003, kLongestObject, kHighestObject);
+  correction.begin_epoch(scans.front().T_world_sensor);
+  std::size_t residuals = 0;
+  for (const SimulatedScan& scan : scans) {
+    GroundSplit split = split_of(scan);
+    for (std::size_t i = 0; i < split.count; ++i) {
+      const Eigen::Vector3f p = fault({split.points.x[i], split.points.y[i], split.points.z[i]});
+      split.points.x[i] = p.x();
+      split.points.y[i] = p.y();
+      split.points.z[i] = p.z();
+    }
+    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
+    CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
+    correction.insert(T, split, {});
+    residuals += correction.residual() ? 1 : 0;
+  }
+  CHECK(residuals == scans.size() - 1);
 }
 
 // The errors allowed are those along the street, the direction with the least information.
@@ -339,66 +394,6 @@ TEST_CASE("traffic that starts together does not correct an exact pose, large ob
   CHECK(correction_by_traffic(1.9, 1.4) > 0.05);
 }
 
-// Whether the distances between level ground and its planes show that a pose is inexact. Each of 16
-// beams looks into all sectors. `of_beam` (m): standard deviation of the error that all distances
-// of a beam share. All distances share an error of 4 mm, and each has one of 2 cm.
-bool shows_error(double of_beam) {
-  Random random(11);
-  NormalEquations equations;
-  CorrectionSupport support;
-  support.clear();
-  for (int beam = 0; beam < 16; ++beam) {
-    const double shared = 0.004 + of_beam * random.normal();
-    const double range = 5.0 + 2.0 * beam;
-    for (int k = 0; k < 180; ++k) {
-      const double angle = M_PI / 90.0 * k;
-      const double x = range * std::cos(angle), y = range * std::sin(angle);
-      const NormalEquations::Vector derivatives = {0.0, 0.0, 1.0, y, -x, 0.0};
-      const double distance = shared + 0.02 * random.normal();
-      equations.add(derivatives, distance, 1.0);
-      support.add({static_cast<float>(x), static_cast<float>(y), -1.7F, false}, derivatives,
-                  distance, 1.0);
-    }
-  }
-  for (std::size_t i = 0; i < 6; ++i) equations.attract(i, 0.0, 0.2);
-  return support.test(equations.solve(), equations, CorrectionSupport::Prior::kExact)
-      .is_significant;
-}
-
-TEST_CASE("an error shows that an exact pose is none, biases of beams do not") {
-  CHECK(shows_error(0.0));
-  CHECK_FALSE(shows_error(0.02));
-}
-
-// Position along the corridor that is found for the last scan. One object alone gives the position
-// of the earlier scans. `doubtful` scans with walls across the corridor are pushed wrong by `error`
-// (m), and so are their walls if they are in the planes.
-double last_position(int doubtful, double error) {
-  PoseCorrection correction = new_correction();
-  correction.begin_epoch(Eigen::Isometry3d::Identity());
-  for (int scan = 0; scan < doubtful + 2; ++scan) {
-    const std::uint64_t seed = 100 * static_cast<std::uint64_t>(scan);
-    const bool is_first = scan == 0, is_last = scan == doubtful + 1;
-    GroundSplit split = corridor(seed, 0.0F, 0.0F, false);
-    if (!is_last) add_surface(seed + 1, {8.5F, 0.0F, 0.9F, 0.9, 2000}, split);
-    for (const float x : {-22.5F, -15.5F, 15.5F, 22.5F}) {
-      if (!is_first) add_surface(seed + 2, {x, 0.0F, 3.5F, 0.9, 2000}, split);
-    }
-    const double pushed_x = is_first || is_last ? 0.0 : error;
-    const Eigen::Isometry3d T =
-        correction.correct(Eigen::Isometry3d(Eigen::Translation3d(pushed_x, 0.0, 0.0)), split);
-    if (is_last) return T.translation().x();
-    correction.insert(T, split, {});
-  }
-  return 0.0;
-}
-
-TEST_CASE("a scan in doubt by more than 10 cm is left out of the planes, but never two in a row") {
-  CHECK(last_position(1, 0.07) == Approx(0.07).margin(0.01));
-  CHECK(last_position(1, 0.15) == Approx(0.0).margin(0.01));
-  CHECK(last_position(2, 0.15) == Approx(0.15).margin(0.01));
-}
-
 // A plane needs twelve points. Other scans than the first give every second of so many points.
 TEST_CASE("all points of the first scan make its planes") {
   const std::size_t points_per_voxel = GENERATE(std::size_t{11}, std::size_t{12});
@@ -435,27 +430,6 @@ TEST_CASE("an error of one pose alone does not last") {
     INFO("scan " << i);
     const double error = (T.translation() - scans[i].T_world_sensor.translation()).norm();
     CHECK(error < (i == 5 ? 0.035 : 0.002));
-  }
-}
-
-TEST_CASE("eigenvalues and eigenvectors of a symmetric matrix") {
-  using Eigen6 = detail::SymmetricEigen<6>;
-  Random random(3);
-  Eigen6::Matrix m;
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) m[i][j] = m[j][i] = random.uniform(-1.0, 1.0);
-  }
-  const Eigen6 eigen = detail::symmetric_eigen<6>(m);
-  for (std::size_t k = 0; k < 6; ++k) {
-    for (std::size_t i = 0; i < 6; ++i) {
-      double product = 0.0, dot = 0.0;
-      for (std::size_t j = 0; j < 6; ++j) {
-        product += m[i][j] * eigen.vectors[k][j];
-        dot += eigen.vectors[k][j] * eigen.vectors[i][j];
-      }
-      CHECK(product == Approx(eigen.values[k] * eigen.vectors[k][i]).margin(1e-12));
-      CHECK(dot == Approx(i == k ? 1.0 : 0.0).margin(1e-12));
-    }
   }
 }
 

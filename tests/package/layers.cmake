@@ -5,6 +5,7 @@ set(layers
   "^((simd|threads)/.*|errors|median|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
   "^(sensor|voxels)/"
   "^(ground|clusters|belief)/"
+  "^registration/"
   "^(descriptors|evidence)/"
   "^(map|recording)/"
   "^config\\.hpp$"
@@ -32,8 +33,8 @@ function(find_layer header result)
 endfunction()
 
 set(basic_layer 0)
-set(stage_layers_end 5)
-set(facade_layer 7)
+set(stage_layers_end 6)
+set(facade_layer 8)
 set(upward "")
 file(GLOB_RECURSE headers RELATIVE ${INCLUDE_DIR}/dynains ${INCLUDE_DIR}/dynains/*.hpp)
 foreach(header IN LISTS headers)

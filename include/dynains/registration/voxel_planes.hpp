@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dynains/pose.hpp"
+#include "dynains/registration/sensor_errors.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/simd/floor.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -29,6 +30,8 @@ class VoxelPlanes {
     bool is_flat = false;
     std::uint32_t matches = 0;  ///< number of matched points, for alignments
     double points = 0.0;        ///< number of points of the fit
+    /// Movement of the plane along its normal by each error of the sensor, m.
+    std::array<double, kSensorErrors> moved = {};
 
     double distance(const double (&p)[3]) const {
       return normal[0] * (p[0] - mean[0]) + normal[1] * (p[1] - mean[1]) +
@@ -40,13 +43,15 @@ class VoxelPlanes {
   struct Block {
     static constexpr std::size_t kMost = 32;
     double points[kMost][3];
+    SensorErrors errors[kMost];
     std::size_t count = 0;
 
     bool is_full() const { return count == kMost; }
     /// Adds the point (x, y, z) (m), transformed by `T`. The block must not be full.
     void push_back(const Pose& T, double x, double y, double z) {
-      double(&point)[3] = points[count++];
+      double(&point)[3] = points[count];
       for (int k = 0; k < 3; ++k) point[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
+      errors[count++] = sensor_errors(T, x, y, z);
     }
   };
 
@@ -90,7 +95,7 @@ class VoxelPlanes {
     for (std::size_t i = 0; i < block.count;) {
       std::size_t end = i + 1;
       while (end < block.count && numbers[end] == numbers[i]) ++end;
-      if (numbers[i] != kNone) add(&block.points[i], end - i, keys[i], numbers[i]);
+      if (numbers[i] != kNone) add(block, i, end, keys[i], numbers[i]);
       i = end;
     }
     block.count = 0;
@@ -132,6 +137,7 @@ class VoxelPlanes {
   // The points of a voxel, relative to its centre.
   struct Moments {
     PlaneMoments sums;
+    SensorErrors errors = {};  // sums
     std::uint32_t last_scan = 0;
   };
 
@@ -164,14 +170,21 @@ class VoxelPlanes {
     return number;
   }
 
-  // Adds consecutive points of a block to a voxel.
-  void add(const double (*points)[3], std::size_t count, VoxelKey key, std::uint32_t number) {
+  // Adds the points [begin, end) of a block to a voxel.
+  void add(const Block& block, std::size_t begin, std::size_t end, VoxelKey key,
+           std::uint32_t number) {
     const double x = centre(key, 0), y = centre(key, 1), z = centre(key, 2);
-    PlaneMoments sums = moments_[number].sums;
-    for (std::size_t i = 0; i < count; ++i) {
-      sums.add(points[i][0] - x, points[i][1] - y, points[i][2] - z, 1.0);
+    Moments& moments = moments_[number];
+    for (std::size_t i = begin; i < end; ++i) {
+      const double(&p)[3] = block.points[i];
+      moments.sums.add(p[0] - x, p[1] - y, p[2] - z, 1.0);
+      for (std::size_t k = 0; k < kSensorErrors; ++k) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          moments.errors[k][axis] += block.errors[i][k][axis];
+        }
+      }
     }
-    moments_[number] = {sums, scans_};
+    moments.last_scan = scans_;
     planes_[number].is_fitted = false;
   }
 
@@ -189,7 +202,14 @@ class VoxelPlanes {
              true,
              false,
              0,
-             moments.sums.count};
+             moments.sums.count,
+             {}};
+    for (std::size_t k = 0; k < kSensorErrors; ++k) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        plane.moved[k] +=
+            plane.normal[axis] * static_cast<double>(moments.errors[k][axis]) / plane.points;
+      }
+    }
     plane.is_flat = flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
                     thickness_squared <= kMostThickness * kMostThickness &&
                     !is_trace_of_beam(plane, moments.sums);

@@ -9,13 +9,13 @@
 #include <cstdint>
 #include <optional>
 
-#include "dynains/evidence/alignment_points.hpp"
-#include "dynains/evidence/motion_prediction.hpp"
-#include "dynains/evidence/pose_alignment.hpp"
-#include "dynains/evidence/voxel_planes.hpp"
 #include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/alignment_points.hpp"
+#include "dynains/registration/motion_prediction.hpp"
+#include "dynains/registration/plane_aligner.hpp"
+#include "dynains/registration/voxel_planes.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -44,6 +44,7 @@ class PoseCorrection {
   /// Forgets all scans and the motion. `T_world_sensor`: pose of the first scan of the next epoch.
   void begin_epoch(const Pose& T_world_sensor) {
     motion_.clear();
+    aligner_.clear();
     inexact_scans_ = 0;
     begin_planes(T_world_sensor);
   }
@@ -59,10 +60,7 @@ class PoseCorrection {
     correction_.reset();
     offset_.reset();
     open_ = {};
-    fitted_ = 0;
-    usual_inliers_ = 0.0;
     residual_.reset();
-    is_doubtful_ = was_left_out_ = false;
   }
 
   /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
@@ -72,7 +70,6 @@ class PoseCorrection {
     if (!is_active()) return T_world_level;
     residual_.reset();
     misfit_.reset();
-    is_doubtful_ = false;
     const Pose T_pushed = composed(T_origin_world_, T_world_level);
     const Pose T_guess = offset_ ? composed(*offset_, T_pushed) : T_pushed;
     correction_ = offset_;
@@ -95,18 +92,13 @@ class PoseCorrection {
                     composed(*correction_, composed(T_origin_world_, T_world_frame)));
   }
 
-  /// Adds the static points of a scan to the planes, or leaves it out if its pose is in doubt, but
-  /// never two in a row. `T_world_level`: result of correct(). `moving`: by non-ground point, 1 for
-  /// a point that may move, else 0; empty if no point does.
+  /// Adds the static points of a scan to the planes. `T_world_level`: result of correct().
+  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
   void insert(const Pose& T_world_level, const GroundSplit& split,
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
-    was_left_out_ = is_doubtful_ && !was_left_out_;
-    if (was_left_out_) return;
     const Pose T = composed(T_origin_world_, T_world_level);
-    const std::size_t wanted = inserted_ == 0            ? split.count + 1  // all points
-                               : inserted_ < kFirstScans ? kFirstInserted
-                                                         : kInserted;
+    const std::size_t wanted = inserted_ == 0 ? split.count + 1 : kInserted;
     ++inserted_;
     planes_.begin_scan(T);
     VoxelPlanes::Block block;
@@ -126,44 +118,34 @@ class PoseCorrection {
   const std::optional<EpochReason>& misfit() const { return misfit_; }
 
  private:
-  using Step = NormalEquations::Vector;
-  static constexpr std::size_t kInserted = 12000;       // points of a scan in the planes
-  static constexpr std::size_t kFirstInserted = 24000;  // the same for the scans after the first
-  static constexpr std::size_t kFirstScans = 5;
+  static constexpr std::size_t kInserted = 12000;  // points of a scan after the first
   static constexpr std::size_t kFewestMatches = 100;
+  static constexpr double kLeastInliers = 0.5;  // ratio to the matches
   static constexpr int kInexactScans = 30;
-  static constexpr double kMostDoubt = 0.1;      // m, of the translation of an inserted scan
-  static constexpr double kLeastInliers = 0.65;  // ratio to the usual share of inliers
-  static constexpr int kFewestFits = 2;          // scans that tell the usual share
-  static constexpr double kLever = 10.0;         // m
 
   bool is_active() const { return tolerance_ > 0.0; }
 
   // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
   void align(const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
-    const Step before = open_;
+    const PoseStep before = open_;
     open_ = {};
-    const Alignment alignment = aligner_.align(selected_, planes_, T_guess, prior());
+    const Alignment alignment = aligner_.align(selected_, planes_, T_guess, inexact_scans_ == 0);
     if (inexact_scans_ > 0) --inexact_scans_;
     if (alignment.matched < kFewestMatches) return;
-    if (!fits(static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched))) {
+    if (static_cast<double>(alignment.inliers) <
+        kLeastInliers * static_cast<double>(alignment.matched)) {
       misfit_ = EpochReason::kMisfit;
       return;
     }
-    is_doubtful_ = alignment.doubt > kMostDoubt;
     open_ = alignment.found;
-    Pose T_aligned = alignment.T_map_sensor;
+    const Pose T_aligned = moved(T_guess, alignment.supported);
     if (alignment.change > tolerance_) {
-      if (is_credible(alignment, before, T_guess)) {
-        if (alignment.is_significant) inexact_scans_ = kInexactScans;
-        T_newest = T_aligned;
-        correction_ = composed(T_newest, inverted(T_pushed));
-        const Step lasting = confirmed(alignment.supported, before);
-        offset_ = composed(moved(T_guess, lasting), inverted(T_pushed));
-        for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
-      } else {
-        T_aligned = T_guess;
-      }
+      inexact_scans_ = kInexactScans;
+      T_newest = T_aligned;
+      correction_ = composed(T_newest, inverted(T_pushed));
+      const PoseStep lasting = confirmed(alignment.supported, before);
+      offset_ = composed(moved(T_guess, lasting), inverted(T_pushed));
+      for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
     }
     const Pose T_motion = composed(inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(composed(T_origin_newest_, T_motion), T_aligned);
@@ -175,44 +157,13 @@ class PoseCorrection {
   }
 
   // Writes the covariance of an alignment, along the axes of the map, to the residual.
-  void set_covariance(const CorrectionSupport::Matrix& covariance, const Pose& T_origin_sensor) {
+  void set_covariance(const PoseCovariance& covariance, const Pose& T_origin_sensor) {
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) residual_->covariance[6 * i + j] = covariance[i][j];
     }
     Pose R_sensor_origin = Pose::Identity();
     R_sensor_origin.linear() = transposed(T_origin_sensor.linear());
     residual_->covariance = transported_covariance(residual_->covariance, R_sensor_origin);
-  }
-
-  // Whether the static world fits, compared with earlier scans of the epoch. `inliers`: ratio to
-  // the matches.
-  bool fits(double inliers) {
-    constexpr double kNewest = 0.2;  // weight
-    const bool is_usual = fitted_ < kFewestFits || inliers >= kLeastInliers * usual_inliers_;
-    if (is_usual) usual_inliers_ += (fitted_ == 0 ? 1.0 : kNewest) * (inliers - usual_inliers_);
-    ++fitted_;
-    return is_usual;
-  }
-
-  // Whether evidence beside the planes of this scan supports a correction: the scan before needs it
-  // as well, or the motion becomes smoother. Small corrections of poses that are known to be
-  // inexact need no more support, and neither do the first scans, without a motion before them.
-  bool is_credible(const Alignment& alignment, const Step& before, const Pose& T_guess) const {
-    const double size = movement(alignment.supported);
-    if (inexact_scans_ > 0 && size <= kMostDoubt) return true;
-    if (2.0 * movement(confirmed(alignment.supported, before)) >= size) return true;
-    const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
-    return !T_predicted || movement(difference(*T_predicted, alignment.T_map_sensor)) <
-                               movement(difference(*T_predicted, T_guess));
-  }
-
-  // Movement (m) of a point at a distance of kLever.
-  static double movement(const Step& step) {
-    return std::hypot(std::hypot(step[0], step[1], step[2]),
-                      kLever * std::hypot(step[3], step[4], step[5]));
-  }
-  static double movement(const PoseResidual& residual) {
-    return std::hypot(residual.translation, kLever * residual.rotation * M_PI / 180.0);
   }
 
   // Compares the pose of the newest scan with the one that the motion predicts. If only the
@@ -242,16 +193,10 @@ class PoseCorrection {
     }
   }
 
-  // Poses are presumed to be exact until a correction shows that they are not.
-  CorrectionSupport::Prior prior() const {
-    using Prior = CorrectionSupport::Prior;
-    return inexact_scans_ > 0 ? Prior::kInexact : Prior::kExact;
-  }
-
   // The part of a step that an earlier step confirms: the projection of the earlier one, at most
   // the whole step. Translations and rotations on their own.
-  static Step confirmed(const Step& step, const Step& before) {
-    Step result = {};
+  static PoseStep confirmed(const PoseStep& step, const PoseStep& before) {
+    PoseStep result = {};
     for (std::size_t first = 0; first < step.size(); first += 3) {
       double squared = 0.0, product = 0.0;
       for (std::size_t i = first; i < first + 3; ++i) {
@@ -286,17 +231,13 @@ class PoseCorrection {
   // Corrections in the origin frame, multiplied from the left: of the newest scan, and the part
   // that lasts.
   std::optional<Pose> correction_, offset_;
-  Step open_ = {};  // step that aligns the last scan, without the part that lasts
+  PoseStep open_ = {};  // step that aligns the last scan, without the part that lasts
   Pose T_origin_newest_ = Pose::Identity();  // corrected
   Pose T_origin_pushed_ = Pose::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   std::optional<EpochReason> misfit_;
   MotionPrediction motion_;
-  int fitted_ = 0;              // scans of the epoch with an alignment
-  double usual_inliers_ = 0.0;  // ratio to the matches
-  int inexact_scans_ = 0;       // number of next scans whose poses are presumed to be inexact
-  bool is_doubtful_ = false;    // whether the pose of the last scan may be wrong
-  bool was_left_out_ = false;   // whether the last insert() left its scan out
+  int inexact_scans_ = 0;  // number of next scans whose poses are presumed to be inexact
   AlignmentPoints selected_;
   PlaneAligner aligner_;
 };

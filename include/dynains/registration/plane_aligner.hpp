@@ -1,0 +1,342 @@
+// Alignment of a scan with planes: Gauss-Newton steps on point-to-plane distances.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/registration/alignment_points.hpp"
+#include "dynains/registration/normal_equations.hpp"
+#include "dynains/registration/sensor_errors.hpp"
+#include "dynains/registration/voxel_planes.hpp"
+
+namespace dynains::detail {
+
+/// Translation (m) and rotation (rad) about the sensor, along the axes of the map.
+using PoseStep = VectorOf<6>;
+using PoseCovariance = MatrixOf<6>;
+
+/// Rotates `T` by a small rotation vector (rad) about its own origin, along the axes of the outer
+/// frame, and translates it.
+inline Pose moved(const Pose& T, const PoseStep& step) {
+  const double w[3] = {step[3] / 2.0, step[4] / 2.0, step[5] / 2.0};
+  const double scale = 1.0 / std::sqrt(1.0 + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  const double a = scale, b = scale * w[0], c = scale * w[1], d = scale * w[2];
+  const double R[3][3] = {
+      {1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)},
+      {2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)},
+      {2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)}};
+  Pose result = T;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      result(i, j) = R[i][0] * T(0, j) + R[i][1] * T(1, j) + R[i][2] * T(2, j);
+    }
+    result(i, 3) = T(i, 3) + step[static_cast<std::size_t>(i)];
+  }
+  return result;
+}
+
+/// Movement (m) of a point 10 m away by a step.
+inline constexpr double kLever = 10.0;  // m
+inline double movement(const PoseStep& step) {
+  return std::hypot(std::hypot(step[0], step[1], step[2]),
+                    kLever * std::hypot(step[3], step[4], step[5]));
+}
+
+/// Result of an alignment.
+struct Alignment {
+  PoseStep found = {};      ///< step from the first estimate to the best fit
+  PoseStep supported = {};  ///< the part of `found` that is certain; none if the pose may be exact
+  std::size_t matched = 0;  ///< points in voxels with a plane
+  std::size_t inliers = 0;  ///< matched points at a small distance from their plane
+  /// Root mean square of the change of the distances between points and planes by the supported
+  /// step, m. Unlike the change of the pose, it does not grow in directions without information.
+  double change = 0.0;
+  PoseCovariance covariance = {};  ///< of `found`, along the axes of the map
+};
+
+/// Aligns scans with planes. Errors of the sensor are unknowns beside the pose, so that they are
+/// not taken for errors of the pose: the error of all elevations is estimated from scan to scan,
+/// that of the mounting may explain what is wrong with poses that are presumed to be exact.
+///
+/// The covariance of a step is that of the distances, and that of the choice of surfaces
+/// (jackknife: changes of the step without two adjacent sectors around the sensor). The latter is
+/// large if one object decides about a direction, for example a slow vehicle ahead. Exact poses are
+/// tested with two more: changes without all objects, as traffic starts together, and without bands
+/// of elevation, as beams have biases.
+class PlaneAligner {
+ public:
+  /// Allocates memory for `count` points.
+  void reserve(std::size_t count) { matches_.reserve(count); }
+
+  /// Forgets the errors of the sensor.
+  void clear() {
+    elevation_ = 0.0;
+    elevation_weight_ = kLeastWeight;
+  }
+
+  /// Aligns points with planes, from a first estimate of the pose that is wrong by at most half a
+  /// voxel. `is_exact`: whether the pose is presumed to be exact. Directions without information
+  /// keep the first estimate.
+  Alignment align(const AlignmentPoints& selected, VoxelPlanes& planes, const Pose& T_guess,
+                  bool is_exact) {
+    constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
+    constexpr double kSmall = 0.01;                             // m, change by one iteration
+    constexpr double kScale = 0.06;                             // m
+    constexpr int kMostIterations = 3;
+    constexpr double kConverged = 0.002;  // m
+    const PointsView points = selected.points();
+    Vector found = {};
+    Pose T = T_guess;
+    Equations equations;
+    const auto advance = [&](const Vector& step) {
+      for (std::size_t i = 0; i < kUnknowns; ++i) found[i] += step[i];
+      T = moved(T, pose_step(step));
+      return equations.change(pose_step(step));
+    };
+    for (const double scale : kCoarseScales) {
+      find_planes(points, kCoarseStep, planes, T, found);
+      equations = sum_equations(scale, found, is_exact);
+      const Vector step = equations.solve();
+      if (equations.change(pose_step(step)) <= kSmall) break;  // left to the fine steps
+      advance(step);
+    }
+    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+      find_planes(points, 1, planes, T, found);
+      equations = sum_equations(kScale, found, is_exact);
+      if (advance(equations.solve()) <= kConverged) break;
+    }
+    return result_of(selected, equations, found, is_exact, kScale);
+  }
+
+  /// How well the upright surfaces of a scan fit at a pose: number of points at a small distance
+  /// from an upright plane, of which the points of one plane count as at most 8. Points without a
+  /// plane do not count. `points`: m, sensor frame.
+  double upright_fit(PointsView points, VoxelPlanes& planes, const Pose& T) {
+    constexpr double kScale = 0.15;  // m
+    find_planes(points, kCoarseStep, planes, T, {});
+    double sum = 0.0;
+    weigh_matches(kScale, [&](const Match& match, const auto&, double weight) {
+      if (std::abs(match.plane->normal[2]) < kUpright) sum += weight;
+    });
+    return sum;
+  }
+
+ private:
+  static constexpr std::size_t kUnknowns = 6 + kSensorErrors;
+  using Equations = NormalEquations<kUnknowns>;
+  using Vector = Equations::Vector;
+
+  static constexpr std::size_t kCoarseStep = 3;  // one of so many points
+  static constexpr double kUpright = 0.7;        // most z of the unit normal of a wall
+  // Weights of the first estimate. They decide only in directions without information.
+  static constexpr PoseStep kAttraction = {0.2, 0.2, 0.2, 100.0, 100.0, 100.0};
+  static constexpr double kFirstError = 1.0;   // m, standard deviation of the first estimate
+  static constexpr double kLeastWeight = 8.0;  // of errors of the sensor: 0.4 deg, at 2 cm
+  static constexpr double kNone = 1e9;         // weight of an unknown that stays
+  static constexpr double kMemory = 0.97;      // of the weight of the elevation, by scan
+  static constexpr double kDeviations = 4.0;   // of a step that is half certain
+  static constexpr double kOfExact = 8.0;      // of one that shows that the pose is not exact
+
+  struct Match {
+    VoxelPlanes::Plane* plane;
+    double arm[3];  // from the sensor to the point, m, axes of the map
+    std::array<double, kSensorErrors> errors;
+    double distance;  // m
+    std::uint32_t point;
+  };
+
+  static PoseStep pose_step(const Vector& step) {
+    return {step[0], step[1], step[2], step[3], step[4], step[5]};
+  }
+
+  // Matches every `step`-th point.
+  void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes, const Pose& T,
+                   const Vector& found) {
+    using Block = VoxelPlanes::Block;
+    matches_.clear();
+    for (std::size_t begin = 0; begin < points.size(); begin += Block::kMost * step) {
+      const std::size_t end = std::min(points.size(), begin + Block::kMost * step);
+      Block block;
+      for (std::size_t i = begin; i < end; i += step) {
+        block.push_back(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                        static_cast<double>(points.z[i]));
+      }
+      planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
+        const double(&p)[3] = block.points[i];
+        Match match = {&plane,
+                       {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
+                       {},
+                       plane.distance(p),
+                       static_cast<std::uint32_t>(begin + i * step)};
+        for (std::size_t k = 0; k < kSensorErrors; ++k) {
+          match.errors[k] = -plane.moved[k];
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            match.errors[k] += plane.normal[axis] * static_cast<double>(block.errors[i][k][axis]);
+          }
+          match.distance += match.errors[k] * ((k == 0 ? elevation_ : 0.0) + found[6 + k]);
+        }
+        matches_.push_back(match);
+      });
+    }
+    for (const Match& match : matches_) match.plane->matches = 0;
+    for (const Match& match : matches_) ++match.plane->matches;
+  }
+
+  // Calls `add(match, derivatives, weight)` for each match. `scale` (m): larger distances have
+  // little weight (Geman-McClure). The points of one plane share its error, so that all of them
+  // weigh at most as much as kMost points.
+  template <class Add>
+  void weigh_matches(double scale, Add&& add) const {
+    constexpr double kMost = 8.0;
+    for (const Match& match : matches_) {
+      const double(&n)[3] = match.plane->normal;
+      const double(&arm)[3] = match.arm;
+      const double loss = scale * scale / (scale * scale + match.distance * match.distance);
+      const double most = std::min(kMost, match.plane->points / 3.0);
+      const double share = most / (most + static_cast<double>(match.plane->matches));
+      add(match,
+          Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
+                 arm[0] * n[1] - arm[1] * n[0], match.errors[0], match.errors[1], match.errors[2]},
+          loss * loss * share);
+    }
+  }
+
+  // Equations of the matches for the next step after `found`.
+  Equations sum_equations(double scale, const Vector& found, bool is_exact) const {
+    Equations equations;
+    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
+      equations.add(derivatives, match.distance, weight);
+    });
+    for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -found[i], kAttraction[i]);
+    equations.attract(6, -found[6], elevation_weight_);
+    for (std::size_t i = 7; i < kUnknowns; ++i) {
+      equations.attract(i, -found[i], is_exact ? kLeastWeight : kNone);
+    }
+    return equations;
+  }
+
+  Alignment result_of(const AlignmentPoints& selected, const Equations& equations,
+                      const Vector& found, bool is_exact, double scale) {
+    constexpr double kInlier = 0.12;  // m
+    Alignment result;
+    result.found = pose_step(found);
+    result.matched = matches_.size();
+    result.inliers = static_cast<std::size_t>(
+        std::count_if(matches_.begin(), matches_.end(),
+                      [](const Match& match) { return std::abs(match.distance) <= kInlier; }));
+    const Equations::Matrix inverse = equations.inverse();
+    elevation_ += found[6];
+    elevation_weight_ = std::max(kLeastWeight, kMemory / inverse[6][6]);
+    result.covariance = covariance_of(selected, equations, inverse, is_exact, scale);
+    result.supported = supported_part(result.found, result.covariance, is_exact);
+    result.change = equations.change(result.supported);
+    add_first_error(inverse, result.covariance);
+    return result;
+  }
+
+  // The expected step by its covariance, if steps of this size are usual. None if the pose may be
+  // exact.
+  static PoseStep supported_part(const PoseStep& found, const PoseCovariance& covariance,
+                                 bool is_exact) {
+    if (is_exact) {
+      const PoseStep weighted = solve_symmetric<6>(covariance, found);
+      double squared = 0.0;
+      for (std::size_t i = 0; i < 6; ++i) squared += found[i] * weighted[i];
+      if (squared < kOfExact * kOfExact) return {};
+    }
+    PoseStep variances;
+    PoseCovariance sum = covariance;
+    for (std::size_t i = 0; i < 6; ++i) {
+      variances[i] = found[i] * found[i] / (kDeviations * kDeviations);
+      sum[i][i] += variances[i];
+    }
+    PoseStep result = solve_symmetric<6>(sum, found);
+    for (std::size_t i = 0; i < 6; ++i) result[i] *= variances[i];
+    return result;
+  }
+
+  // Sectors of nearly equal angles, without trigonometric functions.
+  static std::size_t sector_of(float x, float y) {
+    const double length = std::abs(static_cast<double>(x)) + std::abs(static_cast<double>(y));
+    if (!(length > 0.0)) return 0;
+    const double t = static_cast<double>(y) / length;
+    const double angle = x >= 0.0F ? 1.0 + t : 3.0 - t;  // [0, 4]
+    return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
+  }
+
+  // Bands of equal sines of the elevation, 0.9 deg at the horizon. The outer ones have no end.
+  static std::size_t band_of(float x, float y, float z) {
+    constexpr double kHighest = 0.5;  // sine
+    const auto height = static_cast<double>(z);
+    const double range = std::hypot(static_cast<double>(x), static_cast<double>(y), height);
+    if (!(range > 0.0)) return 0;
+    const double place = (height / range + kHighest) / (2.0 * kHighest);  // [0, 1) within
+    return static_cast<std::size_t>(
+        std::min(std::max(place, 0.0) * kBands, static_cast<double>(kBands - 1)));
+  }
+
+  PoseCovariance covariance_of(const AlignmentPoints& selected, const Equations& equations,
+                               const Equations::Matrix& inverse, bool is_exact, double scale) {
+    const PointsView points = selected.points();
+    groups_.assign(is_exact ? kSectors + kBands + 1 : kSectors, Equations());
+    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
+      const std::size_t i = match.point;
+      const auto add_to = [&](std::size_t group) {
+        groups_[group].add(derivatives, match.distance, weight);
+      };
+      // Each sector is in two pairs, so that no object is divided.
+      const std::size_t sector = sector_of(points.x[i], points.y[i]);
+      add_to(sector);
+      add_to((sector + 1) % kSectors);
+      if (!is_exact) return;
+      add_to(kSectors + band_of(points.x[i], points.y[i], points.z[i]));
+      if (selected.is_on_object(i)) add_to(kSectors + kBands);
+    });
+    PoseCovariance covariance;
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) covariance[i][j] = equations.variance() * inverse[i][j];
+    }
+    const Vector all = equations.solve();
+    for (std::size_t group = 0; group < groups_.size(); ++group) {
+      if (groups_[group].empty()) continue;
+      Equations others = equations;
+      others -= groups_[group];
+      Vector change = others.solve();
+      for (std::size_t i = 0; i < 6; ++i) change[i] -= all[i];
+      const double weight = group < kSectors ? 0.5 : 1.0;
+      for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += weight * change[i] * change[j];
+      }
+    }
+    return covariance;
+  }
+
+  // Where the surfaces tell nothing, attractions keep the first estimate and its error.
+  static void add_first_error(const Equations::Matrix& inverse, PoseCovariance& covariance) {
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double kept = kAttraction[k] * kFirstError / (k < 3 ? 1.0 : kLever);
+      for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t j = 0; j < 6; ++j) {
+          covariance[i][j] += kept * kept * inverse[i][k] * inverse[j][k];
+        }
+      }
+    }
+  }
+
+  static constexpr std::size_t kSectors = 32;
+  static constexpr std::size_t kBands = 64;
+
+  std::vector<Match> matches_;
+  std::vector<Equations> groups_;  // parts of the equations
+  double elevation_ = 0.0;         // rad, error of all elevations
+  double elevation_weight_ = kLeastWeight;
+};
+
+}  // namespace dynains::detail
