@@ -29,110 +29,154 @@ void OdometryConfig::validate() const {
 
 class Odometry::Loop {
  public:
-  explicit Loop(const Config& config)
-      : config_(config), preparation_(config.nearest, config.farthest) {
-    if (config.remove) remover_.emplace(DynaInsRemover::Config::odometry());
-  }
+  explicit Loop(const Config& config) : config_(config), scan_(config.nearest, config.farthest) {}
 
   OdometryResult push(RawPoints<float> points, Span<const double> offsets, double time) {
-    const Pose T_last_predicted = predicted_motion(time);
-    preparation_.prepare(points, offsets, T_last_newest_, period_);
+    check(points, offsets);
+    scan_.take(points, offsets);
+    const double mean_time = time + scan_.mean_offset();
+    check_time(mean_time);
+    const double period = scan_count_ > 0 ? mean_time - mean_time_ : 1.0;
     OdometryResult result;
-    const Pose T_predicted = T_world_last_ * T_last_predicted;
-    result.T_world_sensor = T_predicted;
-    result.loss = register_scan(T_predicted, result);
-    if (result.loss != OdometryLoss::kNone) return result;
-    result.T_world_sensor = orthonormalized(result.T_world_sensor);
-    if (remover_) {
-      const RawPoints<float> cloud = preparation_.cloud();
-      result.labels = remover_->push(cloud, result.T_world_sensor, time).newest.labels;
+    Pose T_last_newest = predicted_motion(period);
+    result.loss = register_scan(period, T_last_newest, result);
+    const double stamp = 1.0 - scan_.mean_offset() / period;  // 0: last scan, 1: this one
+    if (first_ && result.loss == OdometryLoss::kNone) {
+      const double first_stamp = -first_->mean_offset() / period;
+      T_world_start_ = extrapolate(Pose::Identity(), T_last_newest, first_stamp);
     }
-    note_prediction(T_predicted.inverse() * result.T_world_sensor);
-    add_to_map(result.T_world_sensor, result.labels);
-    T_last_newest_ = T_world_last_.inverse() * result.T_world_sensor;
-    period_ = scan_count_ > 0 ? time - time_ : 0.0;
-    time_ = time;
-    preparation_.adapt();
-    ++scan_count_;
-    T_world_last_ = result.T_world_sensor;
+    if (scan_count_ > 0) {
+      result.T_world_sensor = T_world_start_.inverse() * T_world_last_ *
+                              extrapolate(Pose::Identity(), T_last_newest, stamp);
+    }
+    if (result.loss == OdometryLoss::kNone) take(T_last_newest, period, mean_time, result);
     return result;
   }
 
-  void check(RawPoints<float> points, Span<const double> offsets, double time) const {
-    const std::size_t count = PointCloudTraits<RawPoints<float>>::size(points);
-    if (!offsets.empty() && offsets.size() != count) {
-      throw CloudError(std::to_string(offsets.size()) + " offsets for " + std::to_string(count) +
-                       " points; expected one for each, or none");
-    }
-    if (std::isfinite(time) && (scan_count_ == 0 || time > time_)) return;
-    throw PoseError("time " + std::to_string(time) + " s must be finite and after " +
-                    std::to_string(time_) + " s");
-  }
-
  private:
-  /// At constant velocity; a long pause tells nothing of the velocity.
-  Pose predicted_motion(double time) const {
-    constexpr double kLongestPause = 1.0;  // s
-    if (period_ <= 0.0 || time - time_ > kLongestPause) return Pose::Identity();
-    return extrapolate(Pose::Identity(), T_last_newest_, (time - time_) / period_);
+  static void check(RawPoints<float> points, Span<const double> offsets) {
+    const std::size_t count = PointCloudTraits<RawPoints<float>>::size(points);
+    if (offsets.empty() || offsets.size() == count) return;
+    throw CloudError(std::to_string(offsets.size()) + " offsets for " + std::to_string(count) +
+                     " points; expected one for each, or none");
   }
 
-  OdometryLoss register_scan(const Pose& T_predicted, OdometryResult& result) {
+  void check_time(double mean_time) const {
+    if (std::isfinite(mean_time) && (scan_count_ == 0 || mean_time > mean_time_)) return;
+    throw PoseError("time " + std::to_string(mean_time) + " s must be finite and after " +
+                    std::to_string(mean_time_) + " s");
+  }
+
+  /// At constant velocity; a long pause tells nothing of the velocity.
+  Pose predicted_motion(double period) const {
+    constexpr double kLongestPause = 1.0;  // s
+    if (period_ <= 0.0 || period > kLongestPause) return Pose::Identity();
+    return extrapolate(Pose::Identity(), T_last_newest_, period / period_);
+  }
+
+  /// De-skewing needs the motion, which needs de-skewed points: both in turn.
+  OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
+    constexpr int kMostTurns = 4;
     constexpr std::size_t kFewest = 100;  // points
     constexpr double kLeastFit = 0.2;
+    constexpr double kConverged = 0.02;  // m
     // m. The surfaces of a few scans are rough.
     constexpr double kFirst = 0.8, kDecay = 0.9, kFinest = 0.1;
-    if (preparation_.keypoints().size() < kFewest) return OdometryLoss::kFewPoints;
-    if (map_.empty()) return OdometryLoss::kNone;
-    const std::vector<Eigen::Vector3d>& points = preparation_.keypoints();
     const double finest =
         std::max(kFinest, kFirst * std::pow(kDecay, static_cast<double>(scan_count_)));
-    Alignment best = align(points, map_, T_predicted, 3.0 * expected_error_, finest);
-    // The first motion is not predicted.
-    if (period_ <= 0.0 || best.fit < kLeastFit) {
-      const Alignment found = search(points, map_, T_world_last_, finest);
-      if (found.score > best.score) best = found;
+    double scale = 3.0 * expected_error_;
+    for (int turn = 0; turn < kMostTurns; ++turn) {
+      scan_.prepare(T_last_newest, period);
+      const std::vector<Eigen::Vector3d>& points = scan_.keypoints();
+      if (points.size() < kFewest) return OdometryLoss::kFewPoints;
+      if (scan_count_ == 0) return OdometryLoss::kNone;
+      if (first_) start_map(T_last_newest, period);
+      Alignment best = align(points, map_, T_world_last_ * T_last_newest, scale, finest);
+      // The first motion is not predicted.
+      if (turn == 0 && (first_ || best.fit < kLeastFit)) {
+        const Alignment found = search(points, map_, T_world_last_, finest);
+        if (found.score > best.score) best = found;
+      }
+      result.fit = best.fit;
+      result.free_directions = best.free_directions;
+      if (best.fit < kLeastFit) return OdometryLoss::kNoOverlap;
+      const Pose T_last_before = T_last_newest;
+      T_last_newest = T_world_last_.inverse() * best.T_map_scan;
+      if (scan_.has_one_time() || length_of(T_last_before.inverse() * T_last_newest) < kConverged) {
+        break;
+      }
+      scale = finest;
     }
-    result.fit = best.fit;
-    result.free_directions = best.free_directions;
-    if (best.fit < kLeastFit) return OdometryLoss::kNoOverlap;
-    result.T_world_sensor = best.T_map_scan;
     return OdometryLoss::kNone;
   }
 
-  /// Running mean of the errors of predictions.
-  void note_prediction(const Pose& T_predicted_found) {
-    constexpr double kShare = 0.1, kArm = 10.0;  // m
-    if (period_ <= 0.0) return;
-    const Eigen::Matrix3d R = T_predicted_found.linear();
+  /// Of a motion: m, a turn counts at an arm of 10 m.
+  static double length_of(const Pose& T) {
+    constexpr double kArm = 10.0;  // m
+    const Eigen::Matrix3d R = T.linear();
     const Eigen::Vector3d axis(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
-    const double turn = std::atan2(axis.norm(), R.trace() - 1.0);  // rad
-    const double error = T_predicted_found.translation().norm() + kArm * turn;
-    expected_error_ += kShare * (error - expected_error_);
+    return T.translation().norm() + kArm * std::atan2(axis.norm(), R.trace() - 1.0);
   }
 
-  void add_to_map(const Pose& T_world_sensor, Span<const PointLabel> labels) {
-    constexpr double kForget = 0.1;  // of the reach
-    for (const ScanPreparation::Point& point : preparation_.map_points()) {
-      if (!labels.empty() && labels[point.index] == PointLabel::kDynamic) continue;
-      map_.insert(T_world_sensor * point.position);
+  /// The map of the first scan, whose motion is that until the second one.
+  void start_map(const Pose& T_first_second, double period) {
+    map_ = LocalMap();
+    first_->prepare(T_first_second, period);
+    for (const ScanPreparation::Point& point : first_->map_points()) map_.insert(point.position);
+  }
+
+  /// Judges the scan, adds it to the map, and is ready for the next one.
+  void take(const Pose& T_last_newest, double period, double mean_time, OdometryResult& result) {
+    constexpr double kShare = 0.1;
+    if (period_ > 0.0) {  // the running mean of the errors of predictions
+      const double error = length_of(predicted_motion(period).inverse() * T_last_newest);
+      expected_error_ += kShare * (error - expected_error_);
     }
-    const Eigen::Vector3d& centre = T_world_sensor.translation();
+    T_world_last_ = orthonormalized(T_world_last_ * T_last_newest);
+    if (config_.remove) {
+      if (scan_count_ < 2) remover_.emplace(DynaInsRemover::Config::odometry());
+      if (first_) remover_->push(first_->cloud(), Pose::Identity(), mean_time_);
+      result.labels = remover_->push(scan_.cloud(), T_world_last_, mean_time).newest.labels;
+    }
+    scan_.adapt();
+    if (scan_count_ == 0) {
+      first_ = scan_;
+    } else {
+      add_to_map(result.labels);
+      first_.reset();
+      T_last_newest_ = T_last_newest;
+      period_ = period;
+    }
+    mean_time_ = mean_time;
+    ++scan_count_;
+  }
+
+  void add_to_map(Span<const PointLabel> labels) {
+    constexpr double kForget = 0.1;  // of the reach
+    for (const ScanPreparation::Point& point : scan_.map_points()) {
+      if (!labels.empty() && labels[point.index] == PointLabel::kDynamic) continue;
+      map_.insert(T_world_last_ * point.position);
+    }
+    const Eigen::Vector3d& centre = T_world_last_.translation();
     if ((centre - centre_).norm() < kForget * config_.farthest) return;
     map_.forget_beyond(centre, 1.1 * config_.farthest);
     centre_ = centre;
   }
 
+  // Poses of scans are those at the mean time of their points. The frame `world` is the first one;
+  // results refer to `start`, the sensor at the stamp of the first scan.
   Config config_;
-  ScanPreparation preparation_;
+  ScanPreparation scan_;
+  std::optional<ScanPreparation> first_;  // until the motion of the first scan is known
   LocalMap map_;
   std::optional<DynaInsRemover> remover_;
+  Pose T_world_start_ = Pose::Identity();
   Pose T_world_last_ = Pose::Identity();
   Pose T_last_newest_ = Pose::Identity();
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();  // m, of the map
   double expected_error_ = 0.5;                       // m, of predictions
-  double time_ = 0.0;                                 // s
-  double period_ = 0.0;                               // s, 0: one scan or none
+  double mean_time_ = 0.0;                            // s, of the last scan
+  double period_ = 0.0;                               // s, of T_last_newest_; 0: not known
   std::size_t scan_count_ = 0;
 };
 
@@ -145,7 +189,6 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 OdometryResult Odometry::push(RawPoints<float> points, Span<const double> offsets, double time) {
-  loop_->check(points, offsets, time);
   return loop_->push(points, offsets, time);
 }
 

@@ -9,6 +9,8 @@
 namespace dynains::odometry {
 namespace {
 
+constexpr double kLongest = 0.5;  // s from the stamp, of offsets that can be right
+
 bool is_first_in_voxel(VoxelHashTable<>& taken, const Eigen::Vector3d& p, double edge) {
   const std::size_t count = taken.size();
   return taken.insert(voxel_of(p, edge)) == count;
@@ -16,31 +18,49 @@ bool is_first_in_voxel(VoxelHashTable<>& taken, const Eigen::Vector3d& p, double
 
 }  // namespace
 
-/// Moves points by the nearest of equally spaced poses of the sensor.
-void ScanPreparation::deskew(RawPoints<float> points, Span<const double> offsets,
-                             const Pose& motion, double period) {
-  constexpr double kStep = 0.0005, kLongest = 0.5;  // s
-  constexpr auto kSteps = static_cast<std::size_t>(2.0 * kLongest / kStep);
-  std::vector<Pose> T_scan_point(kSteps + 1);
-  for (std::size_t k = 0; k <= kSteps; ++k) {
-    T_scan_point[k] =
-        extrapolate(Pose::Identity(), motion, (static_cast<double>(k) * kStep - kLongest) / period);
-  }
+void ScanPreparation::take(RawPoints<float> points, Span<const double> offsets) {
+  measured_.resize(3 * points.count);
   for (std::size_t i = 0; i < points.count; ++i) {
+    std::copy_n(points.data + i * points.stride, 3, &measured_[3 * i]);
+  }
+  offsets_.assign(offsets.begin(), offsets.end());
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < offsets_.size(); ++i) {
+    if (!is_timed(i)) continue;
+    sum += offsets_[i];
+    ++count;
+  }
+  mean_offset_ = count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
+/// Whether a point is a return with a time.
+bool ScanPreparation::is_timed(std::size_t i) const {
+  const Eigen::Map<const Eigen::Vector3f> p(&measured_[3 * i]);
+  return std::abs(offsets_[i]) <= kLongest && p.allFinite() && !p.isZero(0.0F);
+}
+
+/// Moves points by the nearest of equally spaced poses of the sensor.
+void ScanPreparation::deskew(const Pose& motion, double period) {
+  constexpr double kStep = 0.0005;  // s
+  constexpr auto kSteps = static_cast<std::size_t>(4.0 * kLongest / kStep);
+  std::vector<Pose> T_mean_point(kSteps + 1);
+  for (std::size_t k = 0; k <= kSteps; ++k) {
+    const double time = static_cast<double>(k) * kStep - 2.0 * kLongest;
+    T_mean_point[k] = extrapolate(Pose::Identity(), motion, time / period);
+  }
+  for (std::size_t i = 0; i < offsets_.size(); ++i) {
+    if (!is_timed(i)) continue;
     Eigen::Map<Eigen::Vector3f> p(&cloud_[3 * i]);
-    if (!(std::abs(offsets[i]) <= kLongest) || p.isZero(0.0F)) continue;
-    const auto k = static_cast<std::size_t>(std::lround((offsets[i] + kLongest) / kStep));
-    p = (T_scan_point[k] * p.cast<double>()).cast<float>();
+    const double time = offsets_[i] - mean_offset_ + 2.0 * kLongest;
+    p = (T_mean_point[static_cast<std::size_t>(std::lround(time / kStep))] * p.cast<double>())
+            .cast<float>();
   }
 }
 
-void ScanPreparation::prepare(RawPoints<float> points, Span<const double> offsets,
-                              const Pose& motion, double period) {
-  cloud_.resize(3 * points.count);
-  for (std::size_t i = 0; i < points.count; ++i) {
-    std::copy_n(points.data + i * points.stride, 3, &cloud_[3 * i]);
-  }
-  if (!offsets.empty() && period > 0.0) deskew(points, offsets, motion, period);
+void ScanPreparation::prepare(const Pose& motion, double period) {
+  cloud_ = measured_;
+  if (!offsets_.empty()) deskew(motion, period);
   thin_out();
 }
 

@@ -15,16 +15,22 @@ namespace dynains::odometry {
 class ScanPreparation {
  public:
   struct Point {
-    Eigen::Vector3d position;  ///< m, sensor frame at the time of the scan
+    Eigen::Vector3d position;  ///< m, sensor frame at the mean time of the points
     std::size_t index;         ///< in the cloud
   };
 
   /// `nearest`, `farthest`: m, range of the points that are used.
   ScanPreparation(double nearest, double farthest) : nearest_(nearest), farthest_(farthest) {}
 
-  /// `offsets`: s, empty or one per point. `motion`: of the sensor in `period` s; 0: not known.
-  void prepare(RawPoints<float> points, Span<const double> offsets, const Pose& motion,
-               double period);
+  /// Copies a scan. `offsets`: s from the stamp, empty or one per point.
+  void take(RawPoints<float> points, Span<const double> offsets);
+  /// s from the stamp; 0 without offsets. A registration of points that are de-skewed to this time
+  /// hardly changes with an error of the velocity.
+  double mean_offset() const { return mean_offset_; }
+  bool has_one_time() const { return offsets_.empty(); }
+
+  /// De-skews to the mean time and thins out. `motion`: of the sensor in `period` > 0 s.
+  void prepare(const Pose& motion, double period);
 
   /// Adapts the large voxels to the scan, for the scans after it.
   void adapt();
@@ -37,13 +43,16 @@ class ScanPreparation {
   const std::vector<Eigen::Vector3d>& keypoints() const { return keypoints_; }
 
  private:
-  void deskew(RawPoints<float> points, Span<const double> offsets, const Pose& motion,
-              double period);
+  bool is_timed(std::size_t i) const;
+  void deskew(const Pose& motion, double period);
   void thin_out();
 
   double nearest_;
   double farthest_;
   double edge_ = 1.0;  // m, of the large voxels
+  double mean_offset_ = 0.0;
+  std::vector<float> measured_;  // points as they came
+  std::vector<double> offsets_;
   std::vector<float> cloud_;
   std::vector<Point> map_points_;
   std::vector<Eigen::Vector3d> keypoints_;

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/trajectory.hpp"
+#include "dynains/median.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
@@ -60,6 +62,44 @@ TEST_CASE("In a hall and in a crowd, poses are found to centimetres, with and wi
       CAPTURE(static_cast<int>(scene), remove, worst_error(found));
       CHECK(found.exact.back().translation().norm() > 0.1);
       CHECK(worst_error(found) < 0.1);
+    }
+  }
+}
+
+/// Median of the errors of the motion from scan to scan, m, for stamps `shift` s after the first
+/// point of each scan.
+double error_of_motion(const std::vector<simulation::SimulatedScan>& scans, double shift) {
+  Odometry odometry{OdometryConfig()};
+  std::vector<double> errors;
+  Pose T_world_estimated = Pose::Identity(), T_world_exact = Pose::Identity();
+  for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
+    const double period = scans[i + 1].time - scans[i].time;
+    const Pose T_exact =
+        extrapolate(scans[i].T_world_sensor, scans[i + 1].T_world_sensor, shift / period);
+    std::vector<double> offsets;
+    for (const float time : scans[i].times) offsets.push_back(time - shift);
+    const OdometryResult found = odometry.push(points_of(scans[i]), offsets, scans[i].time + shift);
+    REQUIRE(found.loss == OdometryLoss::kNone);
+    const Pose motion = T_world_estimated.inverse() * found.T_world_sensor;
+    const Pose exact = T_world_exact.inverse() * T_exact;
+    if (i > 0) errors.push_back((motion.translation() - exact.translation()).norm());
+    T_world_estimated = found.T_world_sensor;
+    T_world_exact = T_exact;
+  }
+  return median(std::move(errors));
+}
+
+TEST_CASE("Points with times: motions to 3 cm, wherever in the turn the stamp is") {
+  for (const double speed : {1.2, 10.0}) {
+    simulation::Config config = place(simulation::Scene::kUrban, 14);
+    config.ego_speed = speed;
+    config.rolling_shutter = true;
+    simulation::Simulator simulator(config);
+    std::vector<simulation::SimulatedScan> scans;
+    for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+    for (const double shift : {0.0, 0.05, 0.1}) {
+      CAPTURE(speed, shift);
+      CHECK(error_of_motion(scans, shift) < 0.03);
     }
   }
 }

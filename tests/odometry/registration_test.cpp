@@ -136,25 +136,32 @@ TEST_CASE("An upright pole is a surface; a ring of the sensor is none") {
   CHECK(map.surface_at({0.1, 22.0, 0.0}, up).direction_count == 0);
 }
 
-TEST_CASE("Points are moved by the motion until they were measured") {
+TEST_CASE("Points are moved by the motion between their time and the mean time") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<float> xyz = {5.0F, 0.0F, 1.0F, 5.0F, 0.0F, 1.0F,
                                   5.0F, 0.0F, 1.0F, 0.0F, 0.0F, 0.0F};
-  const std::vector<double> offsets = {0.05, -0.1, std::numeric_limits<double>::quiet_NaN(), 0.05};
+  const std::vector<double> offsets = {0.25, 0.1, nan, 0.05};
   Pose T = Pose::Identity();
   T.translation().x() = 2.0;
   T.linear() = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   ScanPreparation preparation(1.0, 100.0);
+  preparation.take({xyz.data(), 4, 3}, offsets);
+  CHECK(preparation.mean_offset() == Approx(0.175));  // of returns with a time
   const auto point = [&](std::size_t i) {
     return Eigen::Vector3f(preparation.cloud().data + 3 * i).cast<double>().eval();
   };
-  preparation.prepare({xyz.data(), 4, 3}, offsets, T, 0.1);
-  const Eigen::Vector3d half(1.0 + 5.0 * std::cos(0.1), 5.0 * std::sin(0.1), 1.0);
-  CHECK((point(0) - half).norm() < 1e-5);
-  const Eigen::Vector3d before(-2.0 + 5.0 * std::cos(0.2), -5.0 * std::sin(0.2), 1.0);
-  CHECK((point(1) - before).norm() < 1e-5);
-  CHECK(point(2) == Eigen::Vector3d(5.0, 0.0, 1.0));
-  CHECK(point(3).isZero(0.0));
-  preparation.prepare({xyz.data(), 4, 3}, offsets, T, 0.0);  // no motion is known
+  for (int turn = 0; turn < 2; ++turn) {  // from the points as they were measured
+    preparation.prepare(T, 0.15);
+    const Eigen::Vector3d after(1.0 + 5.0 * std::cos(0.1), 5.0 * std::sin(0.1), 1.0);
+    CHECK((point(0) - after).norm() < 1e-5);
+    const Eigen::Vector3d before(-1.0 + 5.0 * std::cos(0.1), -5.0 * std::sin(0.1), 1.0);
+    CHECK((point(1) - before).norm() < 1e-5);
+    CHECK(point(2) == Eigen::Vector3d(5.0, 0.0, 1.0));
+    CHECK(point(3).isZero(0.0));
+  }
+  preparation.take({xyz.data(), 4, 3}, {});
+  preparation.prepare(T, 0.1);
+  CHECK(preparation.mean_offset() == 0.0);
   CHECK(point(0) == Eigen::Vector3d(5.0, 0.0, 1.0));
 }
 

@@ -46,7 +46,7 @@ constexpr std::array<const char*, 3> value_names(OdometryLoss) {
 
 /// The answer to one scan.
 struct OdometryResult {
-  /// In the frame of the first scan. After a loss: the predicted pose.
+  /// At the stamp, in the frame of the first scan at its stamp. After a loss: the predicted pose.
   Pose T_world_sensor = Pose::Identity();
   OdometryLoss loss = OdometryLoss::kNone;
   double fit = 1.0;  ///< share of the points that lie on surfaces of the map, [0, 1]
@@ -58,11 +58,11 @@ struct OdometryResult {
   Span<const PointLabel> labels;
 };
 
-/// Scans in, poses out. Each scan is predicted at constant velocity, de-skewed if its points have
-/// times, and registered point to plane (poles: point to line) to a map of voxels (Chen and Medioni
-/// 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess and Singh 2016). Then
-/// the remover judges the scan, and only points that do not move enter the map. The first motion is
-/// searched for up to 3 m. Same scans, same bits.
+/// Scans in, poses out. Each scan is predicted at constant velocity, de-skewed to the mean time of
+/// its points if they have times, and registered point to plane (poles: point to line) to a map of
+/// voxels (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
+/// and Singh 2016). Then the remover judges the scan, and only points that do not move enter the
+/// map. The first motion is searched for up to 3 m. Same scans, same bits.
 class Odometry {
  public:
   using Config = OdometryConfig;
@@ -76,8 +76,9 @@ class Odometry {
   /// Takes the next scan: points in m, sensor frame; NaN, infinity and the origin are no returns.
   /// `offsets`: for each point the seconds from `time` (s) until it was measured, or none if the
   /// points are all of one time; a point without a finite offset keeps its place. Throws CloudError
-  /// if the numbers of offsets and points differ, and PoseError if `time` is not after the time of
-  /// the scan before; the state is then unchanged. A lost scan does not enter the map.
+  /// if the numbers of offsets and points differ, and PoseError if the mean time of the points is
+  /// not after that of the scan before; the state is then unchanged. A lost scan does not enter the
+  /// map.
   OdometryResult push(RawPoints<float> points, Span<const double> offsets, double time);
 
  private:
