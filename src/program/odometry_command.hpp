@@ -2,17 +2,11 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <stdexcept>
 
 #include "recording_options.hpp"
 #include "run/estimate_poses.hpp"
 
 namespace dynains::program {
-
-/// The odometry lost track; results of the scans before it are complete.
-struct LostTrack : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// Adds --no-deskew.
 void add_compensated_flag(CLI::App& command, bool& is_compensated);

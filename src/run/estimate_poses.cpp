@@ -28,19 +28,13 @@ std::string loss_at(const Recording& recording, std::size_t scan, std::size_t do
   return text + "; " + std::to_string(done) + " scans before it have poses";
 }
 
-}  // namespace
-
-PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
-                            const std::function<void(std::size_t, std::size_t)>& progress) {
-  const ScanRange range = select_scans(recording, window);
-  if (range.size() < 2) {
-    throw ConfigError(recording.folder().string() +
-                      ": the odometry needs two scans or more, found one");
-  }
+/// Poses of the scans before the first one that is lost. Reads the recording until it returns.
+PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool one_thread,
+                        const std::function<void(std::size_t, std::size_t)>& progress,
+                        std::vector<Pose>& poses) {
   const InterruptGuard interrupt;
   Odometry odometry{OdometryConfig()};
   PoseEstimate estimate;
-  std::vector<Pose> poses;
   RecordedScan scan;
   ReadAhead scans(recording, range.first, range.last,
                   one_thread ? std::launch::deferred : std::launch::async);
@@ -58,7 +52,21 @@ PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool
     poses.push_back(result.T_world_sensor);
     progress(poses.size(), range.size());
   }
-  if (poses.size() < 2) throw IoError(*estimate.loss);
+  return estimate;
+}
+
+}  // namespace
+
+PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
+                            const std::function<void(std::size_t, std::size_t)>& progress) {
+  const ScanRange range = select_scans(recording, window);
+  if (range.size() < 2) {
+    throw ConfigError(recording.folder().string() +
+                      ": the odometry needs two scans or more, found one");
+  }
+  std::vector<Pose> poses;
+  const PoseEstimate estimate = find_poses(recording, range, one_thread, progress, poses);
+  if (poses.size() < 2) throw LostTrack(*estimate.loss);
   recording.take_poses(range.first, poses);
   return estimate;
 }

@@ -4,12 +4,18 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "dynains/io/recording.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {
+
+/// The odometry lost track; results of the scans before it are complete.
+struct LostTrack : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// Findings of the odometry about a recording.
 struct PoseEstimate {
@@ -22,7 +28,8 @@ struct PoseEstimate {
 /// Gives poses to the scans in `window`, up to the first one that the odometry loses, and leaves
 /// out the others. The first scan is the world frame. Calls `progress(done, total)` before the
 /// first scan and after each; a signal ends the command. `one_thread`: this thread also reads.
-/// Throws IoError, ConfigError for a window with fewer than two scans, and Interrupted.
+/// Throws IoError, ConfigError for a window with fewer than two scans, LostTrack if fewer have
+/// poses, and Interrupted.
 PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
                             const std::function<void(std::size_t, std::size_t)>& progress);
 

@@ -108,6 +108,19 @@ TEST_CASE("After a loss of track, the scans before it have results") {
   CHECK(count_files(out / "labels") == 8);
 }
 
+TEST_CASE("A loss of track at the second scan leaves nothing, with the exit code of a later one") {
+  const Unposed recording(4, 1);
+  const fs::path out = recording / "out";
+  for (const char* command : {"odometry", "run"}) {
+    std::vector<std::string> arguments = {command, recording.sequence(), "--out", out, "-q"};
+    if (std::string(command) == "run") arguments.push_back("--odometry");
+    const Outcome outcome = start(arguments);
+    CHECK(outcome.code == 3);
+    CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000001"));
+    CHECK_FALSE(fs::exists(out));
+  }
+}
+
 TEST_CASE("The odometry refuses what it cannot use") {
   const Unposed recording(3);
   const auto error = [&](std::vector<std::string> more) {
