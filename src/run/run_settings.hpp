@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/config.hpp"
@@ -17,12 +18,14 @@
 
 namespace dynains::program {
 
-/// The number that a text is, for a field that may be empty. Throws ConfigError.
+/// The number that a text is, for a field that may be empty; without a sign, that of a scan. Throws
+/// ConfigError.
 template <class T>
 std::optional<T> read_number(const std::string& text) {
   const std::optional<T> value = parse_value<T>(text);
-  if (!value) throw ConfigError("expected a number, found " + text);
-  return value;
+  if (value) return value;
+  const std::string what = std::is_unsigned_v<T> ? "the number of a scan" : "a number";
+  throw ConfigError("expected " + what + ", found " + text);
 }
 
 struct RunSettings {

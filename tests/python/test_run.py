@@ -105,7 +105,7 @@ def test_arguments_by_name(drive, tmp_path):
         ({"config": {"window": 4}}, TypeError, "expected a Config"),
         ({"config": dynains.Config(min_range=50, max_range=40)}, dynains.ConfigError, "min_range"),
         ({"progress": 3}, TypeError, "progress = 3: expected a function"),
-        ({"start": -1}, dynains.ConfigError, "start: expected a number, found -1"),
+        ({"start": -1}, dynains.ConfigError, "start: expected the number of a scan, found -1"),
         ({"start": 50}, dynains.ConfigError, "leave no scan"),
         ({"map": "map.txt"}, dynains.ConfigError, "map.txt"),
         ({"crs": "EPSG:25832"}, dynains.ConfigError, "las"),
