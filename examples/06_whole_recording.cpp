@@ -79,19 +79,17 @@ int main() {
   std::vector<dynains::VerdictArrays> verdicts;  // by scan
   dynains::MemoryStore store;                    // or your own ByteStore, for example a file
   dynains::SecondPass pass(store);
-  dynains::ComparedPoses compared;
 
   dynains::DynaInsRemover::Config config;
   config.build_map = false;
   dynains::DynaInsRemover remover(config);
   const auto take = [&](const dynains::ScanVerdict& verdict) {
-    pass.add(scans[verdict.scan].points, verdict, compared[verdict.scan]);
+    pass.add(scans[verdict.scan].points, verdict);
     verdicts.emplace_back().take(verdict, /*with_beliefs=*/true);
   };
   for (const Scan& scan : scans) {
     const dynains::FrameResult frame =
         remover.push(dynains::PointsView(scan.points), scan.T_world_sensor, scan.time);
-    compared.add(frame);
     if (frame.finished) take(*frame.finished);
   }
   remover.flush(take);
@@ -99,7 +97,7 @@ int main() {
 
   pass.test();
   for (std::uint32_t i = 0; i < scans.size(); ++i) {
-    pass.revise(scans[i].points, i, verdicts[i]);
+    pass.revise(scans[i].points, i, scans[i].T_world_sensor, verdicts[i]);
   }
   const double after = moving_share(scans, verdicts);
   std::cout << "moving points of the van: " << 100.0 * before << " % by the stream, "

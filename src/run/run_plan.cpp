@@ -78,7 +78,7 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
 
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
-  const int passes = settings.passes;
+  const int passes = passes_of(settings);
   if (passes < 1 || passes > 2) {
     throw ConfigError("--passes " + std::to_string(passes) + ": expected 1 or 2");
   }
@@ -105,7 +105,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   add_map_attributes(settings, config, outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
-  if (settings.passes > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
+  if (passes_of(settings) > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
   return outputs;
 }
 
@@ -232,7 +232,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["session"] = session.info.name;
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
-  request["passes"] = settings.passes;
+  request["passes"] = passes_of(settings);
   if (!outputs.log.empty()) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
@@ -249,7 +249,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           configuration,
           std::move(request),
           std::move(session),
-          settings.passes,
+          passes_of(settings),
           settings.static_policy};
 }
 

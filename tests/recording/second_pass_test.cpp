@@ -57,16 +57,8 @@ VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Remov
   return verdict;
 }
 
-/// The first pass compares fewer scans than one drive has.
-SecondPassConfig short_first_pass() {
-  SecondPassConfig config;
-  config.evidence.lookback_scans = 10;
-  config.evidence.lookahead_scans = 10;
-  return config;
-}
-
 SecondPassConfig last_policy() {
-  SecondPassConfig config = short_first_pass();
+  SecondPassConfig config;
   config.static_policy = StaticPolicy::kLast;
   return config;
 }
@@ -78,9 +70,7 @@ struct Counts {
 /// Points of each scan with a label, after both passes.
 std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
                           const Removes& removes = removes_nothing,
-                          const SecondPassConfig& config = short_first_pass(),
-                          std::size_t second_epoch = 0,
-                          const Pose& T_turned_world = Pose::Identity()) {
+                          const SecondPassConfig& config = {}) {
   MemoryStore store;
   SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
@@ -88,12 +78,11 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     ScanVerdict verdict;
     verdict.scan = i;
     verdict.time = 0.5 * static_cast<double>(i);
-    verdict.T_world_sensor = T_turned_world * recording.scans[i].T_world_sensor;
+    verdict.T_world_sensor = recording.scans[i].T_world_sensor;
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
     verdict.instances = arrays.instances;
-    pass.add(recording.scans[i].points, verdict,
-             {verdict.T_world_sensor, i == 0 || i == second_epoch});
+    pass.add(recording.scans[i].points, verdict);
   }
   pass.test([tests] { return tests; });
   CHECK(pass.is_decided() == tests);
@@ -103,7 +92,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
   for (const BoxScan& scan : recording.scans) {
     VerdictArrays arrays = first_verdict(scan, number, removes);
     const VerdictArrays before = arrays;
-    const bool has_changed = pass.revise(scan.points, number++, arrays);
+    const bool has_changed = pass.revise(scan.points, number++, scan.T_world_sensor, arrays);
     CHECK(has_changed == (arrays.labels != before.labels));
     counts.emplace_back();
     for (std::size_t i = 0; i < arrays.labels.size(); ++i) {
@@ -205,38 +194,12 @@ TEST_CASE("a car that parks and stays is static if what stands at last is, and s
   const Counts always = sum(count(recording, kCar));
   CHECK(always.removed > 9 * always.kept);
   const Counts last = sum(count(recording, kCar, true, removes_nothing, last_policy()));
-  // The last look passes the edge of a place, and hits nothing else there.
-  CHECK(last.kept > 100 * last.removed);
+  CHECK(last.kept > 0);
+  CHECK(last.removed == 0);
   // A car that left is in neither map.
   const Counts left = sum(count(with_parked_car(), kCar, true, removes_nothing, last_policy()));
   CHECK(left.removed > 9 * left.kept);
   CHECK(sum(count(recording, kHouse, true, removes_nothing, last_policy())).removed == 0);
-}
-
-TEST_CASE("an epoch does not judge another one, and no scan that the first pass has compared") {
-  const Recorded recording = with_parked_car();
-  const std::size_t turn = recording.scans.size() / 2;
-  CHECK(sum(count(recording, kCar, true, removes_nothing, short_first_pass(), turn)).removed == 0);
-  CHECK(sum(count(recording, kCar, true, removes_nothing, {})).removed == 0);
-}
-
-TEST_CASE("the ground tells which way is up") {
-  const Recorded recording = with_parked_car();
-  const Counts upright = sum(count(recording, kCar));
-  Pose T_turned_world(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.6, 0.0, 0.8)));
-  T_turned_world.translation() = Eigen::Vector3d(100.0, -50.0, 20.0);
-  const Counts turned =
-      sum(count(recording, kCar, true, removes_nothing, short_first_pass(), 0, T_turned_world));
-  CHECK(turned.removed == Approx(upright.removed).epsilon(0.01));
-}
-
-TEST_CASE("the margins are those of the first pass") {
-  SecondPassConfig config = short_first_pass();
-  config.evidence.margin = 2.0;
-  config.evidence.margin_slope = 0.1;
-  const Recorded recording = with_parked_car();
-  CHECK(sum(count(recording, kCar, true, removes_nothing, config)).removed <
-        sum(count(recording, kCar)).removed);
 }
 
 TEST_CASE("a second pass that was interrupted changes nothing") {
@@ -299,7 +262,7 @@ TEST_CASE("neither memory nor threads change the second pass") {
   CHECK(counts.removed > 0);
   for (const double memory : {0.0, 160.0}) {
     for (const int threads : {1, 2}) {
-      SecondPassConfig config = short_first_pass();
+      SecondPassConfig config;
       config.memory = memory;
       config.threads = threads;
       const Counts others = sum(count(recording, kCar, true, removes_nothing, config));
@@ -319,19 +282,19 @@ TEST_CASE("the second pass refuses scans out of order and verdicts of another si
   MemoryStore store;
   SecondPass pass(store);
   verdict.scan = 1;
-  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
   verdict.scan = 0;
-  CHECK_THROWS_AS(pass.add(PointBuffer(), verdict, {}), UsageError);
-  pass.add(scan.points, verdict, {});
-  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
+  CHECK_THROWS_AS(pass.add(PointBuffer(), verdict), UsageError);
+  pass.add(scan.points, verdict);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
   pass.test();
   verdict.scan = 1;
-  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
   VerdictArrays short_one = arrays;
   short_one.causes.pop_back();
-  CHECK_THROWS_AS(pass.revise(scan.points, 0, short_one), UsageError);
+  CHECK_THROWS_AS(pass.revise(scan.points, 0, scan.T_world_sensor, short_one), UsageError);
   VerdictArrays whole = arrays;
-  CHECK_FALSE(pass.revise(scan.points, 0, whole));
+  CHECK_FALSE(pass.revise(scan.points, 0, scan.T_world_sensor, whole));
   SecondPassConfig config;
   config.threads = 3;
   CHECK_THROWS_AS(SecondPass(store, config), ConfigError);
