@@ -38,6 +38,13 @@ void check_is_outside(const fs::path& city, const std::string& name) {
   }
 }
 
+/// Throws IoError if a file is there and must not be replaced.
+void check_is_new(const fs::path& path, const std::string& name, bool force) {
+  if (fs::exists(fs::symlink_status(path)) && !force) {
+    throw IoError(name + ": exists; choose another name, or replace it by --force");
+  }
+}
+
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
 /// format has them.
 class CityPointFile {
