@@ -4,8 +4,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "dynains/io/atomic_file.hpp"
-
 namespace dynains::program {
 
 EvaluationOptions::EvaluationOptions(CLI::App& command, std::string unlabeled,
@@ -62,15 +60,13 @@ void add_window_options(CLI::App& command, ScanWindow& window) {
 }
 
 TextFile::TextFile(const std::string& path) {
-  if (!path.empty()) file_.emplace(path, true, InputFiles());
+  if (!path.empty()) file_.emplace(path);
 }
 
 void TextFile::write(const std::string& text) {
   if (!file_) return;
-  AtomicFile file(file_->path());
-  file.stream() << text;
-  file.commit();
-  file_->put_in_place();
+  file_->stream() << text;
+  file_->commit();
 }
 
 }  // namespace dynains::program

@@ -17,6 +17,7 @@
 #include "dynains/pose.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
+#include "run/finished_run.hpp"
 #include "run/interrupt.hpp"
 #include "run/json_file.hpp"
 #include "run/labelled_sequence.hpp"
@@ -24,7 +25,7 @@
 #include "run/output_folder.hpp"
 #include "run/repose_session.hpp"
 #include "run/run_plan.hpp"
-#include "run/write_view.hpp"
+#include "run/run_request.hpp"
 
 namespace dynains::program {
 namespace {
@@ -58,9 +59,13 @@ struct EarlierRun {
   double map_voxel = 0.0;  // m
 };
 
-EarlierRun read_run(const ResultFolder& out) {
+EarlierRun read_run(const OutputFolder& out) {
   EarlierRun run;
-  run.report_file = out.marker_path();
+  run.report_file = out.path() / out.kind().marker;
+  if (!out.has_results()) {
+    throw IoError(run.report_file.string() + ": not found; expected the results of dynains run");
+  }
+  check_run_is_finished(out.path());
   run.report = out.marker();
   run.scans = out.listing().scans;
   run.has_points_in_world =
@@ -82,7 +87,7 @@ std::vector<std::size_t> scans_of(const Recording& recording, const EarlierRun& 
   std::vector<std::size_t> scans;
   std::set<std::string> missing = run.scans;
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (missing.erase(listed_name(recording.name(i))) > 0) scans.push_back(i);
+    if (missing.erase(recording.name(i)) > 0) scans.push_back(i);
   }
   if (missing.empty()) return scans;
   throw IoError(recording.folder().string() + ": has no pose or no scan for " +
@@ -152,10 +157,11 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   return map;
 }
 
-/// The map is a file of its own, or is added to the folder of the run, whose report describes it.
+/// Writes the map and returns its path. In the folder of the run, the report lists the file before
+/// it appears, and describes it afterwards.
 class NewMap {
  public:
-  NewMap(const RemapOptions& options, ResultFolder& out, const Recording& recording,
+  NewMap(const RemapOptions& options, OutputFolder& out, const Recording& recording,
          const ScanRange& range, const InputFiles& inputs)
       : out_(out) {
     const fs::path folder = whole_path(out.path());
@@ -163,44 +169,58 @@ class NewMap {
     if (is_las(path_)) {
       throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
     }
-    if (path_.parent_path() != folder) {
-      check_is_no_scan(path_, recording);
-      outside_.emplace(path_, options.force, inputs);
-    } else if (path_.filename() == kRemappedMap) {
-      added_.emplace(out, kRemappedMap);
-    } else {
+    is_inside_ = path_.parent_path() == folder;
+    if (!is_inside_) {
+      outside_.emplace(path_, recording, range, inputs, options.force);
+      writer_ = outside_->take_writer();
+      return;
+    }
+    if (path_.filename() != kRemappedMap) {
       throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
                         kRemappedMap);
     }
-    writer_ =
-        open_map(outside_ ? outside_->path() : added_->path(), recording, range, RunOutputs());
+    const auto entry = out.folder().find(kRemappedMap);
+    if (entry &&
+        (entry->kind != Folder::Kind::kFile || !out.listing().contains("", kRemappedMap))) {
+      throw IoError(path_.string() +
+                    ": is in the way, and was not written by dynains remap; move it away");
+    }
+    // Before the file of this command: a file system without locks does not tell which is whose.
+    out.remove_temporaries();
+    remove_leftovers(folder, [](const std::string& name) { return name == kRemappedMap; });
+    writer_ = open_map(path_, recording, range, RunOutputs());
   }
 
   const fs::path& path() const { return path_; }
 
   /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   template <class Publish>
-  void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
+  void write(const StaticMapAccumulator& map, Json report, const Json& description,
+             Publish&& publish_more) {
     map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
-    writer_->commit();
-    if (outside_) {
+    writer_->prepare();
+    if (!is_inside_) {
       publish_more();
-      return outside_->put_in_place();
+      writer_->commit();
+      return;
     }
-    Json report = out_.marker();
+    OutputListing listing = out_.listing();
+    listing.files.insert(kRemappedMap);
     report.erase(kField);
-    added_->put_in_place(report, publish_more);
+    out_.mark(report, listing);
+    publish_more();
+    writer_->commit();
     report[kField] = description;
-    out_.mark(report, OutputListing(out_.listing()));
+    out_.mark(report, listing);
   }
 
  private:
   static constexpr const char* kField = "remapped_map";
 
-  ResultFolder& out_;
+  OutputFolder& out_;
   fs::path path_;
-  std::optional<OutputFile> outside_;
-  std::optional<AddedFile> added_;
+  bool is_inside_ = false;
+  std::optional<OutsideMap> outside_;
   std::unique_ptr<MapFile> writer_;
 };
 
@@ -241,7 +261,8 @@ Json point_flags(const EarlierRun& run) {
 
 void remap(RemapOptions& options) {
   check_run_folder(options.run);
-  ResultFolder out = open_finished_run(options.run);
+  const LockedFolder lock(options.run);
+  OutputFolder out(Folder(options.run), run_output_kind());
   const EarlierRun run = read_run(out);
   options.sequence.complete(options.sequence.folder(), point_flags(run));
   const Recording corrected = open_corrected(options, run);
@@ -268,7 +289,7 @@ void remap(RemapOptions& options) {
          out.path(), pose_fingerprint(corrected, range), scans},
         original ? *original : corrected, corrected);
   }
-  file.write(map,
+  file.write(map, run.report,
              {{"file", kRemappedMap},
               {"points", map.size()},
               {"map_voxel", map.config().map_voxel},

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
-#include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
@@ -54,8 +53,11 @@ struct RunDescription {
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
                                    const RunTiming& timing);
 
-/// The folder of a run.
-const OutputKind& run_output_kind();
+/// The report of a run that is not finished.
+nlohmann::ordered_json unfinished_report(const std::string& map);
+
+/// Text of a report, as in the file.
+std::string to_text(const nlohmann::ordered_json& report);
 
 /// Throws IoError.
 void write_timing(const std::filesystem::path& path, const RunTiming& timing);

@@ -154,12 +154,12 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   is_refused(start({"map", days.at("city"), "export", days.at("city/x.ply")}), "lies in the map");
   is_refused(start({"run", days.at("day1"), "--out", days.at("out3"), "--session", "x"}),
              "--session needs --update");
-  // The same run again adds no second session.
-  CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
+  // Nothing to do for a complete run; no second session.
+  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
   CHECK(content_of(days.at("city")) == before);
   // Removed points come back with the same bytes.
   CHECK(start({"map", days.at("city"), "drop", "day0"}).code == 0);
-  CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
+  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
   CHECK(content_of(days.at("city")) == before);
 }
 
@@ -189,7 +189,7 @@ TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
                                         "--update", days.at("city"), "-q",    "--accept-poses"};
   for (const int signal : {SIGKILL, SIGTERM}) {
     Process process(run);
-    const auto is_writing = [&] { return fs::exists(days.at("out2.partial/labels/000020.label")); };
+    const auto is_writing = [&] { return fs::exists(days.at("out2/labels/000020.label")); };
     for (int i = 0; i < 3000 && !is_writing(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -301,7 +301,7 @@ TEST_CASE("map: a session of a slightly different frame is aligned, or refused b
   }
   CHECK(session["alignment"]["sessions"] == nlohmann::json({"day1"}));
   CHECK(start({"map", at("city"), "check"}).code == 0);
-  const Outcome again = start(update("day2", {"--force", align[0], align[1], align[2]}));
+  const Outcome again = start(update("day2", {"--resume", align[0], align[1], align[2]}));
   CHECK_THAT(again.out, ContainsSubstring("complete already"));
 
   const auto first = content_of(at("city/day2"));

@@ -80,7 +80,7 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
 
     def disturb():
         while not disturbed:
-            disturbed.extend(out.glob("drive6.partial/labels/*.label"))
+            disturbed.extend(out.glob("drive6/labels/*.label"))
             time.sleep(0.01)
         workers.workers[0].send_signal(signal.SIGKILL)
         workers.workers[1].send_signal(signal.SIGSTOP)
@@ -115,27 +115,12 @@ def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
 
 def test_a_worker_waits_for_a_folder_that_another_holds(drives, tmp_path, monkeypatch):
     monkeypatch.setattr(fleet, "_PATIENCE", 0.0)
-    job = (str(drives / "drive1"), str(tmp_path / "out"), {})
-    (tmp_path / "out.partial").mkdir()
-    other = os.open(tmp_path / "out.partial", os.O_RDONLY)
+    job = (str(drives / "drive1"), str(tmp_path / "out"), {"resume": True})
+    assert fleet._clean_one(*job)["scans"] == 20
+    other = os.open(tmp_path / "out", os.O_RDONLY)
     fcntl.flock(other, fcntl.LOCK_SH)
     assert "is in use" in fleet._clean_one(*job)["error"]
     os.close(other)
-    assert fleet._clean_one(*job)["scans"] == 20
-
-
-def test_finished_recordings_are_not_run_again_and_never_taken_for_others(drives, tmp_path):
-    job = (str(drives / "drive1"), str(tmp_path / "out"))
-    first = fleet._clean_one(*job, {})
-    label = tmp_path / "out" / "labels" / "000003.label"
-    label.unlink()
-    assert fleet._clean_one(*job, {}) == first
-    assert not label.exists()
-    assert "preset default, not paper" in fleet._clean_one(*job, {"preset": "paper"})["error"]
-    assert "update None" in fleet._clean_one(*job, {"update": "/city", "session": "x"})["error"]
-    report = json.loads((tmp_path / "out" / "report.json").read_text())
-    (tmp_path / "out" / "report.json").write_text(json.dumps({**report, "complete": False}))
-    assert "holds earlier results" in fleet._clean_one(*job, {})["error"]
 
 
 def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives, tmp_path, capsys):

@@ -128,6 +128,8 @@ def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
     before = read_labels(finished.folder)
     with pytest.raises(dynains.IoError, match="holds earlier results"):
         dynains.run(drive, finished.folder)
+    again = dynains.run(drive, finished.folder, view=True, write_mcap=True, resume=True)
+    assert again.was_complete_before and again.scans == finished.scans
     dynains.run(drive, finished.folder, view=True, write_mcap=True, force=True)
     assert read_labels(finished.folder) == before
 
@@ -157,15 +159,14 @@ def test_ctrl_c_ends_a_run_as_it_ends_the_program(drive, finished, tmp_path):
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt, match="3 scans"):
         dynains.run(drive, out, progress=interrupt)
-    partial = tmp_path / "out.partial"
-    report = json.loads((partial / "report.json").read_text())
+    report = json.loads((out / "report.json").read_text())
     assert not report["complete"] and report["scans"] == 3
-    assert len(read_labels(partial)) == 3 and not out.exists()
+    assert len(read_labels(out)) == 3
     with pytest.raises(dynains.IoError, match="was interrupted"):
-        dynains.view(partial)
-    assert dynains.run(drive, out).scans == finished.scans
-    assert read_labels(out) == read_labels(finished.folder) and not partial.exists()
-    with pytest.raises(KeyboardInterrupt, match="out.partial"):
+        dynains.view(out)
+    assert dynains.run(drive, out, resume=True).scans == finished.scans
+    assert read_labels(out) == read_labels(finished.folder)
+    with pytest.raises(KeyboardInterrupt, match="stay as they were"):
         dynains.run(drive, out, force=True, progress=interrupt)
     assert read_labels(out) == read_labels(finished.folder)
     assert_python_has_the_signals_back()
@@ -184,7 +185,7 @@ def test_an_error_in_the_callback_ends_the_run(drive, finished, tmp_path):
 
     with pytest.raises(LookupError, match="enough"):
         dynains.run(drive, tmp_path / "out", progress=fail)
-    dynains.run(drive, tmp_path / "out")
+    dynains.run(drive, tmp_path / "out", resume=True)
     assert read_labels(tmp_path / "out") == read_labels(finished.folder)
 
 

@@ -4,8 +4,7 @@
 
 A recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
 depend on the workers, their number, or the order. A task of a worker that dies is given to another
-worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. The same
-command again runs over those that have no results yet.
+worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. Run the command again to complete what is missing.
 """
 
 import argparse
@@ -121,37 +120,18 @@ _ERRORS = (ConfigError, IoError, PoseError, UsageError)
 
 
 def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
-    """Runs over one recording, unless OUT has its results. Returns them, or the error."""
+    """Runs over one recording. Returns its result, with the warnings, or its error."""
     try:
-        report = _finished(Path(out), arguments)
-        if report is None:
-            report = _when_free(lambda: run(recording, out, **arguments)).report
+        result = _when_free(lambda: run(recording, out, **arguments))
     except _ERRORS as error:
         return {"recording": recording, "error": str(error)}
-    result = {key: report[key] for key in ("scans", "points", "labels")}
-    warnings = report.get("doubts", {}).get("warnings", [])
-    return {"recording": recording, **result, "warnings": warnings}
-
-
-def _finished(out: Path, arguments: Dict[str, Any]) -> Optional[Dict[str, Any]]:
-    """The report of a finished run by these arguments, as far as it has them; None without one.
-
-    Raises UsageError if it tells of others.
-    """
-    try:
-        report = json.loads((out / "report.json").read_text())
-    except (OSError, ValueError):
-        return None
-    if not isinstance(report, dict) or not report.get("complete"):
-        return None
-    made = {"preset": report.get("preset"), **report.get("request", {})}
-    for name, otherwise in (("preset", "default"), ("update", None), ("session", None)):
-        wanted = arguments.get(name, otherwise)
-        if made.get(name) != wanted:
-            raise UsageError(
-                f"{out}: holds results with {name} {made.get(name)}, not {wanted}; choose another --out"
-            )
-    return report
+    return {
+        "recording": recording,
+        "scans": result.scans,
+        "points": result.points,
+        "labels": result.label_counts,
+        "warnings": result.report.get("doubts", {}).get("warnings", []),
+    }
 
 
 @contextmanager
@@ -200,7 +180,7 @@ def clean(
     out = Path(out).resolve()
     for name, path in recordings.items():
         _check_name(name, path)
-    common = {**arguments, "one_thread": True}
+    common = {**arguments, "resume": True, "one_thread": True}
     jobs = {
         name: (str(path), str(out / name), {**common, **_session(city, name)})
         for name, path in recordings.items()
