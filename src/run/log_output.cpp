@@ -58,8 +58,9 @@ class CloudEditor {
     const std::string& type = log_.log().topics()[log_.cloud_topic()].type;
     const std::vector<std::uint8_t> classes =
         classes_of(name->second, inspect_cloud(type, cloud).points);
-    return adds_labels_ ? with_labels(type, cloud, classes)
-                        : without_points(type, cloud, kept(classes));
+    if (adds_labels_) return with_labels(type, cloud, classes);
+    const std::vector<std::uint8_t> keep = kept(classes);
+    return without_points(type, cloud, keep);
   }
 
  private:
