@@ -83,8 +83,9 @@ def main(program, node, work):
         rospy.Subscriber("/dynains/residual", PoseWithCovarianceStamped, residuals.append)
         start(node, "points:=/velodyne", "_fixed_frame:=odom", "_map_period:=0.3", "_queue:=100", "_tf_timeout:=10",
               "_min_range:=2.5")
+        # Nobody subscribes to the other topics of the bag.
         start("rosbag", "play", "--quiet", "--wait-for-subscribers", "--delay=1", "--rate=2",
-              bag)
+              bag, "--topics", "/velodyne", "/tf", "/tf_static")
         wait_for(lambda: len(received["dynamic"]) == SCANS and len(received["static"]) == SCANS,
                  f"{SCANS} clouds")
         newest = received["static"][-1].header.stamp

@@ -240,7 +240,7 @@ TEST_CASE("A log that does not fit on the disk is not there, and the other resul
   Fixture fixture;
   const std::string target = fixture.folder / "big.mcap";
   // No other result is as large as the log.
-  REQUIRE(fixture.run({"--write-log", target}).code == 0);
+  REQUIRE(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}).code == 0);
   const rlimit limit{fs::file_size(target) - 1, fs::file_size(target) - 1};
   fs::remove(target);
   fs::remove_all(fixture.out);
@@ -248,14 +248,17 @@ TEST_CASE("A log that does not fit on the disk is not there, and the other resul
     std::signal(SIGXFSZ, SIG_IGN);
     ::setrlimit(RLIMIT_FSIZE, &limit);
   };
-  const Outcome outcome = start(
-      {"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log", target}, limit_files);
+  const Outcome outcome = start({"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log",
+                                 target, "--passes", "1", "--map-voxel", "2"},
+                                limit_files);
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, ContainsSubstring("big.mcap"));
   CHECK(count_entries(fixture.folder.path()) == 2);
   const auto report = nlohmann::json::parse(read_text(fs::path(fixture.out) / "report.json"));
   CHECK(report["complete"] == true);
   // --resume makes up for it.
-  CHECK(fixture.run({"--write-log", target, "--resume"}).code == 0);
+  CHECK(
+      fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2", "--resume"}).code ==
+      0);
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 0));
 }
