@@ -71,8 +71,8 @@ install(FILES ${PROJECT_BINARY_DIR}/dynainsConfig.cmake
 
 # The pkg-config files name the prefix relative to themselves, so that the tree can be moved. That of
 # the headers is of every architecture, that of the compiled remover is not.
-set(dynains_pc_core_folder ${CMAKE_INSTALL_FULL_DATADIR}/pkgconfig)
-set(dynains_pc_remover_folder ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig)
+set(dynains_pc_core_folder ${CMAKE_INSTALL_DATADIR}/pkgconfig)
+set(dynains_pc_remover_folder ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 foreach(kind includedir libdir)
   string(TOUPPER ${kind} upper_kind)
   set(dynains_pc_${kind} "\${prefix}/${CMAKE_INSTALL_${upper_kind}}")
@@ -82,7 +82,8 @@ foreach(kind includedir libdir)
 endforeach()
 function(dynains_install_pc part name)
   set(folder ${dynains_pc_${part}_folder})
-  file(RELATIVE_PATH dynains_pc_to_prefix ${folder} ${CMAKE_INSTALL_PREFIX})
+  get_filename_component(full_folder ${folder} ABSOLUTE BASE_DIR ${CMAKE_INSTALL_PREFIX})
+  file(RELATIVE_PATH dynains_pc_to_prefix ${full_folder} ${CMAKE_INSTALL_PREFIX})
   string(REGEX REPLACE "/$" "" dynains_pc_to_prefix "${dynains_pc_to_prefix}")
   configure_file(cmake/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${folder} COMPONENT dynains_${part})
