@@ -237,7 +237,7 @@ def test_runs_in_threads(drive, finished, tmp_path):
 def test_a_run_of_one_thread_has_the_same_results(drive, finished, tmp_path):
     result = dynains.run(drive, tmp_path / "out", one_thread=True)
     assert read_labels(result.folder) == read_labels(finished.folder)
-    with pytest.raises(TypeError, match="expected bool"):
+    with pytest.raises(dynains.ConfigError, match=r"one_thread = 2: expected true\|false"):
         dynains.run(drive, tmp_path / "other", one_thread=2)
 
 
