@@ -6,7 +6,7 @@
 # tests/long.sh coverage            lines of include/ and src/ that the tests reach
 # tests/long.sh disturbed STARTS    every state after a power cut, every error of every call, and so
 #                                   many random starts of the program
-# tests/long.sh kills COUNT         runs that are killed and resumed
+# tests/long.sh kills COUNT         runs that are killed and repeated
 # tests/long.sh endurance SCANS     scans in one remover
 set -euo pipefail
 cd "$(dirname "$0")/.."

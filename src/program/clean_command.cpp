@@ -11,7 +11,9 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/parameters.hpp"
 #include "io/point_file_copy.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/input_files.hpp"
@@ -55,20 +57,19 @@ fs::path target_of(const CleanOptions& options) {
     throw ConfigError("--map " + target.string() + ": expected a name that ends in " +
                       map.extension().string() + ", as that of the map");
   }
-  if (fs::exists(target) && !options.force) {
-    throw UsageError(target.string() + ": exists; replace it with --force");
-  }
   return target;
 }
 
-/// Throws IoError for a file that the command reads, and for a place among the results of the run.
-void check_target(const fs::path& target, const fs::path& map, const Recording& recording,
-                  const OutputFolder& out) {
+InputFiles inputs_of(const fs::path& map, const Recording& recording) {
   InputFiles inputs;
   inputs.add(map);
   for (const fs::path& file : recording.files()) inputs.add(file);
-  inputs.refuse(target);
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  return inputs;
+}
+
+/// Throws IoError for a place among the scans or the results of the run.
+void check_target(const fs::path& target, const Recording& recording, const ResultFolder& out) {
+  const fs::path folder = target.parent_path();
   for (const fs::path& taken : {recording.scan_folder(), out.path(), out.path() / "labels"}) {
     if (identity_of(folder) != identity_of(taken)) continue;
     throw IoError(target.string() + ": lies in " + taken.string() +
@@ -77,13 +78,13 @@ void check_target(const fs::path& target, const fs::path& map, const Recording& 
 }
 
 /// Adds the points of all scans of the run with their labels. Throws Interrupted.
-void add_scans(const Recording& recording, const OutputFolder& out, bool quiet, MapVotes& votes) {
+void add_scans(const Recording& recording, const ResultFolder& out, bool quiet, MapVotes& votes) {
   const auto& names = out.listing().scans;
   Progress progress(names.size(), "scans", quiet);
   RecordedScan scan;
   std::size_t done = 0;
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (names.count(recording.name(i)) == 0) continue;
+    if (names.count(listed_name(recording.name(i))) == 0) continue;
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
@@ -126,22 +127,22 @@ Verdicts judge(const MapVotes& votes, std::size_t count, const fs::path& map) {
 }
 
 void clean(CleanOptions& options) {
-  const fs::path target = target_of(options);
-  const LockedFolder lock(options.run);
-  const OutputFolder out = open_finished_run(options.run);
-  const Recording recording =
-      options.sequence.open_of_run(out.path() / out.kind().marker, out.marker(),
-                                   "dynains clean " + options.map + ' ' + options.run);
-  check_target(target, options.map, recording, out);
+  const fs::path target = whole_path(target_of(options));
+  const ResultFolder out = open_finished_run(options.run);
+  const Recording recording = options.sequence.open_of_run(
+      out.marker_path(), out.marker(), "dynains clean " + options.map + ' ' + options.run);
+  check_target(target, recording, out);
+  OutputFile cleaned(target, options.force, inputs_of(options.map, recording));
   const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
 
   const InterruptGuard interrupt;
   MapVotes votes(positions, options.voxel);
   add_scans(recording, out, options.quiet, votes);
   const Verdicts verdicts = judge(votes, positions.size(), options.map);
-  AtomicFile file(target);
+  AtomicFile file(cleaned.path());
   copy_points(options.map, verdicts.keep, file.stream());
   file.commit();
+  cleaned.put_in_place();
 
   if (2 * verdicts.unseen > positions.size()) {
     std::cerr << "dynains: warning: " << verdicts.unseen << " of " << positions.size()
@@ -166,12 +167,9 @@ void add_clean_command(CLI::App& app) {
       .add_option("--map", options->cleaned,
                   "the cleaned map, in the format of MAP [MAP with _static before its ending]")
       ->type_name("FILE");
-  command
-      .add_option("--voxel", options->voxel,
-                  "edge of the voxels in which points of the scans decide about those of the map")
-      ->check(CLI::Range(0.01, 10.0))
-      ->capture_default_str()
-      ->type_name("M");
+  SettingFlags{command}(Parameter{"voxel", options->voxel, closed(0.01, 10.0), "m",
+                                  "edge of the voxels in which points of the scans decide about "
+                                  "those of the map"});
   command.add_flag("--force", options->force, "replace the cleaned map if it exists");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(

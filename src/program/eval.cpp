@@ -58,7 +58,9 @@ void check_targets(const EvalOptions& options, const Recording& recording) {
 
 void check_are_finished(const EvalOptions& options) {
   for (const std::string& folder : options.runs) check_run_is_finished(folder);
-  for (const std::string& map : options.maps) check_map_is_finished(map);
+  for (const std::filesystem::path map : options.maps) {
+    check_run_is_finished(map.parent_path());
+  }
 }
 
 void eval(const EvalOptions& options) {

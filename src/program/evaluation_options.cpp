@@ -4,6 +4,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "dynains/io/atomic_file.hpp"
+
 namespace dynains::program {
 
 EvaluationOptions::EvaluationOptions(CLI::App& command, std::string unlabeled,
@@ -60,13 +62,15 @@ void add_window_options(CLI::App& command, ScanWindow& window) {
 }
 
 TextFile::TextFile(const std::string& path) {
-  if (!path.empty()) file_.emplace(path);
+  if (!path.empty()) file_.emplace(path, true, InputFiles());
 }
 
 void TextFile::write(const std::string& text) {
   if (!file_) return;
-  file_->stream() << text;
-  file_->commit();
+  AtomicFile file(file_->path());
+  file.stream() << text;
+  file.commit();
+  file_->put_in_place();
 }
 
 }  // namespace dynains::program

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "run/labelled_sequence.hpp"
+#include "run/output_folder.hpp"
 
 namespace dynains::program {
 
@@ -42,7 +42,7 @@ class TextFile {
   void write(const std::string& text);
 
  private:
-  std::optional<AtomicFile> file_;
+  std::optional<OutputFile> file_;
 };
 
 }  // namespace dynains::program

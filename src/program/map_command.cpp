@@ -38,13 +38,6 @@ void check_is_outside(const fs::path& city, const std::string& name) {
   }
 }
 
-/// Throws IoError if a file is there and must not be replaced.
-void check_is_new(const fs::path& path, const std::string& name, bool force) {
-  if (fs::exists(fs::symlink_status(path)) && !force) {
-    throw IoError(name + ": exists; choose another name, or replace it by --force");
-  }
-}
-
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
 /// format has them.
 class CityPointFile {
@@ -57,7 +50,7 @@ class CityPointFile {
       throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
     }
     check_is_outside(city, name);
-    check_is_new(path, name, force);
+    output_.emplace(path, force, InputFiles());
     double most = 0.0;
     Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
     for (const SessionInfo& session : map.sessions()) {
@@ -66,13 +59,13 @@ class CityPointFile {
       lowest = session.lowest;
     }
     if (is_las(path)) {
-      las_ = std::make_unique<LasWriter>(path, las_options_near(lowest));
+      las_ = std::make_unique<LasWriter>(output_->path(), las_options_near(lowest));
       return;
     }
     PointColumns columns;
     columns.label = columns.time = columns.session = true;
     columns.double_xyz = most > kFloatCoordinateLimit;
-    points_ = std::make_unique<PointFileWriter>(path, columns);
+    points_ = std::make_unique<PointFileWriter>(output_->path(), columns);
   }
 
   void add(const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
@@ -98,10 +91,12 @@ class CityPointFile {
   void commit() {
     if (las_) las_->commit();
     if (points_) points_->commit();
+    output_->put_in_place();
   }
 
  private:
   const CityMap& map_;
+  std::optional<OutputFile> output_;
   std::unique_ptr<LasWriter> las_;
   std::unique_ptr<PointFileWriter> points_;
   std::size_t size_ = 0;

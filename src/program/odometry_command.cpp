@@ -9,7 +9,7 @@
 #include "dynains/errors.hpp"
 #include "evaluation_options.hpp"
 #include "progress.hpp"
-#include "run/input_files.hpp"
+#include "run/output_folder.hpp"
 
 namespace dynains::program {
 namespace {
@@ -27,17 +27,14 @@ struct OdometryFlags {
 };
 
 void write_poses(const OdometryFlags& flags) {
-  const std::filesystem::path out = flags.out;
-  if (std::filesystem::exists(std::filesystem::symlink_status(out)) && !flags.force) {
-    throw IoError(flags.out + ": exists; choose another name for --out, or replace it by --force");
-  }
-  PoseEstimate estimate;
-  const Recording recording = open_with_odometry(
-      flags.recording, flags.is_compensated, flags.window, flags.one_thread, flags.quiet, estimate);
+  Recording recording = flags.recording.open_without_poses(flags.is_compensated);
   InputFiles inputs;
   for (const std::filesystem::path& file : recording.files()) inputs.add(file);
-  inputs.refuse(out);
-  write_trajectory(out, recording);
+  OutputFile file(flags.out, flags.force, inputs);
+  const PoseEstimate estimate =
+      estimate_with_progress(recording, flags.window, flags.one_thread, flags.quiet);
+  write_trajectory(file.path(), recording);
+  file.put_in_place();
   if (!flags.quiet) {
     std::cout << recording.size() << " poses: " << flags.out << std::endl;
   }
@@ -52,15 +49,14 @@ void add_compensated_flag(CLI::App& command, bool& is_compensated) {
                    "[the odometry de-skews points with times]");
 }
 
-Recording open_with_odometry(const RecordingFlags& flags, bool is_compensated,
-                             const ScanWindow& window, bool one_thread, bool quiet,
-                             PoseEstimate& estimate) {
-  Recording recording = flags.open_without_poses(is_compensated);
+PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& window, bool one_thread,
+                                    bool quiet) {
   std::optional<Progress> progress;
-  estimate = estimate_poses(recording, window, one_thread, [&](std::size_t done, std::size_t all) {
-    if (!progress) progress.emplace(all, "poses", quiet);
-    if (done > 0) progress->update(done);
-  });
+  const PoseEstimate estimate =
+      estimate_poses(recording, window, one_thread, [&](std::size_t done, std::size_t all) {
+        if (!progress) progress.emplace(all, "poses", quiet);
+        if (done > 0) progress->update(done);
+      });
   progress.reset();
   if (estimate.uncertain_scans > 0) {
     std::cerr << "dynains: warning: the surfaces of " << estimate.uncertain_scans << " of "
@@ -69,7 +65,7 @@ Recording open_with_odometry(const RecordingFlags& flags, bool is_compensated,
                  "that of the scans before"
               << std::endl;
   }
-  return recording;
+  return estimate;
 }
 
 void add_odometry_command(CLI::App& app) {

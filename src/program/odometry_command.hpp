@@ -11,11 +11,10 @@ namespace dynains::program {
 /// Adds --no-deskew.
 void add_compensated_flag(CLI::App& command, bool& is_compensated);
 
-/// Opens the recording without its poses and estimates them, with progress on standard error.
-/// Warns of directions that nothing determines.
-Recording open_with_odometry(const RecordingFlags& flags, bool is_compensated,
-                             const ScanWindow& window, bool one_thread, bool quiet,
-                             PoseEstimate& estimate);
+/// As estimate_poses(), with progress on standard error. Warns of directions that nothing
+/// determines.
+PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& window, bool one_thread,
+                                    bool quiet);
 
 void add_odometry_command(CLI::App& app);
 

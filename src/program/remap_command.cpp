@@ -17,7 +17,6 @@
 #include "dynains/pose.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/finished_run.hpp"
 #include "run/interrupt.hpp"
 #include "run/json_file.hpp"
 #include "run/labelled_sequence.hpp"
@@ -25,7 +24,7 @@
 #include "run/output_folder.hpp"
 #include "run/repose_session.hpp"
 #include "run/run_plan.hpp"
-#include "run/run_request.hpp"
+#include "run/write_view.hpp"
 
 namespace dynains::program {
 namespace {
@@ -59,13 +58,9 @@ struct EarlierRun {
   double map_voxel = 0.0;  // m
 };
 
-EarlierRun read_run(const OutputFolder& out) {
+EarlierRun read_run(const ResultFolder& out) {
   EarlierRun run;
-  run.report_file = out.path() / out.kind().marker;
-  if (!out.has_results()) {
-    throw IoError(run.report_file.string() + ": not found; expected the results of dynains run");
-  }
-  check_run_is_finished(out.path());
+  run.report_file = out.marker_path();
   run.report = out.marker();
   run.scans = out.listing().scans;
   run.has_points_in_world =
@@ -87,7 +82,7 @@ std::vector<std::size_t> scans_of(const Recording& recording, const EarlierRun& 
   std::vector<std::size_t> scans;
   std::set<std::string> missing = run.scans;
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (missing.erase(recording.name(i)) > 0) scans.push_back(i);
+    if (missing.erase(listed_name(recording.name(i))) > 0) scans.push_back(i);
   }
   if (missing.empty()) return scans;
   throw IoError(recording.folder().string() + ": has no pose or no scan for " +
@@ -157,11 +152,10 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   return map;
 }
 
-/// Writes the map and returns its path. In the folder of the run, the report lists the file before
-/// it appears, and describes it afterwards.
+/// The map is a file of its own, or is added to the folder of the run, whose report describes it.
 class NewMap {
  public:
-  NewMap(const RemapOptions& options, OutputFolder& out, const Recording& recording,
+  NewMap(const RemapOptions& options, ResultFolder& out, const Recording& recording,
          const ScanRange& range, const InputFiles& inputs)
       : out_(out) {
     const fs::path folder = whole_path(out.path());
@@ -169,58 +163,44 @@ class NewMap {
     if (is_las(path_)) {
       throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
     }
-    is_inside_ = path_.parent_path() == folder;
-    if (!is_inside_) {
-      outside_.emplace(path_, recording, range, inputs, options.force);
-      writer_ = outside_->take_writer();
-      return;
-    }
-    if (path_.filename() != kRemappedMap) {
+    if (path_.parent_path() != folder) {
+      check_is_no_scan(path_, recording);
+      outside_.emplace(path_, options.force, inputs);
+    } else if (path_.filename() == kRemappedMap) {
+      added_.emplace(out, kRemappedMap);
+    } else {
       throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
                         kRemappedMap);
     }
-    const auto entry = out.folder().find(kRemappedMap);
-    if (entry &&
-        (entry->kind != Folder::Kind::kFile || !out.listing().contains("", kRemappedMap))) {
-      throw IoError(path_.string() +
-                    ": is in the way, and was not written by dynains remap; move it away");
-    }
-    // Before the file of this command: a file system without locks does not tell which is whose.
-    out.remove_temporaries();
-    remove_leftovers(folder, [](const std::string& name) { return name == kRemappedMap; });
-    writer_ = open_map(path_, recording, range, RunOutputs());
+    writer_ =
+        open_map(outside_ ? outside_->path() : added_->path(), recording, range, RunOutputs());
   }
 
   const fs::path& path() const { return path_; }
 
   /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   template <class Publish>
-  void write(const StaticMapAccumulator& map, Json report, const Json& description,
-             Publish&& publish_more) {
+  void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
     map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
-    writer_->prepare();
-    if (!is_inside_) {
-      publish_more();
-      writer_->commit();
-      return;
-    }
-    OutputListing listing = out_.listing();
-    listing.files.insert(kRemappedMap);
-    report.erase(kField);
-    out_.mark(report, listing);
-    publish_more();
     writer_->commit();
+    if (outside_) {
+      publish_more();
+      return outside_->put_in_place();
+    }
+    Json report = out_.marker();
+    report.erase(kField);
+    added_->put_in_place(report, publish_more);
     report[kField] = description;
-    out_.mark(report, listing);
+    out_.mark(report, OutputListing(out_.listing()));
   }
 
  private:
   static constexpr const char* kField = "remapped_map";
 
-  OutputFolder& out_;
+  ResultFolder& out_;
   fs::path path_;
-  bool is_inside_ = false;
-  std::optional<OutsideMap> outside_;
+  std::optional<OutputFile> outside_;
+  std::optional<AddedFile> added_;
   std::unique_ptr<MapFile> writer_;
 };
 
@@ -261,8 +241,7 @@ Json point_flags(const EarlierRun& run) {
 
 void remap(RemapOptions& options) {
   check_run_folder(options.run);
-  const LockedFolder lock(options.run);
-  OutputFolder out(Folder(options.run), run_output_kind());
+  ResultFolder out = open_finished_run(options.run);
   const EarlierRun run = read_run(out);
   options.sequence.complete(options.sequence.folder(), point_flags(run));
   const Recording corrected = open_corrected(options, run);
@@ -289,7 +268,7 @@ void remap(RemapOptions& options) {
          out.path(), pose_fingerprint(corrected, range), scans},
         original ? *original : corrected, corrected);
   }
-  file.write(map, run.report,
+  file.write(map,
              {{"file", kRemappedMap},
               {"points", map.size()},
               {"map_voxel", map.config().map_voxel},

@@ -73,12 +73,8 @@ void print_alignment(const SessionAlignment& alignment) {
 }
 
 void print_summary(const RunOutcome& run) {
-  if (run.was_complete_before) {
-    std::cout << run.outputs.folder.string() << ": complete already" << std::endl;
-  } else {
-    print_results(run);
-    if (run.alignment) print_alignment(*run.alignment);
-  }
+  print_results(run);
+  if (run.alignment) print_alignment(*run.alignment);
   if (!run.log.empty()) std::cout << "log: " << run.log.string() << std::endl;
   if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
 }
@@ -90,8 +86,8 @@ Recording open(RunFlags& flags, PoseEstimate& estimate) {
     if (flags.is_compensated) throw ConfigError("--no-deskew needs --odometry");
     return flags.recording.open();
   }
-  Recording recording = open_with_odometry(flags.recording, flags.is_compensated, settings.window,
-                                           settings.one_thread, flags.quiet, estimate);
+  Recording recording = flags.recording.open_without_poses(flags.is_compensated);
+  estimate = estimate_with_progress(recording, settings.window, settings.one_thread, flags.quiet);
   settings.poses_are_estimated = true;
   // Commands over the results take the poses from there.
   settings.recording_flags["--poses"] = (whole_path(settings.out) / kEstimatedPoses).string();
@@ -128,13 +124,12 @@ void run_as_asked(RunFlags& flags) {
   const RunOutcome outcome = run(settings, open(flags, estimate), listener);
   progress.reset();
 
-  if (outcome.earlier_results_stay) {
-    std::cerr << "dynains: interrupted; the earlier results in " << outcome.outputs.folder.string()
-              << " stay as they were" << std::endl;
-  } else if (!flags.quiet) {
-    print_summary(outcome);
+  if (!outcome.complete) {
+    std::cerr << "dynains: interrupted; the results of " << outcome.scans << " scans stay in "
+              << outcome.outputs.folder.string() << " until the next run" << std::endl;
+    throw Interrupted{outcome.signal};
   }
-  if (!outcome.complete) throw Interrupted{outcome.signal};
+  if (!flags.quiet) print_summary(outcome);
   if (estimate.loss) throw LostTrack(*estimate.loss);
 }
 
@@ -151,7 +146,6 @@ void add_run_command(CLI::App& app) {
       ->type_name("FOLDER");
   RunSettings::visit_common(*options, SettingFlags{command});
   RunSettings::visit_more(*options, SettingFlags{command, "More outputs, and memory"});
-  command.get_option("--resume")->excludes(command.get_option("--force"));
   command.add_flag("--odometry", flags->odometry,
                    "estimate the poses from the scans, for a recording without poses (see `dynains "
                    "odometry`); also writes them to poses.txt");
@@ -162,9 +156,9 @@ void add_run_command(CLI::App& app) {
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
       "--errors`), "
       "static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), report.json and "
-      "timing.csv. Each file appears whole or "
-      "not at all; report.json says\n\"complete\": false until the end. Ctrl-C ends the run after "
-      "the scan at hand, writes what is there and exits\nwith 130. Other exit codes: 0; 1 if a "
+      "timing.csv. All appear in OUT at once,\nwhen the run is complete; until then they are in "
+      "OUT.partial. Ctrl-C ends the run after the scan at hand and exits\nwith 130: the results so "
+      "far stay in OUT.partial until the next run. Other exit codes: 0; 1 if a "
       "file "
       "cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the scans "
       "disagree with; 3 if the odometry loses track: the results of the scans before are "

@@ -11,12 +11,10 @@
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_log.hpp"
 #include "dynains/simulation/write_sequence.hpp"
-#include "dynains/version.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/interrupt.hpp"
 #include "run/output_folder.hpp"
-#include "run/run_report.hpp"
 
 namespace dynains::program {
 namespace {
@@ -62,12 +60,7 @@ simulation::Config make_config(const SimulateOptions& options) {
 }
 
 const OutputKind& simulation_output_kind() {
-  static const OutputKind kind = {
-      "simulate",
-      "simulation.json",
-      {"poses.txt", "poses_true.txt", "times.txt", "calib.txt", kLogName},
-      false,
-      {{"velodyne", {".bin"}}, {"labels", {".label"}}}};
+  static const OutputKind kind = {"simulate", "simulation.json"};
   return kind;
 }
 
@@ -95,16 +88,12 @@ const std::string& name_of(Enum value, const std::vector<std::string>& names) {
 }
 
 /// Everything that is needed to make this sequence again.
-nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config,
-                                bool complete) {
-  nlohmann::ordered_json json = {{"program", "dynains"},
-                                 {"version", kVersionString},
-                                 {"command", simulation_output_kind().command},
-                                 {"complete", complete},
-                                 {"scene", name_of(config.scene, simulation::scene_names())},
-                                 {"sensor", name_of(config.sensor, simulation::sensor_names())},
-                                 {"labelling", options.labelling},
-                                 {"format", options.format}};
+nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config) {
+  nlohmann::ordered_json json = begin_marker(simulation_output_kind());
+  json["scene"] = name_of(config.scene, simulation::scene_names());
+  json["sensor"] = name_of(config.sensor, simulation::sensor_names());
+  json["labelling"] = options.labelling;
+  json["format"] = options.format;
   simulation::Config::visit(
       config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
@@ -125,28 +114,13 @@ bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& 
 void simulate(const SimulateOptions& options) {
   const simulation::Config config = make_config(options);
   simulation::Simulator simulator(config);
-  const LockedFolder lock(options.out);
-  OutputFolder out(Folder(options.out), simulation_output_kind());
-  if (out.has_results() && !options.force) {
-    throw IoError(out.path().string() +
-                  ": holds earlier results; choose another folder, or replace them by --force");
-  }
-  const OutputListing listing = listing_of(simulator, options.format);
-  out.check(listing, InputFiles());
+  OutputFolder out(options.out, simulation_output_kind(), listing_of(simulator, options.format),
+                   options.force, InputFiles());
   const InterruptGuard interrupt;
-  const auto mode = out.has_results() ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace;
-  OutputChange change(out, mode, describe(options, config, false), listing);
-  if (!write_scans(simulator, change.folder(), options)) {
-    if (change.is_staged()) {
-      std::cerr << "dynains: interrupted; the earlier results in " << out.path().string()
-                << " stay as they were" << std::endl;
-    }
-    throw Interrupted{InterruptGuard::signal()};
-  }
-  change.put_in_place();
-  change.finish(describe(options, config, true), listing);
-  const std::filesystem::path sequence =
-      options.format == kFolder ? out.path() : out.path() / kLogName;
+  if (!write_scans(simulator, out.path(), options)) throw Interrupted{InterruptGuard::signal()};
+  out.finish(describe(options, config));
+  const std::filesystem::path folder = options.out;
+  const std::filesystem::path sequence = options.format == kFolder ? folder : folder / kLogName;
   if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
@@ -187,9 +161,7 @@ void add_simulate_command(CLI::App& app) {
   options->flags.add_to(command, simulation::Config(), "Parameters");
   command.footer(
       "The same flags give the same files. --scene random draws scene, sensor and every parameter "
-      "that is not given from the seed. simulation.json keeps them, and says \"complete\": "
-      "false until "
-      "the end.");
+      "that is not given from the seed. simulation.json keeps them.");
   command.callback([options] { simulate(*options); });
 }
 

@@ -26,7 +26,7 @@ struct ViewOptions {
 };
 
 void view(ViewOptions& options) {
-  const fs::path page = write_view(
+  const fs::path page = add_page(
       options.out,
       [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
         return options.sequence.open_of_run(report_file, report, "dynains view " + options.out);

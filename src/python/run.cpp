@@ -139,10 +139,8 @@ program::RunListener listen(const RunArguments& run) {
 /// Raises what Python raises for a signal.
 [[noreturn]] void raise_signal(const RunOutcome& outcome) {
   const std::string folder = outcome.outputs.folder.string();
-  const std::string text =
-      outcome.earlier_results_stay
-          ? "the earlier results in " + folder + " stay as they were"
-          : folder + " has the results of " + std::to_string(outcome.scans) + " scans";
+  const std::string text = "the results of " + std::to_string(outcome.scans) + " scans stay in " +
+                           folder + " until the next run";
   if (outcome.signal == SIGINT) {
     PyErr_SetString(PyExc_KeyboardInterrupt, text.c_str());
   } else {
@@ -221,7 +219,7 @@ fs::path write_page(const fs::path& out, const py::object& recording, std::size_
     return to_recording(py::cast(path), from_flags(flags))->get();
   };
   const py::gil_scoped_release release;
-  return program::write_view(out, open, max_points);
+  return program::add_page(out, open, max_points);
 }
 
 py::object path_or_none(const fs::path& path) {
@@ -238,10 +236,6 @@ void bind_run(py::module_& module) {
       .def_property_readonly(
           "folder", [](const RunResult& result) { return result.outcome.outputs.folder; },
           "Folder of the results.")
-      .def_property_readonly(
-          "was_complete_before",
-          [](const RunResult& result) { return result.outcome.was_complete_before; },
-          "Whether resume=True found the results complete, so that nothing was done.")
       .def_property_readonly("scans", count("scans"), "Number of scans.")
       .def_property_readonly("points", count("points"), "Number of points of all scans.")
       .def_property_readonly(
@@ -277,10 +271,11 @@ void bind_run(py::module_& module) {
       "Removes what moves from a recorded sequence, as the program `dynains run`.\n\n"
       "recording: a Recording, or its path. out: folder for the results; created, must be empty.\n"
       "By name:\n" +
-      std::string(kObjects) + describe_settings<RunSettings>() + "For the path of a recording also:\n" +
-      describe_settings<program::RecordingSettings>() +
+      std::string(kObjects) + describe_settings<RunSettings>() +
+      "For the path of a recording also:\n" + describe_settings<program::RecordingSettings>() +
       "Returns a RunResult. Ctrl-C ends the run after the scan at hand and raises "
-      "KeyboardInterrupt; what is there is written, and resume=True completes it. Raises IoError, "
+      "KeyboardInterrupt; the results so far stay in out.partial until the next run. Raises "
+      "IoError, "
       "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "
       "RuntimeWarning. Other threads run meanwhile.";
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());

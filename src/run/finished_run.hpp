@@ -9,8 +9,4 @@ namespace dynains::program {
 /// cannot be read as JSON. Folders of other tools, and folders without report.json, pass.
 void check_run_is_finished(const std::filesystem::path& folder);
 
-/// As check_run_is_finished(), for the folder of a map file if its report names that file as the
-/// map of the run.
-void check_map_is_finished(const std::filesystem::path& map);
-
 }  // namespace dynains::program

@@ -2,11 +2,13 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <memory>
 #include <system_error>
 
@@ -88,18 +90,23 @@ std::optional<Folder::Entry> Folder::find(const std::string& name) const {
   return Entry{kind, {status.st_dev, status.st_ino}};
 }
 
-void Folder::check_changeable() const {
-  if (::faccessat(descriptor_, ".", W_OK | X_OK, AT_EACCESS) != 0) {
-    fail_with(path_, "cannot be changed", errno);
-  }
-  struct statx status {};
-  const int result = ::statx(descriptor_, "", AT_EMPTY_PATH, STATX_BASIC_STATS, &status);
-  if (result == 0 && (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0) {
-    fail_with(path_, "cannot be changed", EPERM);
+void Folder::lock() const {
+  int result = 0;
+  do {
+    result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
+  } while (result != 0 && errno == EINTR);
+  if (result != 0 && errno == EWOULDBLOCK) {
+    throw UsageError(path_.string() +
+                     ": is in use; expected a folder that nobody else writes to at the same time");
   }
 }
 
-void Folder::check_removable(const std::string& name) const {
+void Folder::check_changeable() const {
+  if (::faccessat(descriptor_, ".", W_OK | X_OK, AT_EACCESS) == 0) return;
+  fail_with(path_, "cannot be changed", errno);
+}
+
+void Folder::check_replaceable(const std::string& name) const {
   struct statx status {};
   struct stat folder {};
   if (::statx(descriptor_, name.c_str(), AT_SYMLINK_NOFOLLOW, STATX_BASIC_STATS, &status) != 0 ||
@@ -111,7 +118,7 @@ void Folder::check_removable(const std::string& name) const {
                             user != status.stx_uid;
   const bool is_protected =
       (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0;
-  if (is_of_others || is_protected) fail_with(path_ / name, "cannot be removed", EPERM);
+  if (is_of_others || is_protected) fail_with(path_ / name, "cannot be replaced", EPERM);
   if ((status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0) {
     fail_with(path_ / name, "cannot be replaced: something is mounted there", EBUSY);
   }
@@ -129,16 +136,32 @@ bool Folder::remove_folder(const std::string& name) const {
   fail_with(path_ / name, "cannot be removed", errno);
 }
 
-Folder Folder::make_folder(const std::string& name) const {
-  if (::mkdirat(descriptor_, name.c_str(), 0777) != 0 && errno != EEXIST) {
-    fail_with(path_ / name, "cannot be created", errno);
-  }
-  return Folder(*this, name);
+bool Folder::make_folder(const std::string& name) const {
+  if (::mkdirat(descriptor_, name.c_str(), 0777) == 0) return true;
+  if (errno != EEXIST) fail_with(path_ / name, "cannot be created", errno);
+  return false;
 }
 
-void Folder::move_file(const std::string& name, const Folder& target) const {
-  if (::renameat(descriptor_, name.c_str(), target.descriptor_, name.c_str()) != 0) {
-    fail_with(target.path_ / name, "cannot be put in place", errno);
+bool Folder::rename(const std::string& name, const Folder& target, const std::string& new_name,
+                    Rename how) const {
+  const unsigned flags = how == Rename::kNew        ? RENAME_NOREPLACE
+                         : how == Rename::kExchange ? RENAME_EXCHANGE
+                                                    : 0U;
+  const auto try_with = [&](unsigned with) {
+    return ::renameat2(descriptor_, name.c_str(), target.descriptor_, new_name.c_str(), with) == 0;
+  };
+  if (try_with(flags)) return true;
+  // Some file systems know plain renames only.
+  const bool is_unknown = flags != 0 && (errno == EINVAL || errno == ENOSYS);
+  if (is_unknown && how == Rename::kExchange) return false;
+  if (is_unknown && !target.find(new_name) && try_with(0)) return true;
+  fail_with(target.path_ / new_name, "cannot be put in place", errno);
+}
+
+void Folder::sync() const {
+  // Some file systems cannot sync folders.
+  if (::fsync(descriptor_) != 0 && errno != EINVAL) {
+    fail_with(path_, "cannot be written to the disk", errno);
   }
 }
 

@@ -42,19 +42,32 @@ class Folder {
   std::vector<std::string> names() const;
   std::optional<Entry> find(const std::string& name) const;
 
+  /// Locks the folder until destruction, for all processes of this machine; on a file system
+  /// without locks of folders, always. Throws UsageError if another one has locked it.
+  void lock() const;
   /// Throws unless entries can be made and removed, as far as permissions tell.
   void check_changeable() const;
-  /// Throws unless entry `name` can be removed, as far as its attributes tell.
-  void check_removable(const std::string& name) const;
+  /// Throws unless entry `name` can be replaced, as far as its attributes tell.
+  void check_replaceable(const std::string& name) const;
 
+  /// Makes the folder `name`. False if there is an entry of that name already.
+  bool make_folder(const std::string& name) const;
   /// Does nothing if there is no such file.
   void remove_file(const std::string& name) const;
   /// False if the folder holds anything; true also if there is none.
   bool remove_folder(const std::string& name) const;
-  /// Folder `name`, made if there is none.
-  Folder make_folder(const std::string& name) const;
-  /// Replaces the file of that name in `target`. Both are on one file system.
-  void move_file(const std::string& name, const Folder& target) const;
+
+  enum class Rename {
+    kNew,       ///< nothing has the new name before
+    kReplace,   ///< replaces a file, or an empty folder
+    kExchange,  ///< both entries exist, and change names in one step
+  };
+  /// Moves entry `name` to `new_name` in `target`, on the same file system. False if the file
+  /// system cannot exchange entries.
+  bool rename(const std::string& name, const Folder& target, const std::string& new_name,
+              Rename how) const;
+  /// The names of all entries are on the disk afterwards.
+  void sync() const;
 
  private:
   std::filesystem::path path_;

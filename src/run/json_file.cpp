@@ -108,4 +108,8 @@ std::optional<std::string> json_field(const fs::path& path, const Json& json,
   return field_as<std::string>(path, json, pointer, &Json::is_string, "a string");
 }
 
+std::string to_text(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
 }  // namespace dynains::program

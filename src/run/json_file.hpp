@@ -19,6 +19,9 @@ inline constexpr std::uint64_t kMaxJsonBytes = std::uint64_t{64} << 20U;
 /// Reads a JSON file. Throws IoError with path, line, column and expectation.
 nlohmann::ordered_json read_json_file(const std::filesystem::path& path);
 
+/// Text of a JSON file. Bytes that are not UTF-8, as of paths, are replaced.
+std::string to_text(const nlohmann::ordered_json& json);
+
 /// The field of `json` that `pointer` ("/static_map/file") names; nothing if there is none or if it
 /// is null. Throws IoError with path, pointer and expected type for a value of another type. T is
 /// bool, std::uint64_t, double or std::string. `path` is the file that `json` was read from.

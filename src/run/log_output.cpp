@@ -99,14 +99,8 @@ LogOutput::LogOutput(const RunPlan& plan, bool may_replace)
       adds_labels_(plan.outputs.mark_log),
       drops_not_judged_(plan.outputs.drop_not_judged) {
   check_kind();
-  check_place(plan.inputs, may_replace);
-  const fs::path folder = target_.parent_path();
-  lock_.emplace(folder, FolderLock::Mode::kShared);
-  remove_leftovers(folder, [&](const std::string& name) { return name == target_.filename(); });
-  const AtomicFile trial(target_);
-  if (count_writers(target_) > 1) {
-    throw UsageError(target_.string() + ": is being written by another run");
-  }
+  check_is_no_scan(target_, recording_);
+  file_.emplace(target_, may_replace, plan.inputs);
 }
 
 void LogOutput::check_kind() const {
@@ -123,24 +117,11 @@ void LogOutput::check_kind() const {
   if (recording_.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 
-void LogOutput::check_place(const InputFiles& inputs, bool may_replace) const {
-  inputs.refuse(target_);
-  const fs::path folder = target_.parent_path();
-  if (!fs::is_directory(folder)) throw IoError(folder.string() + ": is no folder");
-  if (identity_of(folder) == identity_of(recording_.scan_folder())) {
-    throw IoError(target_.string() + ": the log is there; choose another folder for --write-log");
-  }
-  if (!may_replace && fs::exists(fs::symlink_status(target_))) {
-    throw IoError(target_.string() +
-                  ": exists; choose another name for --write-log, or replace it by --force");
-  }
-}
-
 std::optional<std::size_t> LogOutput::write(const fs::path& results) const {
   const CloudEditor editor(recording_, range_, results / "labels", adds_labels_, drops_not_judged_);
   try {
     const auto log = open_log(recording_.log()->log().path(), recording_.options().accept_missing);
-    copy_log(*log, target_, std::cref(editor));
+    copy_log(*log, file_->path(), std::cref(editor));
   } catch (const Interrupted&) {
     return std::nullopt;
   }

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "run_plan.hpp"
 
@@ -23,17 +22,18 @@ class LogOutput {
   /// Copies the log with the labels of the run in `results`. Returns the number of clouds on the
   /// topic that have none, which stay as they are; nothing after a signal. Throws IoError.
   std::optional<std::size_t> write(const std::filesystem::path& results) const;
+  /// The written log is at its place. Throws IoError.
+  void put_in_place() { file_->put_in_place(); }
 
  private:
   void check_kind() const;
-  void check_place(const InputFiles& inputs, bool may_replace) const;
 
   const Recording& recording_;
   ScanRange range_;
   std::filesystem::path target_;
   bool adds_labels_;
   bool drops_not_judged_;
-  std::optional<FolderLock> lock_;
+  std::optional<OutputFile> file_;
 };
 
 }  // namespace dynains::program

@@ -22,7 +22,6 @@ class PointMapFile final : public MapFile {
     writer_.add(point);
   }
   std::size_t size() const override { return writer_.size(); }
-  void prepare() override { writer_.prepare(); }
   void commit() override { writer_.commit(); }
 
  private:
@@ -49,7 +48,6 @@ class LasMapFile final : public MapFile {
     writer_.add(point);
   }
   std::size_t size() const override { return writer_.size(); }
-  void prepare() override { writer_.prepare(); }
   void commit() override { writer_.commit(); }
 
  private:

@@ -27,8 +27,7 @@ struct MapFileOptions {
   double intensity_scale = 1.0;  ///< of .las: from the intensities of scans to 16 bits
 };
 
-/// Writes points one by one; `commit()` creates or replaces the file atomically. All members throw
-/// IoError.
+/// Writes points one by one; `commit()` creates the file. All members throw IoError.
 class MapFile {
  public:
   static std::unique_ptr<MapFile> open(const std::filesystem::path& path,
@@ -38,8 +37,6 @@ class MapFile {
   /// `position`: m, world frame.
   virtual void add(const Eigen::Vector3d& position, const MapAttributes& attributes) = 0;
   virtual std::size_t size() const = 0;
-  /// Writes all but the name of the file. No point can be added then.
-  virtual void prepare() = 0;
   virtual void commit() = 0;
 };
 

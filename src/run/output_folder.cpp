@@ -3,51 +3,40 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <map>
-#include <optional>
-#include <set>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/version.hpp"
 #include "json_file.hpp"
-#include "run_report.hpp"
 
 namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
-/// Names of the entries that are listed.
-std::vector<std::string> listed_names(const Folder& folder, const OutputListing& listing,
-                                      const std::string& name) {
-  std::vector<std::string> names = folder.names();
-  names.erase(
-      std::remove_if(names.begin(), names.end(),
-                     [&](const std::string& entry) { return !listing.contains(name, entry); }),
-      names.end());
-  return names;
+constexpr const char* kPartialEnd = ".partial";
+
+/// The folder of an OutputFile.
+const OutputKind& file_kind() {
+  static const OutputKind kind = {"file", "partial.json"};
+  return kind;
 }
 
-/// A folder below a folder of results, if it is there. Throws IoError if it is anything else.
-std::optional<Folder> find_folder(const Folder& parent, const std::string& name) {
-  if (!parent.find(name)) return std::nullopt;
-  return Folder(parent, name);
+OutputListing listing_of_file(const std::string& name) { return {{listed_name(name)}, {}, {}}; }
+
+bool has(const Json& marker, const char* field, const Json& value) {
+  const Json::json_pointer pointer(field);
+  return marker.contains(pointer) && marker[pointer] == value;
 }
 
-/// Creates a folder and those above it. Returns the created ones, innermost first.
-std::vector<fs::path> create_missing_folders(const fs::path& folder) {
-  std::vector<fs::path> missing;
-  std::error_code ignored;
-  fs::path path = whole_path(folder);
-  while (path.has_relative_path() && !fs::exists(path, ignored)) {
-    missing.push_back(path);
-    path = path.parent_path();
-  }
-  create_folder(folder);
-  return missing;
+/// Throws ConfigError for a name that another output has while it is written.
+void check_name(const fs::path& target) {
+  if (target.extension() != kPartialEnd) return;
+  throw ConfigError(target.string() +
+                    ": names that end in .partial are those of unfinished outputs; choose another");
 }
 
 }  // namespace
@@ -63,232 +52,273 @@ void create_folder(const fs::path& folder) {
   if (error) throw IoError(folder.string() + ": cannot be created: " + error.message());
 }
 
-LockedFolder::LockedFolder(const fs::path& folder)
-    : created_(create_missing_folders(folder)), lock_(folder) {}
-
-LockedFolder::~LockedFolder() {
-  for (const fs::path& folder : created_) ::rmdir(folder.c_str());
+Json begin_marker(const OutputKind& kind) {
+  return {{"program", "dynains"},
+          {"version", kVersionString},
+          {"command", kind.command},
+          {"complete", false}};
 }
 
-OutputFolder::OutputFolder(Folder folder, const OutputKind& kind)
+ResultFolder::ResultFolder(Folder folder, const OutputKind& kind)
     : folder_(std::move(folder)), kind_(kind) {
-  const fs::path file = path() / kind.marker;
-  const std::optional<Folder::Entry> marker = folder_.find(kind.marker);
-  if (marker) {
+  folder_.lock();
+  if (const std::optional<Folder::Entry> marker = folder_.find(kind.marker)) {
     if (marker->kind != Folder::Kind::kFile) {
-      throw IoError(file.string() + ": is a link or a folder; expected a file");
+      throw IoError(marker_path().string() + ": is a link or a folder; expected a file");
     }
-    marker_ = read_json_file(file);
-    listing_ = read_listing(file, marker_, kind);
-    if (auto staging = find_folder(folder_, kStagingFolder)) {
-      staging_ = std::make_unique<OutputFolder>(std::move(*staging), kind);
-    }
+    marker_ = read_json_file(marker_path());
+    listing_ = read_listing(marker_path(), marker_, kind.command);
     return;
   }
   for (const std::string& name : folder_.names()) {
     if (target_of_temporary(name) == kind.marker) continue;
-    const bool is_empty_folder = kind.folders.count(name) > 0 &&
-                                 folder_.find(name)->kind == Folder::Kind::kFolder &&
-                                 Folder(folder_, name).names().empty();
-    if (is_empty_folder) continue;
     throw IoError(path().string() + ": is not empty and holds no earlier results (no " +
                   kind.marker + "); choose another folder");
   }
 }
 
-bool OutputFolder::is_complete() const {
-  return has_results() &&
-         json_field<bool>(path() / kind_.marker, marker_, "/complete").value_or(false);
+bool ResultFolder::is_complete() const { return has(marker_, "/complete", true); }
+
+bool ResultFolder::is_listed(const std::string& folder, const std::string& name) const {
+  const std::string target = target_of_temporary(name);
+  const std::string& file = target.empty() ? name : target;
+  return listing_.contains(folder, file) || (folder.empty() && file == kind_.marker);
 }
 
-void OutputFolder::check_file(const Folder& folder, const std::string& name, bool is_listed,
-                              const InputFiles& inputs) const {
-  const fs::path file = folder.path() / name;
-  const std::optional<Folder::Entry> entry = folder.find(name);
-  if (!entry) return;
-  if (!is_listed) {
-    throw IoError(file.string() + ": is in the way, and no part of earlier results (" +
-                  kind_.marker + " does not list it); move it away, or choose another folder");
-  }
-  if (entry->kind != Folder::Kind::kFile) {
-    throw IoError(file.string() + ": is a link or a folder; expected a file or nothing there");
-  }
-  inputs.refuse(entry->identity, file);
-  folder.check_removable(name);
-}
-
-void OutputFolder::check_folder(const std::string& name, const OutputListing& planned,
-                                const InputFiles& inputs) const {
-  const std::optional<Folder> folder = find_folder(folder_, name);
-  if (!folder) return;
-  inputs.refuse(folder->identity(), folder->path());
-  folder_.check_removable(name);
-  folder->check_changeable();
-  for (const std::string& entry : folder->names()) {
-    const bool is_listed = listing_.contains(name, entry);
-    if (is_listed || planned.contains(name, entry)) check_file(*folder, entry, is_listed, inputs);
+template <class Visit>
+void ResultFolder::visit_entries(Visit&& visit) const {
+  for (const std::string& name : folder_.names()) {
+    const std::optional<Folder::Entry> entry = folder_.find(name);
+    if (!entry) continue;
+    if (entry->kind != Folder::Kind::kFolder || listing_.folders.count(listed_name(name)) == 0) {
+      visit(folder_, name, *entry, entry->kind == Folder::Kind::kFile && is_listed("", name));
+      continue;
+    }
+    const Folder inner(folder_, name);
+    for (const std::string& file : inner.names()) {
+      const std::optional<Folder::Entry> found = inner.find(file);
+      if (!found) continue;
+      visit(inner, file, *found, found->kind == Folder::Kind::kFile && is_listed(name, file));
+    }
+    visit(folder_, name, *entry, true);
   }
 }
 
-void OutputFolder::check(const OutputListing& planned, const InputFiles& inputs) const {
+void ResultFolder::check(const InputFiles& inputs) const {
   inputs.refuse(folder_.identity(), path());
   folder_.check_changeable();
-  if (has_results()) folder_.check_removable(kind_.marker);
-  std::set<std::string> files = listing_.files;
-  files.insert(planned.files.begin(), planned.files.end());
-  for (const std::string& name : files) {
-    check_file(folder_, name, listing_.contains("", name), inputs);
-  }
-  std::map<std::string, std::string> folders = listing_.folders;
-  folders.insert(planned.folders.begin(), planned.folders.end());
-  for (const auto& folder : folders) check_folder(folder.first, planned, inputs);
-  if (staging_) {
-    staging_->check_nothing_foreign();
-    staging_->check(planned, inputs);
-  }
+  visit_entries(
+      [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
+        const fs::path file = parent.path() / name;
+        if (!is_ours) {
+          throw IoError(file.string() + ": is no file of the results (" + kind_.marker +
+                        " does not list it), which would be replaced as a whole; move it away");
+        }
+        inputs.refuse(entry.identity, file);
+        if (entry.kind == Folder::Kind::kFolder) Folder(parent, name).check_changeable();
+      });
 }
 
-void OutputFolder::check_nothing_foreign() const {
-  const auto refuse = [](const fs::path& file) {
-    throw IoError(file.string() + ": is no file of dynains; move it away");
-  };
-  const auto is_ours = [&](const std::string& folder, const std::string& name) {
-    const std::string target = target_of_temporary(name);
-    return listing_.contains(folder, target.empty() ? name : target) ||
-           (folder.empty() && (name == kind_.marker || target == kind_.marker));
-  };
+void ResultFolder::mark(Json marker, const OutputListing& listing) {
   for (const std::string& name : folder_.names()) {
-    if (is_ours("", name)) continue;
-    if (kind_.folders.count(name) == 0) refuse(path() / name);
-    const Folder folder(folder_, name);
-    for (const std::string& entry : folder.names()) {
-      if (!is_ours(name, entry)) refuse(folder.path() / entry);
-    }
+    if (target_of_temporary(name) == kind_.marker)
+      folder_.remove_file(name);  // of a killed command
   }
-}
-
-void OutputFolder::mark(nlohmann::ordered_json marker, const OutputListing& listing) {
   marker["outputs"] = listing.to_json();
-  AtomicFile file(path() / kind_.marker);
+  AtomicFile file(marker_path());
   file.stream() << to_text(marker);
   file.commit();
   marker_ = std::move(marker);
   listing_ = listing;
 }
 
-void OutputFolder::remove_folder_results(const std::string& name) const {
-  const std::optional<Folder> folder = find_folder(folder_, name);
-  if (!folder) return;
-  remove_leftovers(folder->path(),
-                   [&](const std::string& file) { return listing_.contains(name, file); });
-  for (const std::string& file : listed_names(*folder, listing_, name)) folder->remove_file(file);
-  folder_.remove_folder(name);  // stays if it holds anything else
+void ResultFolder::remove_results() const {
+  visit_entries(
+      [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
+        if (!is_ours || (&parent == &folder_ && name == kind_.marker)) return;
+        if (entry.kind == Folder::Kind::kFile) return parent.remove_file(name);
+        parent.remove_folder(name);  // stays if it holds anything else
+      });
+  folder_.remove_file(kind_.marker);
 }
 
-void OutputFolder::remove_results() const {
-  remove_temporaries();
-  for (const std::string& name : listing_.files) folder_.remove_file(name);
-  for (const auto& folder : listing_.folders) remove_folder_results(folder.first);
+MissingFolders::MissingFolders(const fs::path& folder) {
+  std::error_code ignored;
+  for (fs::path path = folder; path.has_relative_path() && !fs::exists(path, ignored);
+       path = path.parent_path()) {
+    created_.push_back(path);
+  }
+  create_folder(folder);
 }
 
-void OutputFolder::remove_temporaries() const {
-  remove_leftovers(path(), [&](const std::string& file) {
-    return file == kind_.marker || listing_.contains("", file);
-  });
-  for (const auto& entry : listing_.folders) {
-    const std::string& name = entry.first;
-    if (const auto folder = find_folder(folder_, name)) {
-      remove_leftovers(folder->path(),
-                       [&](const std::string& file) { return listing_.contains(name, file); });
-    }
+MissingFolders::~MissingFolders() {
+  for (const fs::path& folder : created_) ::rmdir(folder.c_str());
+}
+
+PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
+                             const OutputListing& listing, const InputFiles& inputs)
+    : missing_(target.parent_path()),
+      parent_(target.parent_path()),
+      target_(target.filename().string()),
+      name_(target_ + kPartialEnd) {
+  parent_.make_folder(name_);
+  results_.emplace(Folder(parent_, name_), kind);
+  // Another command may have renamed the folder before it was locked here.
+  const std::optional<Folder::Entry> entry = parent_.find(name_);
+  if (!entry || entry->identity != results_->folder().identity()) {
+    throw UsageError(path().string() + ": is in use");
+  }
+  results_->check(inputs);
+  left_ = results_->marker();
+  results_->remove_results();
+  try {
+    results_->mark(begin_marker(kind), listing);
+  } catch (...) {
+    parent_.remove_folder(name_);
+    throw;
   }
 }
 
-void OutputFolder::move_results(const Folder& target) const {
-  for (const auto& entry : listing_.folders) {
-    const std::string& name = entry.first;
-    const std::optional<Folder> folder = find_folder(folder_, name);
-    if (!folder) continue;
-    const Folder target_folder = target.make_folder(name);
-    for (const std::string& file : listed_names(*folder, listing_, name)) {
-      folder->move_file(file, target_folder);
-    }
-  }
-  for (const std::string& file : listed_names(folder_, listing_, "")) {
-    folder_.move_file(file, target);
+PartialFolder::~PartialFolder() {
+  if (is_kept_) return;
+  try {
+    remove();
+  } catch (const IoError&) {
+    // The next command with this target removes the rest.
   }
 }
 
-void OutputFolder::discard_staging() {
-  if (!staging_) return;
-  staging_->remove_results();
-  // The marker is removed last: it lists the files that a power cut could bring back.
-  sync_files(staging_->path());
-  for (const auto& folder : kind_.folders) staging_->folder_.remove_folder(folder.first);
-  staging_->folder_.remove_file(kind_.marker);
-  folder_.remove_folder(kStagingFolder);
-  staging_.reset();
+void PartialFolder::remove() {
+  keep();
+  results_->remove_results();
+  parent_.remove_folder(name_);
 }
 
-OutputFolder& OutputFolder::make_staging(const nlohmann::ordered_json& marker,
-                                         const OutputListing& listing) {
-  discard_staging();
-  staging_ = std::make_unique<OutputFolder>(folder_.make_folder(kStagingFolder), kind_);
-  staging_->mark(marker, listing);
-  return *staging_;
-}
-
-OutputChange::OutputChange(OutputFolder& out, Mode mode, nlohmann::ordered_json marker,
-                           OutputListing planned)
-    : out_(out), mode_(mode), marker_(std::move(marker)), planned_(std::move(planned)) {
-  if (is_staged()) {
-    out_.make_staging(marker_, planned_);
+void PartialFolder::replace(ResultFolder* earlier) {
+  if (earlier == nullptr) {
+    parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
+    parent_.sync();
     return;
   }
-  out_.discard_staging();
-  if (!planned_.contains(out_.listing())) remove_earlier();
-  out_.mark(marker_, planned_);
-  out_.remove_temporaries();
-}
-
-OutputChange::~OutputChange() {
-  try {
-    if (is_staged()) out_.discard_staging();
-  } catch (const IoError&) {
-    // The next command with this folder removes the staging folder.
+  if (parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
+    parent_.sync();
+    earlier->remove_results();
+    parent_.remove_folder(name_);
+    return;
   }
+  // Nothing that is called complete loses its files one by one.
+  Json marker = earlier->marker();
+  marker["complete"] = false;
+  earlier->mark(marker, OutputListing(earlier->listing()));
+  earlier->remove_results();
+  parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
+  parent_.sync();
 }
 
-const fs::path& OutputChange::folder() const {
-  return is_staged() ? out_.staging()->path() : out_.path();
-}
-
-/// Their listing stays in the marker until they are gone for good. From the mark on, the staging
-/// folder is no longer removed in case of an error.
-void OutputChange::remove_earlier() {
-  out_.mark(marker_, OutputListing(out_.listing()));
-  mode_ = Mode::kInPlace;
-  out_.remove_results();
-  sync_files(out_.path());
-}
-
-void OutputChange::put_in_place(const std::function<void()>& put_others) {
-  if (is_staged()) {
-    sync_files(out_.staging()->path());
-    remove_earlier();
-    out_.mark(marker_, planned_);
-    put_others();
-    out_.staging()->move_results(out_.folder());
-    sync_files(out_.path());
-    out_.discard_staging();
-  } else {
-    put_others();
-    sync_files(out_.path());
+OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
+                           const OutputListing& listing, bool may_replace, const InputFiles& inputs)
+    : listing_(listing) {
+  const fs::path place = whole_path(target);
+  check_name(place);
+  inputs.refuse(place);
+  if (fs::exists(fs::symlink_status(place))) {
+    if (identity_of(place) == identity_of(".")) {
+      throw IoError(target.string() +
+                    ": is the current folder, which a new one would replace; "
+                    "choose another folder");
+    }
+    ResultFolder found(Folder(place), kind);
+    if (found.has_results() && !may_replace) {
+      throw IoError(target.string() +
+                    ": holds earlier results; choose another folder, or replace them by --force");
+    }
+    found.check(inputs);
+    Folder(place.parent_path()).check_replaceable(place.filename().string());
+    if (!found.folder().names().empty()) earlier_.emplace(std::move(found));
   }
+  partial_.emplace(place, kind, listing, inputs);
 }
 
-void OutputChange::finish(const nlohmann::ordered_json& marker, const OutputListing& written) {
-  out_.mark(marker, written);
+bool OutputFolder::earlier_have(const char* field, const std::string& text) const {
+  return earlier_ && has(earlier_->marker(), field, text);
+}
+
+bool OutputFolder::left_have(const char* field, const std::string& text) const {
+  return has(partial_->left(), "/complete", true) && has(partial_->left(), field, text);
+}
+
+bool OutputFolder::owns(const char* field, const fs::path& path) const {
+  // A file that still waits to be put in place is not the one there.
+  const fs::path waiting = fs::path(path).concat(kPartialEnd) / path.filename();
+  return earlier_have(field, path.string()) ||
+         (left_have(field, path.string()) && !fs::exists(fs::symlink_status(waiting)));
+}
+
+void OutputFolder::keep_unfinished(const Json& marker) {
+  partial_->results().mark(marker, listing_);
+  sync_files(path());
+  partial_->keep();
+}
+
+void OutputFolder::finish(Json marker, const std::function<void()>& put_others) {
+  marker["complete"] = true;
+  partial_->results().mark(marker, listing_);
+  sync_files(path());
+  partial_->keep();  // the results are whole
+  put_others();
+  partial_->replace(earlier_ ? &*earlier_ : nullptr);
+}
+
+OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
+    : target_(whole_path(target)), lock_(target_.parent_path(), FolderLock::Mode::kShared) {
+  check_name(target_);
+  inputs.refuse(target_);
+  const Folder parent(target_.parent_path());
+  if (const auto entry = parent.find(target_.filename().string())) {
+    if (entry->kind != Folder::Kind::kFile) {
+      throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
+    }
+    if (!may_replace) {
+      throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
+    }
+    replaces_ = true;
+  }
+  const std::string name = target_.filename().string();
+  partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
+}
+
+void OutputFile::put_in_place() {
+  sync_files(partial_->path());
+  partial_->keep();  // the file is whole
+  partial_->results().folder().rename(partial_->target(), partial_->parent(), partial_->target(),
+                                      replaces_ ? Folder::Rename::kReplace : Folder::Rename::kNew);
+  partial_->parent().sync();
+  partial_->remove();
+}
+
+AddedFile::AddedFile(ResultFolder& results, const std::string& name)
+    : results_(results),
+      name_(name),
+      partial_(whole_path(results.path()).concat('.' + name), file_kind(), listing_of_file(name),
+               InputFiles()) {
+  const std::optional<Folder::Entry> entry = results.folder().find(name);
+  if (!entry || (entry->kind == Folder::Kind::kFile && results.listing().contains("", name))) {
+    return;
+  }
+  throw IoError((results.path() / name).string() + ": is in the way, and no part of the results (" +
+                results.kind().marker + " does not list it); move it away");
+}
+
+void AddedFile::put_in_place(const Json& marker, const std::function<void()>& publish_more) {
+  sync_files(partial_.path());
+  OutputListing listing = results_.listing();
+  listing.files.insert(listed_name(name_));
+  // Listed first: a file that is not listed would count as one of the user.
+  results_.mark(marker, listing);
+  publish_more();
+  partial_.results().folder().rename(name_, results_.folder(), name_, Folder::Rename::kReplace);
+  results_.folder().sync();
+  partial_.remove();
 }
 
 }  // namespace dynains::program

@@ -1,10 +1,15 @@
-// Folders of results: nothing but listed files is removed, and old and new files never mix.
+// Outputs of a command: each appears whole, or not at all, and nothing of others is replaced.
+//
+// A command writes TARGET into the folder TARGET.partial, which it creates, locks and marks as its
+// own before anything else, and renames when all is on the disk. A command that is killed leaves
+// that folder, which the next one with this target replaces. Links are never followed below the
+// folder that holds the target.
 #pragma once
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,116 +27,175 @@ std::filesystem::path whole_path(const std::filesystem::path& path);
 /// Creates a folder and those above it. Throws IoError.
 void create_folder(const std::filesystem::path& folder);
 
-/// The folder of a command's results, locked until destruction. The constructor creates it, and
-/// those above it, if they are missing. The destructor removes what the constructor created and
-/// what is still empty: a refused command leaves nothing behind.
-class LockedFolder {
- public:
-  /// Throws IoError, and UsageError if another process has locked the folder.
-  explicit LockedFolder(const std::filesystem::path& folder);
-  ~LockedFolder();
-  LockedFolder(const LockedFolder&) = delete;
-  LockedFolder& operator=(const LockedFolder&) = delete;
-
- private:
-  std::vector<std::filesystem::path> created_;  // innermost first
-  FolderLock lock_;
+/// Folders of results of one command, and the name of their marker: a file of JSON that names the
+/// program and the command, says whether the results are complete, and lists all other files.
+struct OutputKind {
+  std::string command;  ///< "run"
+  std::string marker;   ///< "report.json"
 };
 
-/// In a folder of results, while new results that will replace complete ones are written.
-inline constexpr const char* kStagingFolder = ".dynains_staging";
+/// What each marker begins with; `"complete"` is false.
+nlohmann::ordered_json begin_marker(const OutputKind& kind);
 
-/// A folder that is empty or holds earlier results of one kind, known by a marker that lists them.
-/// Files that are not listed belong to others and stay. Links below the folder are never followed.
-/// All members throw IoError. Make a LockedFolder of the folder first.
-class OutputFolder {
+/// A folder of results, locked until destruction. All members throw IoError.
+class ResultFolder {
  public:
-  /// Throws if the folder is neither empty nor holds results that a command of this `kind` listed.
-  /// Temporaries of the marker and empty folders of the kind do not count.
-  OutputFolder(Folder folder, const OutputKind& kind);
+  /// Throws unless the folder holds results of this kind, or nothing but temporaries of the marker;
+  /// UsageError if another command has locked it. `kind` outlives this.
+  ResultFolder(Folder folder, const OutputKind& kind);
 
-  const std::filesystem::path& path() const { return folder_.path(); }
   const Folder& folder() const { return folder_; }
+  const std::filesystem::path& path() const { return folder_.path(); }
+  std::filesystem::path marker_path() const { return path() / kind_.marker; }
   const OutputKind& kind() const { return kind_; }
-
-  bool has_results() const { return !marker_.is_null(); }
-  /// Marker of the earlier results; null if there are none.
+  /// Null if there is none.
   const nlohmann::ordered_json& marker() const { return marker_; }
+  bool has_results() const { return !marker_.is_null(); }
   const OutputListing& listing() const { return listing_; }
   /// Whether the marker has `"complete": true`.
   bool is_complete() const;
-  /// New results that were not put in place, because their command was killed; null if none.
-  const OutputFolder* staging() const { return staging_.get(); }
 
-  /// Throws unless every listed file can be removed and every `planned` one written, here and in
-  /// the staging folder, as far as can be known in advance. No file of others and none of `inputs`
-  /// may be in the way.
-  void check(const OutputListing& planned, const InputFiles& inputs) const;
-
+  /// Throws if any file is not listed, or is one of `inputs`.
+  void check(const InputFiles& inputs) const;
   /// Replaces the marker, with this listing in the field `outputs`. It is on the disk afterwards.
   void mark(nlohmann::ordered_json marker, const OutputListing& listing);
-  /// Removes listed files and temporaries of them, and folders that are empty then. The marker
-  /// stays.
+  /// Removes the listed files, and at last the marker. Files of others stay.
   void remove_results() const;
-  /// As remove_results(), for one folder of the listing.
-  void remove_folder_results(const std::string& name) const;
-  /// Removes temporaries of listed files that killed processes left.
-  void remove_temporaries() const;
-  /// Moves all listed files to `target`, over files of their names.
-  void move_results(const Folder& target) const;
-  /// Removes the staging folder with all that it holds.
-  void discard_staging();
-  /// An empty staging folder with this marker.
-  OutputFolder& make_staging(const nlohmann::ordered_json& marker, const OutputListing& listing);
 
  private:
-  void check_file(const Folder& folder, const std::string& name, bool is_listed,
-                  const InputFiles& inputs) const;
-  void check_folder(const std::string& name, const OutputListing& planned,
-                    const InputFiles& inputs) const;
-  void check_nothing_foreign() const;
+  /// visit(parent, name, entry, is_ours) for all entries, those of a folder before it.
+  template <class Visit>
+  void visit_entries(Visit&& visit) const;
+  bool is_listed(const std::string& folder, const std::string& name) const;
 
   Folder folder_;
   const OutputKind& kind_;
   nlohmann::ordered_json marker_;
   OutputListing listing_;
-  std::unique_ptr<OutputFolder> staging_;
 };
 
-/// The change of a folder from earlier results to new ones.
-///
-/// In place, for results that are new or resumed: the marker says unfinished first, then files are
-/// written one by one. Staged, for results that replace others: files are written into the staging
-/// folder, and the earlier results stay as they are until `put_in_place()`.
-class OutputChange {
+/// Folders that were missing above an output. The destructor removes those that are still empty.
+class MissingFolders {
  public:
-  enum class Mode { kInPlace, kStaged };
-
-  /// `marker` says unfinished and does not change until `finish()`. `planned` lists all files that
-  /// will be written. Throws IoError.
-  OutputChange(OutputFolder& out, Mode mode, nlohmann::ordered_json marker, OutputListing planned);
-  /// Removes the staging folder, unless its files are being put in place.
-  ~OutputChange();
-  OutputChange(const OutputChange&) = delete;
-  OutputChange& operator=(const OutputChange&) = delete;
-
-  /// The folder to write results into.
-  const std::filesystem::path& folder() const;
-  bool is_staged() const { return mode_ == Mode::kStaged; }
-
-  /// All results are on the disk and in place afterwards. `put_others()` puts files outside of the
-  /// folder in place, when the marker says unfinished. Throws IoError.
-  void put_in_place(const std::function<void()>& put_others = [] {});
-  /// Replaces the marker by the final one. Throws IoError.
-  void finish(const nlohmann::ordered_json& marker, const OutputListing& written);
+  /// Creates them.
+  explicit MissingFolders(const std::filesystem::path& folder);
+  ~MissingFolders();
+  MissingFolders(const MissingFolders&) = delete;
+  MissingFolders& operator=(const MissingFolders&) = delete;
 
  private:
-  void remove_earlier();
+  std::vector<std::filesystem::path> created_;  // innermost first
+};
 
-  OutputFolder& out_;
-  Mode mode_;
-  nlohmann::ordered_json marker_;
-  OutputListing planned_;
+/// The folder TARGET.partial. The destructor removes it unless it was renamed or kept.
+class PartialFolder {
+ public:
+  /// Creates the folder with a marker of this listing. What a killed command of this kind has left
+  /// there is removed before. Throws IoError if anything else has the name, or `inputs` are there;
+  /// UsageError if another command writes the target.
+  PartialFolder(const std::filesystem::path& target, const OutputKind& kind,
+                const OutputListing& listing, const InputFiles& inputs);
+  ~PartialFolder();
+  PartialFolder(const PartialFolder&) = delete;
+  PartialFolder& operator=(const PartialFolder&) = delete;
+
+  const std::filesystem::path& path() const { return results_->path(); }
+  ResultFolder& results() { return *results_; }
+  /// Marker of what a killed command had left; null if there was nothing.
+  const nlohmann::ordered_json& left() const { return left_; }
+  /// The folder of the target.
+  const Folder& parent() const { return parent_; }
+  /// Name of the target there.
+  const std::string& target() const { return target_; }
+  /// Moves this folder to the target, in place of the results that are there, if any.
+  void replace(ResultFolder* earlier);
+  /// The folder stays as it is.
+  void keep() { is_kept_ = true; }
+  /// Removes the folder, which has nothing left but its marker.
+  void remove();
+
+ private:
+  MissingFolders missing_;
+  Folder parent_;
+  std::string target_;
+  std::string name_;
+  std::optional<ResultFolder> results_;
+  nlohmann::ordered_json left_;
+  bool is_kept_ = false;
+};
+
+/// Results in a folder.
+class OutputFolder {
+ public:
+  /// `listing` has all files that will be written. Throws IoError unless `target` is missing, empty
+  /// or, if `may_replace`, holds results of this kind, all of which are listed and none of which
+  /// are `inputs`; UsageError if another command uses it.
+  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
+               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
+
+  /// The folder to write into.
+  const std::filesystem::path& path() const { return partial_->path(); }
+  /// Whether the results that will be replaced have this text in `field` of their marker.
+  bool earlier_have(const char* field, const std::string& text) const;
+  /// Whether complete results have, which a killed command has left beside the target.
+  bool left_have(const char* field, const std::string& text) const;
+  /// Whether the file `path` was put in place with those results, which name it in `field`. Then it
+  /// is theirs, wherever it lies.
+  bool owns(const char* field, const std::filesystem::path& path) const;
+  /// The results so far stay in path(), with this marker. Throws IoError.
+  void keep_unfinished(const nlohmann::ordered_json& marker);
+  /// The results are at the target, with this marker, which says complete, and on the disk, and the
+  /// earlier ones are gone. Calls `put_others()` before, when all bytes are on the disk: the
+  /// results come last, for they say that all is in place. They stay in path() if it fails. Throws
+  /// IoError.
+  void finish(
+      nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
+
+ private:
+  OutputListing listing_;
+  std::optional<ResultFolder> earlier_;
+  std::optional<PartialFolder> partial_;
+};
+
+/// A file as an output of its own.
+class OutputFile {
+ public:
+  /// Throws IoError if `target` cannot be written, is one of `inputs`, or exists and must not be
+  /// replaced; UsageError if another command writes it or its folder.
+  OutputFile(const std::filesystem::path& target, bool may_replace, const InputFiles& inputs);
+
+  /// The file to write, of the name of the target.
+  std::filesystem::path path() const { return partial_->path() / target_.filename(); }
+  /// By whole_path().
+  const std::filesystem::path& target() const { return target_; }
+  /// The file is at the target, and on the disk. If it cannot be put there, it stays in path().
+  /// Throws IoError.
+  void put_in_place();
+
+ private:
+  std::filesystem::path target_;
+  FolderLock lock_;
+  bool replaces_ = false;
+  std::optional<PartialFolder> partial_;
+};
+
+/// A file that is added to finished results, or replaces the one that was added before.
+class AddedFile {
+ public:
+  /// `results` outlive this. Throws IoError if a file of others has the name.
+  AddedFile(ResultFolder& results, const std::string& name);
+
+  /// The file to write.
+  std::filesystem::path path() const { return partial_.path() / name_; }
+  /// The marker lists the file, and the file is in place. Calls `publish_more()` when all bytes
+  /// are on the disk and only names are left to change. Throws IoError.
+  void put_in_place(
+      const nlohmann::ordered_json& marker, const std::function<void()>& publish_more = [] {});
+
+ private:
+  ResultFolder& results_;
+  std::string name_;
+  PartialFolder partial_;
 };
 
 }  // namespace dynains::program

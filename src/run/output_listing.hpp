@@ -6,21 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
-#include <vector>
 
 namespace dynains::program {
 
-/// The names that a command may use: a marker that lists any other name is not ours.
-struct OutputKind {
-  std::string command;             ///< "run"
-  std::string marker;              ///< "report.json"
-  std::vector<std::string> files;  ///< beside the marker
-  bool has_map;                    ///< lists a point file of any name as well
-  /// Folder -> extensions that its files may have.
-  std::map<std::string, std::vector<std::string>> folders;
-};
+/// The name in printable ASCII: other bytes, and `%`, become `%XX`. Names need not be UTF-8.
+std::string listed_name(const std::string& name);
 
-/// Files below a folder of results; the marker is not among them.
+/// Files below a folder of results; the marker is not among them. All names by listed_name().
 struct OutputListing {
   std::set<std::string> files;                 ///< directly in the folder
   std::map<std::string, std::string> folders;  ///< folder -> extension of its files
@@ -28,17 +20,14 @@ struct OutputListing {
 
   /// Whether `folder`/`name` is listed; an empty `folder` is the folder of results itself.
   bool contains(const std::string& folder, const std::string& name) const;
-  /// Whether everything that `other` lists is listed.
-  bool contains(const OutputListing& other) const;
 
-  /// `{"files": [...], "folders": {...}, "scans": [...]}`. Bytes of names that are not printable
-  /// ASCII, and `%`, are written as `%XX`: names need not be UTF-8.
+  /// `{"files": [...], "folders": {...}, "scans": [...]}`.
   nlohmann::ordered_json to_json() const;
 };
 
-/// The field `outputs` of a marker. Throws IoError unless the marker is one of `dynains COMMAND`
-/// and lists nothing but names that the command may use. `file` is the marker's path.
+/// The field `outputs` of a marker. Throws IoError unless the marker is one of `dynains COMMAND`.
+/// `file` is the marker's path. The names are for comparisons with entries of the folder only.
 OutputListing read_listing(const std::filesystem::path& file, const nlohmann::ordered_json& marker,
-                           const OutputKind& kind);
+                           const std::string& command);
 
 }  // namespace dynains::program

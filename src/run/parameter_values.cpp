@@ -1,16 +1,15 @@
 #include "parameter_values.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
-#include <fstream>
+#include <cstdint>
 #include <limits>
 #include <locale>
 #include <sstream>
-#include <system_error>
 
 #include "dynains/parameters.hpp"
 #include "nearest_name.hpp"
+#include "read_text_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -53,26 +52,6 @@ std::string trim(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
-/// A pipe may be given as well, and a device that never ends.
-std::string read_config_text(const std::filesystem::path& path) {
-  constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
-  const auto fail = [&](const std::string& what) {
-    throw IoError(path.string() + ": " + what + "; expected a config file, see dynains config");
-  };
-  const auto reason = [] { return ": " + std::generic_category().message(errno); };
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) fail("is a folder");
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) fail("cannot be read" + reason());
-  std::string text(kMaxBytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad()) fail("cannot be read" + reason());
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMaxBytes) fail("has more than " + std::to_string(kMaxBytes) + " bytes");
-  return text;
-}
-
 }  // namespace
 
 std::string flag_name(std::string parameter_name) {
@@ -107,7 +86,8 @@ std::string format_value(double value) { return format_real(value); }
 std::string format_value(float value) { return format_real(value); }
 
 ParameterValues read_config_file(const std::filesystem::path& path) {
-  std::istringstream file(read_config_text(path));
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20U;
+  std::istringstream file(read_text_file(path, kMaxBytes, "a config file, see dynains config"));
   ParameterValues values;
   std::map<std::string, std::size_t> seen;
   std::size_t number = 0;

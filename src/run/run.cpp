@@ -19,7 +19,6 @@
 #include "range_check.hpp"
 #include "run_doubts.hpp"
 #include "run_plan.hpp"
-#include "run_request.hpp"
 #include "run_sequence.hpp"
 #include "scratch_file.hpp"
 #include "start_check.hpp"
@@ -29,6 +28,8 @@ namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kSessionField = "/request/session";
 
 /// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
 /// After a signal, the first verdicts stay.
@@ -117,7 +118,6 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
   description.log_ends_early = sequence.early_end().has_value();
   description.agreement = agreement.as_given;
   description.preset = settings.preset;
-  description.complete = results.is_complete();
   description.map = plan.outputs.map_name();
   description.configuration = plan.configuration;
   return description;
@@ -158,15 +158,30 @@ nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
           {"objects", std::move(objects)}};
 }
 
-/// Writes the log of complete results.
-void write_log(const LogOutput& log, const RunPlan& plan, const RunListener& listener,
-               RunOutcome& outcome) {
-  const InterruptGuard interrupt(listener.second_signal);
-  const std::optional<std::size_t> unjudged = log.write(plan.outputs.folder);
+/// Outputs outside of the folder of results.
+struct OutsideOutputs {
+  /// Files of the results that `out` replaces are replaced, too.
+  OutsideOutputs(const RunPlan& plan, const OutputFolder& out) {
+    const fs::path& map_file = plan.outputs.map;
+    if (plan.outputs.has_outside_map()) {
+      check_is_no_scan(map_file, plan.sequence);
+      map.emplace(map_file, out.owns("/static_map/file", map_file), plan.inputs);
+    }
+    const fs::path& log_file = plan.outputs.log;
+    if (log_file.empty()) return;
+    log.emplace(plan, out.owns("/request/write_log", log_file));
+  }
+
+  std::optional<OutputFile> map;
+  std::optional<LogOutput> log;
+};
+
+/// Writes the log of the results in `folder`.
+void write_log(const LogOutput& log, const RunPlan& plan, const fs::path& folder,
+               const RunListener& listener, RunOutcome& outcome) {
+  const std::optional<std::size_t> unjudged = log.write(folder);
   if (!unjudged) {
     outcome.complete = false;
-    outcome.signal = InterruptGuard::signal();
-    warn(listener, plan.outputs.log.string() + ": not written; the other results are complete");
     return;
   }
   outcome.log = plan.outputs.log;
@@ -176,19 +191,9 @@ void write_log(const LogOutput& log, const RunPlan& plan, const RunListener& lis
                      "and --end; they keep all points");
 }
 
-/// Report of a run that is not finished.
-nlohmann::ordered_json marker_of(const RunPlan& plan) {
-  nlohmann::ordered_json marker = unfinished_report(plan.outputs.map_name());
-  marker["request"] = plan.request;
-  return marker;
-}
-
-/// Writes the results into `out`, from the first scan on, or until a signal comes.
-RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
-                         const RunListener& caller, OutputFolder& out, OutputChange::Mode mode,
-                         OutsideMap& outside_map) {
-  std::vector<std::string> warnings = plan.sequence.warnings();
-  const RunListener listener = with_memory(caller, warnings);
+/// Throws ConfigError if the scans disagree with the poses. Returns the agreement.
+PoseAgreement check_before(const RunPlan& plan, const RunSettings& settings,
+                           const RunListener& listener) {
   check_ranges(plan.sequence, plan.range, plan.config,
                settings.recording_flags.contains("--point-units"));
   const StartCheck start = check_start(plan.sequence, plan.range, plan.config,
@@ -198,21 +203,63 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
     throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
                       "; or run with these poses and clouds by --accept-poses");
   }
+  return start.agreement;
+}
 
+/// Where the files are written that appear at the end.
+RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
+                           const OutsideOutputs& outside) {
+  RunOutputs outputs = plan.outputs;
+  outputs.folder = out.path();
+  if (!outputs.map.empty()) {
+    outputs.map = outside.map ? outside.map->path() : out.path() / outputs.map.filename();
+  }
+  return outputs;
+}
+
+/// Puts all outputs in place, or keeps what a signal has left.
+void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ordered_json& report,
+             OutputFolder& out, OutsideOutputs& outside, SessionContribution* session,
+             RunOutcome& outcome) {
+  if (!outcome.complete) {
+    outcome.signal = InterruptGuard::signal();
+    outcome.outputs.folder = out.path();
+    return out.keep_unfinished(report);
+  }
+  if (outputs.write_page) {
+    outcome.page = plan.outputs.folder / kViewPage;
+    write_page(outputs.folder / kViewPage, outputs.folder, outputs.map, report, plan.sequence,
+               kDefaultViewPoints);
+  }
+  out.finish(report, [&] {
+    if (outside.map) outside.map->put_in_place();
+    if (outside.log) outside.log->put_in_place();
+    if (session != nullptr) session->commit();
+  });
+}
+
+/// Writes the results, from the first scan on, or until a signal comes.
+RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
+                         const RunListener& caller, OutputFolder& out, OutsideOutputs& outside) {
+  std::vector<std::string> warnings = plan.sequence.warnings();
+  const RunListener listener = with_memory(caller, warnings);
+  const PoseAgreement agreement = check_before(plan, settings, listener);
   std::optional<SessionContribution> session;
   std::optional<SessionAlignment> alignment;
-  // A run that is resumed may have added its session already.
-  if (!plan.session.city.empty() && !(settings.resume && plan.session.is_fulfilled())) {
+  // The results that are replaced may have added the session already.
+  const std::string& name = plan.session.info.name;
+  const bool has_session =
+      (out.earlier_have(kSessionField, name) || out.left_have(kSessionField, name)) &&
+      plan.session.is_fulfilled();
+  if (!plan.session.city.empty() && !has_session) {
     const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
     alignment = request.info.alignment;
     session.emplace(request);
   }
 
   const InterruptGuard interrupt(listener.second_signal);
-  OutputChange change(out, mode, marker_of(plan), plan.listing);
-  RunOutputs outputs = plan.outputs;
-  outputs.folder = change.folder();
-  RunResults results(plan.sequence, plan.range, outputs, outside_map.take_writer());
+  const RunOutputs outputs = partial_outputs(plan, out, outside);
+  RunResults results(plan.sequence, plan.range, outputs);
   if (session) results.contribute_to(*session);
   std::optional<ScratchFile> store;
   std::optional<SecondPass> second_pass;
@@ -226,30 +273,23 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;
   check_not_empty(plan, results);
-  if (!outcome.complete) outcome.signal = InterruptGuard::signal();
-  if (change.is_staged() && !outcome.complete) {
-    outcome.earlier_results_stay = true;
-    return outcome;
-  }
   const RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
   for (const std::string& text : sentences(doubts, plan.sequence)) warn(listener, text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kEstimatedPoses, plan.sequence);
-  change.put_in_place([&] {
-    results.commit_outside_map();
-    if (session && outcome.complete) session->commit();
-  });
-  outcome.map_points = results.map_points();
+  if (outside.log && outcome.complete) {
+    write_log(*outside.log, plan, outputs.folder, listener, outcome);
+  }
   outcome.wall = wall_time(ms_since(settings.started), timing);
-  RunDescription description = describe(plan, settings, start.agreement, results);
+  RunDescription description = describe(plan, settings, agreement, results);
   description.wall = outcome.wall;
   description.doubts = to_json(doubts, plan.sequence);
   description.doubts["warnings"] = warnings;
   nlohmann::ordered_json report = make_report(description, results, timing);
   report["request"] = plan.request;
   if (second_pass) report["second_pass"] = to_json(*second_pass, plan);
-  change.finish(report, plan.listing);
+  publish(plan, outputs, report, out, outside, session ? &*session : nullptr, outcome);
   return outcome;
 }
 
@@ -257,33 +297,10 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
 
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
   const RunPlan plan = make_plan(settings, std::move(recording));
-  const LockedFolder lock(plan.outputs.folder);
-  OutputFolder out(Folder(plan.outputs.folder), run_output_kind());
-  const RunTask task = choose_task(plan, settings, out);
-  std::optional<LogOutput> log;
-  if (!plan.outputs.log.empty()) log.emplace(plan, settings.force || out.has_results());
-  RunOutcome outcome;
-  if (task == RunTask::kNothing) {
-    out.discard_staging();
-    out.remove_temporaries();
-    outcome.outputs = plan.outputs;
-    outcome.was_complete_before = true;
-  } else {
-    out.check(plan.listing, plan.inputs);
-    if (task == RunTask::kReplace) check_space(plan);
-    OutsideMap outside_map(plan, settings.force || out.has_results());
-    outcome = write_results(
-        plan, settings, listener, out,
-        task == RunTask::kReplace ? OutputChange::Mode::kStaged : OutputChange::Mode::kInPlace,
-        outside_map);
-  }
-  if (log && outcome.complete && !(outcome.was_complete_before && fs::exists(plan.outputs.log))) {
-    write_log(*log, plan, listener, outcome);
-  }
-  if (settings.view && outcome.complete) {
-    outcome.page = write_view(out, plan.sequence, kDefaultViewPoints);
-  }
-  return outcome;
+  OutputFolder out(plan.outputs.folder, run_output_kind(), plan.listing, settings.force,
+                   plan.inputs);
+  OutsideOutputs outside(plan, out);
+  return write_results(plan, settings, listener, out, outside);
 }
 
 }  // namespace dynains::program

@@ -28,11 +28,9 @@ struct RunListener {
 };
 
 struct RunOutcome {
-  RunOutputs outputs;
-  bool was_complete_before = false;   ///< --resume of a complete run: nothing below is known
-  bool complete = true;               ///< false after a signal: `scans` were finished
-  int signal = 0;                     ///< that ended the run
-  bool earlier_results_stay = false;  ///< the run ended before it could replace them
+  RunOutputs outputs;    ///< their folder is that of unfinished results after a signal
+  bool complete = true;  ///< false after a signal: `scans` were finished
+  int signal = 0;        ///< that ended the run
   std::size_t scans = 0;
   std::uint64_t points = 0;
   LabelCounts labels;
@@ -44,8 +42,8 @@ struct RunOutcome {
   std::filesystem::path log;                  ///< empty: none was written
 };
 
-/// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: a new folder then
-/// holds the results so far, and earlier results stay. Throws ConfigError, IoError, PoseError,
+/// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: the results so
+/// far then stay in the folder OUT.partial. Throws ConfigError, IoError, PoseError,
 /// UsageError.
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener);
 

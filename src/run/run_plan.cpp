@@ -5,15 +5,14 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
+#include "io/fingerprint.hpp"
 #include "naming_scan.hpp"
 #include "own_body_range.hpp"
-#include "run_request.hpp"
 
 namespace dynains::program {
 namespace {
@@ -43,6 +42,11 @@ fs::path choose_map(const RunSettings& settings, const DynaInsRemover::Config& c
   return map_path(settings.map, out);
 }
 
+/// Whether `path` lies in a folder of results. Both are by whole_path().
+bool is_in_results(const fs::path& path, const fs::path& out) {
+  return std::mismatch(out.begin(), out.end(), path.begin(), path.end()).first == out.end();
+}
+
 /// Place of the log that is written; empty if there is none. Throws ConfigError.
 fs::path choose_log(const RunSettings& settings) {
   if (settings.log.empty()) {
@@ -51,7 +55,7 @@ fs::path choose_log(const RunSettings& settings) {
   }
   const fs::path out = whole_path(settings.out);
   const fs::path log = whole_path(settings.log);
-  if (std::mismatch(out.begin(), out.end(), log.begin(), log.end()).first == out.end()) {
+  if (is_in_results(log, out)) {
     throw ConfigError("--write-log " + settings.log + ": choose a place outside of --out");
   }
   return log;
@@ -96,6 +100,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.write_mcap = settings.write_mcap;
   outputs.log = choose_log(settings);
   outputs.mark_log = settings.mark_log;
+  outputs.write_page = settings.view;
   outputs.write_beliefs = settings.view || settings.write_beliefs;
   add_map_attributes(settings, config, outputs);
   check_passes(settings);
@@ -159,25 +164,6 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   return request;
 }
 
-/// Whether every file of complete results is still there.
-bool is_whole(const RunPlan& plan, const OutputFolder& out) {
-  const RunOutputs& outputs = plan.outputs;
-  if (outputs.has_outside_map() && !fs::exists(outputs.map)) return false;
-  if (!plan.session.city.empty() && !plan.session.is_fulfilled()) return false;
-  const OutputListing& listing = plan.listing;
-  for (const std::string& name : listing.files) {
-    if (!out.folder().find(name)) return false;
-  }
-  for (const auto& [name, extension] : listing.folders) {
-    if (!out.folder().find(name)) return false;
-    const Folder folder(out.folder(), name);
-    for (const std::string& scan : listing.scans) {
-      if (!folder.find(scan + extension)) return false;
-    }
-  }
-  return true;
-}
-
 }  // namespace
 
 ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
@@ -203,14 +189,21 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   if (map == out / "dynamic_points.ply" || map == out / "dynamic_points.las") {
     throw ConfigError("--map " + name + ": the moving points go there");
   }
-  const bool is_beside_results =
-      map.parent_path().parent_path() == out &&
-      (run_output_kind().folders.count(map.parent_path().filename().string()) > 0 ||
-       map.parent_path().filename() == kStagingFolder);
-  if (is_beside_results) {
+  if (is_in_results(map, out) && map.parent_path() != out) {
     throw ConfigError("--map " + name + ": other results go into that folder");
   }
   return map;
+}
+
+std::string pose_fingerprint(const Recording& recording, const ScanRange& range) {
+  Fingerprint result;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    result.add(recording.name(i));
+    result.add(recording.time(i));
+    const Eigen::Matrix4d pose = recording.T_world_sensor(i).matrix();
+    for (Eigen::Index k = 0; k < pose.size(); ++k) result.add(pose(k));
+  }
+  return result.text();
 }
 
 void check_settings(const RunSettings& settings) { outputs_of(settings); }
@@ -227,7 +220,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   }
   if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
-  nlohmann::ordered_json request = describe_request(sequence, range, outputs, configuration);
+  nlohmann::ordered_json request = {{"poses_and_times", pose_fingerprint(sequence, range)},
+                                    {"points_in_world", sequence.frame() == PointFrame::kWorld},
+                                    {"deskew", sequence.is_deskewed()}};
   for (const char* const flag : kPointFlags) {
     if (settings.recording_flags.contains(flag)) request[flag] = settings.recording_flags[flag];
   }
@@ -258,64 +253,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           settings.static_policy};
 }
 
-RunTask choose_task(const RunPlan& plan, const RunSettings& settings, const OutputFolder& out) {
-  if (!out.has_results()) return RunTask::kWrite;
-  if (settings.force) return RunTask::kReplace;
-  if (!settings.resume) {
-    throw IoError(out.path().string() +
-                  ": holds earlier results; choose another folder, or replace them by --force");
-  }
-  const std::string differing = request_differences(out.marker(), plan.request);
-  if (differing.empty()) {
-    return out.is_complete() && is_whole(plan, out) ? RunTask::kNothing : RunTask::kWrite;
-  }
-  const bool was_replacing = out.staging() != nullptr &&
-                             request_differences(out.staging()->marker(), plan.request).empty();
-  if (was_replacing) return RunTask::kReplace;
-  throw IoError(out.path().string() +
-                ": holds results of other flags, scans, poses or another version, which cannot be "
-                "resumed (" +
-                differing + "); choose another folder, or replace them by --force");
-}
-
-void check_space(const RunPlan& plan) {
-  if (plan.sequence.format() != ScanFormat::kBin) return;
-  const std::uint64_t bytes_per_point = 5 + (plan.outputs.write_online ? 4 : 0);
-  std::uint64_t needed = 0;
-  for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
-    needed += bytes_per_point * count_scan_points(plan.sequence.file(i));
-  }
-  std::error_code error;
-  const fs::space_info space = fs::space(plan.outputs.folder, error);
-  if (error || needed <= space.available) return;
-  throw IoError(plan.outputs.folder.string() + ": No space left: labels take " +
-                std::to_string(needed) + " bytes, " + std::to_string(space.available) +
-                " are free; earlier results stay until the new ones are complete");
-}
-
-OutsideMap::OutsideMap(const RunPlan& plan, bool may_replace) {
-  if (!plan.outputs.has_outside_map()) return;
-  open(plan.outputs.map, plan.sequence, plan.range, plan.outputs, plan.inputs, may_replace);
-}
-
-void OutsideMap::open(const fs::path& map, const Recording& recording, const ScanRange& range,
-                      const RunOutputs& outputs, const InputFiles& inputs, bool may_replace) {
-  const fs::path folder = map.parent_path();
-  inputs.refuse(map);
-  if (identity_of(folder) == identity_of(recording.scan_folder())) {
-    throw IoError(map.string() + ": the scans are there; choose another folder for --map");
-  }
-  if (fs::exists(fs::symlink_status(map)) && !may_replace) {
-    throw IoError(map.string() +
-                  ": exists; choose another name for --map, or replace it by "
-                  "--force");
-  }
-  lock_.emplace(folder, FolderLock::Mode::kShared);
-  remove_leftovers(folder, [&](const std::string& name) { return name == map.filename(); });
-  writer_ = open_map(map, recording, range, outputs);
-  if (count_writers(map) > 1) {
-    throw UsageError(map.string() + ": is being written by another run");
-  }
+void check_is_no_scan(const fs::path& output, const Recording& recording) {
+  if (identity_of(output.parent_path()) != identity_of(recording.scan_folder())) return;
+  throw IoError(output.string() + ": the scans are there; choose another folder");
 }
 
 }  // namespace dynains::program

@@ -72,8 +72,9 @@ WallTime wall_time(double ms, const RunTiming& timing) {
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
                                    const RunTiming& timing) {
   const LabelCounts& labels = results.labels();
-  nlohmann::ordered_json report = unfinished_report(run.map);
-  report["complete"] = run.complete;
+  nlohmann::ordered_json report = begin_marker(run_output_kind());
+  report["static_map"] = nullptr;
+  if (!run.map.empty()) report["static_map"] = {{"file", run.map}};
   report["sequence"] = run.sequence;
   report["sequence_flags"] = run.sequence_flags;
   report["first_scan"] = run.first_scan;
@@ -102,19 +103,9 @@ nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& 
   return report;
 }
 
-nlohmann::ordered_json unfinished_report(const std::string& map) {
-  nlohmann::ordered_json report = {{"program", "dynains"},
-                                   {"version", kVersionString},
-                                   {"command", run_output_kind().command},
-                                   {"complete", false}};
-  report["static_map"] = nullptr;
-  if (!map.empty()) report["static_map"] = {{"file", map}};
-  return report;
-}
-
-std::string to_text(const nlohmann::ordered_json& report) {
-  // Paths need not be UTF-8.
-  return report.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+const OutputKind& run_output_kind() {
+  static const OutputKind kind = {"run", "report.json"};
+  return kind;
 }
 
 void write_timing(const std::filesystem::path& path, const RunTiming& timing) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
+#include "output_folder.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
@@ -42,9 +43,8 @@ struct RunDescription {
   std::size_t missing_poses = 0;  ///< scans that were left out because they have no pose
   bool log_ends_early = false;    ///< scans behind the early end are missing
   std::string preset;
-  Agreement agreement;   ///< of the scans under the poses, by a sample
-  bool complete = true;  ///< false after a signal
-  std::string map;       ///< file, relative to the folder of results if it lies there; empty: none
+  Agreement agreement;  ///< of the scans under the poses, by a sample
+  std::string map;      ///< file, relative to the folder of results if it lies there; empty: none
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   WallTime wall;
   nlohmann::ordered_json doubts;  ///< see to_json(RunDoubts), and "warnings"
@@ -53,11 +53,8 @@ struct RunDescription {
 nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
                                    const RunTiming& timing);
 
-/// The report of a run that is not finished.
-nlohmann::ordered_json unfinished_report(const std::string& map);
-
-/// Text of a report, as in the file.
-std::string to_text(const nlohmann::ordered_json& report);
+/// The folder of a run.
+const OutputKind& run_output_kind();
 
 /// Throws IoError.
 void write_timing(const std::filesystem::path& path, const RunTiming& timing);

@@ -67,20 +67,6 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
   return path;
 }
 
-const OutputKind& run_output_kind() {
-  static const OutputKind kind = {"run",
-                                  "report.json",
-                                  {"timing.csv", "dynamic_points.ply", kDynamicLas, kVerdictLog,
-                                   kOverviewPicture, kEstimatedPoses, kViewPage},
-                                  true,
-                                  {{"labels", {".label"}},
-                                   {"online", {".label"}},
-                                   {"causes", {".cause"}},
-                                   {"beliefs", {".belief"}},
-                                   {"clean", {".bin", ".pcd", ".ply"}}}};
-  return kind;
-}
-
 bool RunOutputs::has_outside_map() const {
   return !map.empty() && map.parent_path() != whole_path(folder);
 }
@@ -92,10 +78,11 @@ std::string RunOutputs::map_name() const {
 OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& range) const {
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
-  if (!map.empty() && !has_outside_map()) listing.files.insert(map_name());
+  if (!map.empty() && !has_outside_map()) listing.files.insert(listed_name(map_name()));
   if (has_las_map()) listing.files.insert(kDynamicLas);
   if (write_mcap) listing.files.insert(kVerdictLog);
   if (write_poses) listing.files.insert(kEstimatedPoses);
+  if (write_page) listing.files.insert(kViewPage);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (write_beliefs) listing.folders["beliefs"] = ".belief";
   if (write_online) listing.folders["online"] = ".label";
@@ -103,7 +90,8 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
     listing.folders["clean"] =
         std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
   }
-  for (std::size_t i = range.first; i <= range.last; ++i) listing.scans.insert(recording.name(i));
+  for (std::size_t i = range.first; i <= range.last; ++i)
+    listing.scans.insert(listed_name(recording.name(i)));
   return listing;
 }
 
@@ -119,7 +107,7 @@ std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recor
 }
 
 RunResults::RunResults(const Recording& recording, const ScanRange& range,
-                       const RunOutputs& outputs, std::unique_ptr<MapFile> outside_map)
+                       const RunOutputs& outputs)
     : recording_(recording),
       range_(range),
       final_labels_(outputs.folder / "labels", outputs.folder / "causes",
@@ -127,17 +115,13 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
       overview_(path_of(recording, range)),
       overview_file_(outputs.folder / kOverviewPicture),
-      map_(std::move(outside_map)),
-      map_is_outside_(map_ != nullptr),
       needs_beliefs_(outputs.needs_beliefs()),
       writing_(outputs.thread) {
   final_labels_.create_folders();
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
-  if (!outputs.map.empty() && !map_is_outside_) {
-    map_ = open_map(outputs.folder / outputs.map.filename(), recording, range, outputs);
-  }
+  if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
   if (outputs.write_mcap) {
     log_ = std::make_unique<VerdictLog>(outputs.folder / kVerdictLog, recording, range.first,
                                         is_far(recording, range));
@@ -289,11 +273,7 @@ void RunResults::commit() {
   if (dynamic_las_) dynamic_las_->commit();
   if (log_) log_->commit();
   overview_.picture().write_png(overview_file_);
-  if (map_ && !map_is_outside_) map_->commit();
-}
-
-void RunResults::commit_outside_map() {
-  if (map_ && map_is_outside_) map_->commit();
+  if (map_) map_->commit();
 }
 
 std::optional<std::size_t> RunResults::map_points() const {

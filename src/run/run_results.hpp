@@ -40,9 +40,6 @@ inline constexpr const char* kEstimatedPoses = "poses.txt";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
 
-/// The names that `dynains run` may use in its folder.
-const OutputKind& run_output_kind();
-
 struct RunOutputs {
   std::filesystem::path folder;
   std::filesystem::path map;  ///< by whole_path(); empty: no map
@@ -53,6 +50,7 @@ struct RunOutputs {
   std::filesystem::path log;  ///< by whole_path(); empty: none
   bool mark_log = false;      ///< adds labels to its clouds, which keep all points
   bool write_poses = false;
+  bool write_page = false;  ///< of dynains view
   bool write_beliefs = false;
   std::launch thread = std::launch::async;  ///< deferred: the caller reads and writes
   bool map_attributes = false;              ///< the map holds attributes of its points
@@ -96,10 +94,9 @@ struct JudgedScan {
 class RunResults {
  public:
   /// Opens all files, so that a folder that cannot be written is noticed before the work.
-  /// `outside_map` is that of open_map(); if it is null, the map goes into `outputs.folder`. The
-  /// recording outlives this. Throws IoError.
-  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs,
-             std::unique_ptr<MapFile> outside_map = nullptr);
+  /// They are written into `outputs.folder` and `outputs.map`. The recording outlives this. Throws
+  /// IoError.
+  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs);
 
   /// The verdict on the scan just pushed.
   void take_newest(const NewestVerdict& verdict);
@@ -125,9 +122,8 @@ class RunResults {
   std::launch thread() const { return writing_.policy(); }
 
   void add_map_point(const Eigen::Vector3d& point);
-  /// Puts all files in place, except a map outside of the folder.
+  /// All files are whole.
   void commit();
-  void commit_outside_map();
 
   std::size_t finished() const { return finished_; }
   /// Whether all scans are finished.
@@ -149,7 +145,6 @@ class RunResults {
   std::unique_ptr<MapFile> map_;
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
-  bool map_is_outside_;
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
   SecondPass* second_pass_ = nullptr;

@@ -51,7 +51,6 @@ struct RunSettings {
   bool write_beliefs = false;
   bool view = false;
   bool force = false;
-  bool resume = false;
   bool accept_poses = false;
   bool poses_are_estimated = false;  ///< by the odometry; they are a result
   bool drop_not_judged = false;      ///< clean/ has no points that are not judged
@@ -82,14 +81,11 @@ struct RunSettings {
 
 template <class Self, class Visitor>
 void RunSettings::visit_common(Self& self, Visitor&& visitor) {
-  visitor(Parameter{"force", self.force, Bounds(), "",
-                    "replace the results of an earlier run, and the file of the map, when the new "
-                    "ones are complete: until then the earlier ones stay. A folder without results "
-                    "is refused"});
-  visitor(Parameter{"resume", self.resume, Bounds(), "",
-                    "complete a run with the same settings that was interrupted or killed; nothing "
-                    "to do if it is complete. It begins with the first scan again, for verdicts "
-                    "depend on earlier scans"});
+  visitor(
+      Parameter{"force", self.force, Bounds(), "",
+                "replace the results of an earlier run, and its files of map and write_log, "
+                "when the new ones are complete: until then the earlier ones stay. Nothing else "
+                "is replaced"});
   visitor(TextParameter{"start", self.window.start, &read_number<std::uint64_t>, "N",
                         "number of the first scan"});
   visitor(TextParameter{"end", self.window.end, &read_number<std::uint64_t>, "N",

@@ -6,7 +6,9 @@
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "finished_run.hpp"
 #include "json_file.hpp"
+#include "run_report.hpp"
 #include "run_results.hpp"
 #include "viewer/page.hpp"
 #include "viewer/run_view.hpp"
@@ -26,11 +28,12 @@ std::size_t scan_named(const Recording& recording, const std::string& name,
                 recording.folder().string() + " does not have; is it the recording of the run?");
 }
 
-viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
-  const fs::path report = out.path() / out.kind().marker;
-  const auto& json = out.marker();
+viewer::RunFiles files_of(const fs::path& folder, const fs::path& map,
+                          const nlohmann::ordered_json& json, const Recording& recording) {
+  const fs::path report = folder / run_output_kind().marker;
   viewer::RunFiles files;
-  files.folder = out.path();
+  files.folder = folder;
+  files.map = map;
   const auto text = [&](const char* field) {
     return required_json_field<std::string>(report, json, field);
   };
@@ -48,47 +51,38 @@ viewer::RunFiles files_of(const OutputFolder& out, const Recording& recording) {
       scans("lookback_scans", defaults.lookback_scans),
       scans("lookahead_scans", defaults.lookahead_scans),
       std::max<std::size_t>(scans("reference_step", defaults.reference_step), 1));
-  const auto map = json_field<std::string>(report, json, "/static_map/file");
-  if (map) files.map = out.path() / *map;
   return files;
 }
 
 }  // namespace
 
-OutputFolder open_finished_run(const fs::path& folder) {
-  OutputFolder out(Folder(folder), run_output_kind());
+ResultFolder open_finished_run(const fs::path& folder) {
+  ResultFolder out(Folder(folder), run_output_kind());
   if (!out.has_results()) {
-    throw IoError(out.path().string() + ": holds no results; expected a folder of `dynains run`");
+    throw IoError(out.marker_path().string() + ": not found; expected a folder of `dynains run`");
   }
-  if (!out.is_complete()) {
-    throw IoError(out.path().string() +
-                  ": the run was interrupted; complete it first by dynains run --resume");
-  }
+  check_run_is_finished(folder);
   return out;
 }
 
-fs::path write_view(OutputFolder& out, const Recording& recording, std::size_t max_points) {
-  OutputListing listing = out.listing();
-  listing.files.insert(kViewPage);
-  out.check(listing, InputFiles());
+void write_page(const fs::path& page, const fs::path& folder, const fs::path& map,
+                const nlohmann::ordered_json& report, const Recording& recording,
+                std::size_t max_points) {
   const viewer::ViewData data =
-      viewer::view_of_run(recording, files_of(out, recording), max_points);
-  const fs::path page = out.path() / kViewPage;
+      viewer::view_of_run(recording, files_of(folder, map, report, recording), max_points);
   AtomicFile file(page);
   viewer::write_page(file.stream(), data);
-  // Listed first: a page that is not listed would count as a file of the user.
-  out.mark(nlohmann::ordered_json(out.marker()), listing);
   file.commit();
-  return page;
 }
 
-fs::path write_view(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
-  if (!fs::is_directory(folder)) {
-    throw IoError(folder.string() + ": no such folder; expected a folder of `dynains run`");
-  }
-  const LockedFolder lock(folder);
-  OutputFolder out = open_finished_run(folder);
-  return write_view(out, open(out.path() / out.kind().marker, out.marker()), max_points);
+fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
+  ResultFolder out = open_finished_run(folder);
+  AddedFile page(out, kViewPage);
+  const auto map = json_field<std::string>(out.marker_path(), out.marker(), "/static_map/file");
+  write_page(page.path(), out.path(), map ? out.path() / *map : fs::path(), out.marker(),
+             open(out.marker_path(), out.marker()), max_points);
+  page.put_in_place(out.marker());
+  return out.path() / kViewPage;
 }
 
 }  // namespace dynains::program

@@ -14,21 +14,23 @@ namespace dynains::program {
 /// Points on a page: for 1 million, it has some 10 MB.
 inline constexpr std::size_t kDefaultViewPoints = 1000000;
 
-/// The complete results of a run in `folder`, which is locked. Throws IoError.
-OutputFolder open_finished_run(const std::filesystem::path& folder);
+/// The complete results of a run. Throws IoError, and UsageError if another command uses the
+/// folder.
+ResultFolder open_finished_run(const std::filesystem::path& folder);
 
-/// Writes view.html into a folder with complete results of a run over `recording`, and lists it in
-/// report.json. Returns its path. Throws IoError.
-std::filesystem::path write_view(OutputFolder& out, const Recording& recording,
-                                 std::size_t max_points);
+/// Writes the file `page` about results in `folder`, with this report, of a run over `recording`.
+/// `map`: file of its map; empty: none. Throws IoError.
+void write_page(const std::filesystem::path& page, const std::filesystem::path& folder,
+                const std::filesystem::path& map, const nlohmann::ordered_json& report,
+                const Recording& recording, std::size_t max_points);
 
 /// Opens the recording of a run by its report, which is in `report_file`.
 using OpenRecording = std::function<Recording(const std::filesystem::path& report_file,
                                               const nlohmann::ordered_json& report)>;
 
-/// Writes the page into the `folder` of a run. Throws IoError if it has no complete results,
-/// and UsageError if another run writes to it.
-std::filesystem::path write_view(const std::filesystem::path& folder, const OpenRecording& open,
-                                 std::size_t max_points);
+/// Adds view.html to complete results of a run in `folder`. Returns its path. Throws IoError, and
+/// UsageError if another command uses the folder.
+std::filesystem::path add_page(const std::filesystem::path& folder, const OpenRecording& open,
+                               std::size_t max_points);
 
 }  // namespace dynains::program

@@ -81,14 +81,22 @@ TEST_CASE("clean removes the trail of a mover from a map that another program ha
 
   SECTION("an earlier result is replaced by --force alone") {
     const Outcome again = f.clean();
-    CHECK(again.code == 2);
-    CHECK_THAT(again.err, ContainsSubstring("exists; replace it with --force"));
+    CHECK(again.code == 1);
+    CHECK_THAT(again.err,
+               ContainsSubstring("exists; choose another name, or replace it by --force"));
     CHECK(f.clean({"--force"}).code == 0);
   }
 }
 
 TEST_CASE("clean refuses a map or a recording that does not belong to the run") {
   const CleanFixture f;
+  SECTION("an edge that is no number") {
+    for (const char* edge : {"nan", "0", "inf"}) {
+      const Outcome outcome = f.clean({"--voxel", edge});
+      CHECK(outcome.code == 2);
+      CHECK_THAT(outcome.err, ContainsSubstring("--voxel = " + std::string(edge)));
+    }
+  }
   SECTION("a map in another frame") {
     write_text(f.map, CleanFixture::header(1) + "0 0 0 0 0\n");
     const Outcome outcome = f.clean();

@@ -154,12 +154,12 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   is_refused(start({"map", days.at("city"), "export", days.at("city/x.ply")}), "lies in the map");
   is_refused(start({"run", days.at("day1"), "--out", days.at("out3"), "--session", "x"}),
              "--session needs --update");
-  // Nothing to do for a complete run; no second session.
-  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
+  // The same run again adds no second session.
+  CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
   CHECK(content_of(days.at("city")) == before);
   // Removed points come back with the same bytes.
   CHECK(start({"map", days.at("city"), "drop", "day0"}).code == 0);
-  CHECK(days.update(0, "city", "out", {"--resume"}).code == 0);
+  CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
   CHECK(content_of(days.at("city")) == before);
 }
 
@@ -189,7 +189,7 @@ TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
                                         "--update", days.at("city"), "-q",    "--accept-poses"};
   for (const int signal : {SIGKILL, SIGTERM}) {
     Process process(run);
-    const auto is_writing = [&] { return fs::exists(days.at("out2/labels/000020.label")); };
+    const auto is_writing = [&] { return fs::exists(days.at("out2.partial/labels/000020.label")); };
     for (int i = 0; i < 3000 && !is_writing(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -198,7 +198,7 @@ TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
     CHECK(process.wait().code == 128 + signal);
     CHECK(start({"map", days.at("city"), "check"}).code == 0);
     CHECK(days.exported("city", "after" + std::to_string(signal) + ".ply") == before);
-    fs::remove_all(days.at("out2"));
+    fs::remove_all(days.at("out2.partial"));
   }
   // The next writer removes what the killed one left.
   REQUIRE(days.update(1, "city", "out3").code == 0);
@@ -280,14 +280,14 @@ TEST_CASE("map: a session of a slightly different frame is aligned, or refused b
   const std::vector<std::string> align = {"--align", "--align-start", "1.2 -0.9 0.1 0 0 0 1"};
   {
     Process process(update("day2", align));
-    for (int i = 0; i < 3000 && !fs::exists(at("out-day2/labels/000000.label")); ++i) {
+    for (int i = 0; i < 3000 && !fs::exists(at("out-day2.partial/labels/000000.label")); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     ::kill(process.id(), SIGKILL);
     CHECK(process.wait().code == 128 + SIGKILL);
     const Outcome list = start({"map", at("city"), "list"});
     CHECK_THAT(list.out, ContainsSubstring("day1") && !ContainsSubstring("day2"));
-    fs::remove_all(at("out-day2"));
+    CHECK_FALSE(fs::exists(at("out-day2")));
   }
   const Outcome aligned = start(update("day2", align));
   CAPTURE(aligned.err);
@@ -301,8 +301,9 @@ TEST_CASE("map: a session of a slightly different frame is aligned, or refused b
   }
   CHECK(session["alignment"]["sessions"] == nlohmann::json({"day1"}));
   CHECK(start({"map", at("city"), "check"}).code == 0);
-  const Outcome again = start(update("day2", {"--resume", align[0], align[1], align[2]}));
-  CHECK_THAT(again.out, ContainsSubstring("complete already"));
+  const Outcome again = start(update("day2", {"--force", align[0], align[1], align[2]}));
+  CHECK(again.code == 0);
+  CHECK(again.out.find("aligned") == std::string::npos);
 
   const auto first = content_of(at("city/day2"));
   REQUIRE(start({"map", at("city"), "drop", "day2"}).code == 0);

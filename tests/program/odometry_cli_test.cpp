@@ -80,6 +80,7 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
   }
   CHECK_THAT(start({"odometry", recording.sequence(), "--out", poses}).err,
              ContainsSubstring("--force"));
+  CHECK_FALSE(fs::exists(poses.string() + ".partial"));
   CHECK(start({"odometry", recording.sequence(), "--out", poses, "--force", "--one-thread", "-q"})
             .code == 0);
   CHECK(read_trajectory(poses).poses.back().matrix() == found.poses.back().matrix());
@@ -88,7 +89,7 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
   REQUIRE(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}).code == 0);
   CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
   CHECK(count_files(out / "labels") == 12);
-  CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--resume", "-q"}).code ==
+  CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--force", "-q"}).code ==
         0);
   CHECK(start({"view", out}).code == 0);
 }

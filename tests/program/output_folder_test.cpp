@@ -1,7 +1,8 @@
 #include "run/output_folder.hpp"
 
+#include <unistd.h>
+
 #include "dynains/errors.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
@@ -13,280 +14,377 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-const OutputKind kKind = {
-    "run", "report.json", {"a.txt"}, true, {{"labels", {".label"}}, {"clean", {".bin", ".ply"}}}};
-
+const OutputKind kKind = {"run", "report.json"};
 const OutputListing kListing = {{"a.txt", "map.ply"}, {{"labels", ".label"}}, {"000000", "000001"}};
 
-Json marker(bool complete, const OutputListing& listing = kListing) {
-  return {{"program", "dynains"},
-          {"command", "run"},
-          {"complete", complete},
-          {"outputs", listing.to_json()}};
+Json marker(bool complete) {
+  Json json = begin_marker(kKind);
+  json["complete"] = complete;
+  return json;
 }
 
-/// Complete results, with files of another owner beside them.
-void write_results(const TemporaryFolder& folder) {
-  write_text(folder / "report.json", marker(true).dump());
+Json listed(const Json& outputs = kListing.to_json(), bool complete = true) {
+  Json json = marker(complete);
+  json["outputs"] = outputs;
+  return json;
+}
+
+void write_results(const fs::path& folder) {
+  write_text(folder / "report.json", listed().dump());
   for (const char* name : {"a.txt", "map.ply", "labels/000000.label", "labels/000001.label"}) {
     write_text(folder / name, "old");
   }
-  for (const char* name : {"mine.txt", "labels/mine.txt", "labels/000002.label"}) {
-    write_text(folder / name, "mine");
+}
+
+struct Place {
+  TemporaryFolder root;
+  fs::path out = fs::canonical(root.path()) / "out";
+  fs::path partial = out.string() + ".partial";
+
+  std::unique_ptr<OutputFolder> begin(bool may_replace = true,
+                                      const InputFiles& inputs = InputFiles()) const {
+    return std::make_unique<OutputFolder>(out, kKind, kListing, may_replace, inputs);
   }
-}
-
-void check_foreign_files(const TemporaryFolder& folder) {
-  for (const char* name : {"mine.txt", "labels/mine.txt", "labels/000002.label"}) {
-    CHECK(read_text(folder / name) == "mine");
+  std::string refusal(bool may_replace = true, const InputFiles& inputs = InputFiles()) const {
+    return message_of<IoError>([&] { begin(may_replace, inputs); });
   }
-}
-
-OutputFolder open(const TemporaryFolder& folder) {
-  return OutputFolder(Folder(folder.path()), kKind);
-}
-
-std::string refusal(const TemporaryFolder& folder) {
-  return message_of<IoError>([&] { open(folder).check(kListing, InputFiles()); });
-}
-
-std::string refusal_of_marker(const std::string& text) {
-  const TemporaryFolder folder;
-  write_text(folder / "report.json", text);
-  return refusal(folder);
-}
+};
 
 const std::string kNoRefusal = "(nothing was thrown)";
 
 }  // namespace
 
-TEST_CASE("An empty folder is accepted, even with a temporary marker of a killed command") {
-  TemporaryFolder folder;
-  CHECK(refusal(folder) == kNoRefusal);
-  write_text(folder / ".report.json.0123456789abcdef.tmp", "{");
-  fs::create_directory(folder / "labels");
-  CHECK(refusal(folder) == kNoRefusal);
-  OutputFolder out = open(folder);
-  CHECK_FALSE(out.has_results());
-  const OutputChange change(out, OutputChange::Mode::kInPlace, marker(false), kListing);
-  CHECK_FALSE(fs::exists(folder / ".report.json.0123456789abcdef.tmp"));
-}
-
-TEST_CASE("A folder of another owner is refused, for any names of its files") {
-  for (const char* name : {"labels/000000.label", ".notes.2024.tmp", ".notes.0123456789abcdef.tmp",
-                           ".a.txt.0123456789abcdef.tmp", "a.txt"}) {
-    CAPTURE(name);
-    TemporaryFolder folder;
-    write_text(folder / name, "precious");
-    CHECK_THAT(refusal(folder), ContainsSubstring("no earlier results (no report.json)"));
-    CHECK(read_text(folder / name) == "precious");
+TEST_CASE("Results appear at once, with a marker that lists them") {
+  const Place place;
+  {
+    const auto out = place.begin(false);
+    CHECK(out->path() == place.partial);
+    CHECK(Json::parse(read_text(place.partial / "report.json"))["complete"] == false);
+    write_text(out->path() / "labels/000001.label", "new");
+    CHECK_FALSE(fs::exists(place.out));
+    out->finish(begin_marker(kKind));
+    CHECK_FALSE(fs::exists(place.partial));
   }
+  CHECK(Json::parse(read_text(place.out / "report.json")) == listed());
+  CHECK(read_text(place.out / "labels/000001.label") == "new");
 }
 
-TEST_CASE("A marker is ours if it names the program and the command and lists names of ours") {
-  CHECK(refusal_of_marker(marker(true).dump()) == kNoRefusal);
-  CHECK_THAT(refusal_of_marker("{"), ContainsSubstring("report.json:1: column 2: expected JSON"));
-  CHECK_THAT(refusal_of_marker(std::string(40000, '[')), ContainsSubstring("at most 64 arrays"));
-  CHECK_THAT(refusal_of_marker("{}"), ContainsSubstring("was not written by dynains run"));
-  CHECK_THAT(refusal_of_marker("[1]"), ContainsSubstring("was not written by dynains run"));
-  CHECK_THAT(refusal_of_marker(R"({"program": "dynains", "complete": true})"),
-             ContainsSubstring("does not list the files of the results, as an older version"));
-  const auto with = [](const char* field, const Json& value) {
-    Json json = marker(true);
-    json[Json::json_pointer(field)] = value;
-    return refusal_of_marker(json.dump());
+TEST_CASE(
+    "Results that are not finished leave nothing, or stay beside the place if they are kept") {
+  Place place;
+  place.out = place.root.path() / "above/out";
+  place.partial = place.root.path() / "above/out.partial";
+  {
+    const auto out = place.begin();
+    write_text(out->path() / "labels/000001.label", "new");
+  }
+  CHECK(fs::is_empty(place.root.path()));
+  {
+    const auto out = place.begin();
+    write_text(out->path() / "labels/000001.label", "new");
+    out->keep_unfinished(marker(false));
+  }
+  CHECK_FALSE(fs::exists(place.out));
+  CHECK(read_text(place.partial / "labels/000001.label") == "new");
+  place.begin()->finish(begin_marker(kKind));
+  CHECK_FALSE(fs::exists(place.partial));
+  CHECK_FALSE(fs::exists(place.out / "labels"));
+}
+
+TEST_CASE("Earlier results are replaced as a whole, if they may be") {
+  const Place place;
+  write_results(place.out);
+  CHECK_THAT(place.refusal(false), ContainsSubstring("holds earlier results"));
+  {
+    const auto out = place.begin();
+    CHECK(out->earlier_have("/command", "run"));
+    CHECK_FALSE(out->earlier_have("/command", "other"));
+    CHECK_FALSE(out->earlier_have("/static_map/file", "map.ply"));
+    write_text(out->path() / "a.txt", "new");
+    CHECK(read_text(place.out / "a.txt") == "old");
+    out->finish(begin_marker(kKind));
+  }
+  CHECK(read_text(place.out / "a.txt") == "new");
+  CHECK_FALSE(fs::exists(place.out / "map.ply"));
+  CHECK_FALSE(fs::exists(place.out / "labels"));
+  CHECK_FALSE(fs::exists(place.partial));
+
+  fs::remove_all(place.out);
+  fs::create_directory(place.out);
+  place.begin(false)->finish(begin_marker(kKind));
+  CHECK(fs::exists(place.out / "report.json"));
+}
+
+TEST_CASE("A folder that holds anything but results is refused, and stays as it is") {
+  const Place place;
+  std::string expected = " is no file of the results";
+  fs::path file = place.out / "labels/000000.label";
+  SECTION("no results") {
+    file = place.out / "a.txt";
+    write_text(file, "mine");
+    expected = "no earlier results (no report.json)";
+  }
+  SECTION("a link that leads nowhere") {
+    fs::create_symlink("none", place.out);
+    file = place.out;
+    expected = "out: cannot be opened: No such file";
+  }
+  SECTION("a file beside results") {
+    write_results(place.out);
+    file = place.out / GENERATE("notes.txt", "labels/notes.txt", "labels/000002.label",
+                                ".a.ply.0123456789abcdef.tmp", "more/notes.txt");
+    write_text(file, "mine");
+  }
+  SECTION("a link in the place of a result") {
+    write_results(place.out);
+    write_text(place.root / "precious", "mine");
+    fs::remove(file);
+    fs::create_symlink(place.root / "precious", file);
+  }
+  SECTION("a link in the place of a folder of results") {
+    write_results(place.out);
+    fs::rename(place.out / "labels", place.root / "precious");
+    fs::create_directory_symlink(place.root / "precious", place.out / "labels");
+    file = place.root / "precious/000000.label";
+  }
+  SECTION("a link in the place of the marker") {
+    write_results(place.out);
+    fs::rename(place.out / "report.json", place.root / "report.json");
+    fs::create_symlink(place.root / "report.json", place.out / "report.json");
+    expected = "report.json: is a link or a folder; expected a file";
+  }
+  SECTION("a folder in the place of a result") {
+    write_results(place.out);
+    fs::remove(file);
+    file /= "notes.txt";
+    write_text(file, "mine");
+  }
+  const bool was_there = fs::exists(file);
+  const std::string before = was_there ? read_text(file) : std::string();
+  CHECK_THAT(place.refusal(), ContainsSubstring(expected));
+  CHECK(fs::exists(file) == was_there);
+  if (was_there) CHECK(read_text(file) == before);
+  CHECK_FALSE(fs::exists(place.partial));
+}
+
+TEST_CASE("What a killed command left is removed before the next one, and nothing else") {
+  const Place place;
+  SECTION("of ours") {
+    const bool has_marker = GENERATE(true, false);
+    fs::create_directory(place.partial);
+    write_text(place.partial / ".report.json.0123456789abcdef.tmp", "{");
+    if (has_marker) {
+      write_text(place.partial / "report.json", listed(kListing.to_json(), false).dump());
+      write_text(place.partial / "labels/000001.label", "half");
+      write_text(place.partial / "labels/.000000.label.0123456789abcdef.tmp", "half");
+    }
+    const auto out = place.begin();
+    CHECK_FALSE(fs::exists(place.partial / "labels"));
+    CHECK_FALSE(fs::exists(place.partial / ".report.json.0123456789abcdef.tmp"));
+    out->finish(begin_marker(kKind));
+    CHECK(fs::exists(place.out / "report.json"));
+    return;
+  }
+  const fs::path precious = place.root / "precious";
+  write_text(precious / "notes.txt", "mine");
+  std::string expected = place.partial.string();
+  SECTION("a link") { fs::create_directory_symlink(precious, place.partial); }
+  SECTION("a file") { write_text(place.partial, "mine"); }
+  SECTION("a folder of others") { write_text(place.partial / "notes.txt", "mine"); }
+  SECTION("a folder with a marker of others") {
+    write_text(place.partial / "report.json", R"({"program": "other"})");
+  }
+  SECTION("a file of others beside ours") {
+    write_text(place.partial / "report.json", listed(kListing.to_json(), false).dump());
+    write_text(place.partial / "labels/notes.txt", "mine");
+    expected += "/labels/notes.txt";
+  }
+  CHECK_THAT(place.refusal(), StartsWith(expected));
+  CHECK(read_text(precious / "notes.txt") == "mine");
+  CHECK(fs::exists(fs::symlink_status(place.partial)));
+  CHECK_FALSE(fs::exists(place.out));
+}
+
+TEST_CASE("A marker is ours if it names the program and the command, and lists files") {
+  const Place place;
+  const auto with = [&](const std::string& text) {
+    write_text(place.out / "report.json", text);
+    return place.refusal();
   };
-  CHECK_THAT(with("/program", "other"), ContainsSubstring("was not written by dynains run"));
-  CHECK_THAT(with("/command", "simulate"), ContainsSubstring("was not written by dynains run"));
-  CHECK_THAT(with("/outputs", 3), ContainsSubstring("/outputs/files: expected an array"));
-  CHECK_THAT(with("/outputs/scans", "all"), ContainsSubstring("/outputs/scans: expected an array"));
-  for (const char* name : {"../a.ply", "/a.ply", "", ".", "..", "a%2Fb.ply", "a%00.ply", "a%zz"}) {
-    CAPTURE(name);
-    CHECK_THAT(with("/outputs/files/0", name), ContainsSubstring("expected names of files"));
-    CHECK_THAT(with("/outputs/scans/0", name), ContainsSubstring("expected names of files"));
+  CHECK(with(listed().dump()) == kNoRefusal);
+  CHECK_THAT(with("{"), ContainsSubstring("report.json:1: column 2: expected JSON"));
+  CHECK_THAT(with(std::string(40000, '[')), ContainsSubstring("at most 64 arrays"));
+  for (const char* text : {"{}", "[1]", R"({"program": "dynains", "command": "simulate"})",
+                           R"({"program": "other", "command": "run"})"}) {
+    CHECK_THAT(with(text), ContainsSubstring("was not written by dynains run"));
   }
-  CHECK_THAT(with("/outputs/files/0", "notes.txt"), ContainsSubstring("nothing named notes.txt"));
-  CHECK_THAT(with("/outputs/files/0", "report.json"), ContainsSubstring("nothing named report"));
-  CHECK_THAT(with("/outputs/folders/src", ".cpp"), ContainsSubstring("nothing named src"));
-  CHECK_THAT(with("/outputs/folders/labels", ".txt"), ContainsSubstring("named labels.txt"));
-  CHECK_THAT(with("/outputs/folders/labels", 1), ContainsSubstring("nothing named labels"));
+  for (const char* field : {"/outputs", "/outputs/files", "/outputs/folders", "/outputs/scans"}) {
+    CAPTURE(field);
+    Json json = listed();
+    json[Json::json_pointer(field)] = 3;
+    CHECK_THAT(with(json.dump()), ContainsSubstring("/outputs: expected the names of files"));
+  }
+}
+
+TEST_CASE("No listing leads out of the folder") {
+  const Place place;
+  write_text(place.root / "precious", "mine");
+  const OutputListing listing = {{"../precious"}, {{"..", ""}, {".", ""}}, {"precious"}};
+  write_text(place.out / "report.json", listed(listing.to_json()).dump());
+  place.begin()->finish(begin_marker(kKind));
+  CHECK(read_text(place.root / "precious") == "mine");
 }
 
 TEST_CASE("Names in a listing need not be UTF-8") {
-  const OutputListing listing = {{"\xE4 %.ply"},
-                                 {{"clean", ".bin"}},
-                                 {"sc\xFF"
-                                  "an",
-                                  "0%0A\n"}};
-  const Json json = marker(true, listing);
-  const OutputListing again = read_listing("report.json", Json::parse(json.dump()), kKind);
-  CHECK(again.files == listing.files);
-  CHECK(again.folders == listing.folders);
+  const std::string odd = "sc\xFF\n%0A";
+  const OutputListing listing = {{}, {{"clean", ".bin"}}, {listed_name(odd)}};
+  Json json = marker(true);
+  json["outputs"] = Json::parse(listing.to_json().dump());
+  const OutputListing again = read_listing("report.json", json, "run");
   CHECK(again.scans == listing.scans);
-  CHECK(again.contains("clean",
-                       "sc\xFF"
-                       "an.bin"));
+  CHECK(again.contains("clean", odd + ".bin"));
   CHECK_FALSE(again.contains("clean", "scan.bin"));
   CHECK_FALSE(again.contains("clean", ".bin"));
+  CHECK_FALSE(again.contains("", odd + ".bin"));
 }
 
-TEST_CASE("Links and folders in the place of results are refused before anything is touched") {
-  TemporaryFolder folder;
-  TemporaryFolder other;
-  write_results(folder);
-  write_text(other / "000000.label", "precious");
-  std::string expected = "expected a file or nothing there";
-  SECTION("a folder of results is a link") {
-    fs::remove_all(folder / "labels");
-    fs::create_directory_symlink(other.path(), folder / "labels");
-    expected = "labels: is a link or a file; expected a folder";
-  }
-  SECTION("a file is a link") {
-    fs::remove(folder / "labels/000000.label");
-    fs::create_symlink(other / "000000.label", folder / "labels/000000.label");
-  }
-  SECTION("a file is a folder") {
-    fs::remove(folder / "labels/000001.label");
-    fs::create_directory(folder / "labels/000001.label");
-  }
-  SECTION("the marker is a link") {
-    fs::rename(folder / "report.json", other / "report.json");
-    fs::create_symlink(other / "report.json", folder / "report.json");
-    expected = "report.json: is a link or a folder; expected a file";
-  }
-  SECTION("the staging folder is a link") {
-    fs::create_directory_symlink(other.path(), folder / kStagingFolder);
-    expected = "is a link or a file; expected a folder";
-  }
-  SECTION("the staging folder belongs to somebody") {
-    write_text(folder / kStagingFolder / "notes.txt", "mine");
-    expected = "is not empty and holds no earlier results";
-  }
-  SECTION("the staging folder holds a file of somebody") {
-    write_text(folder / kStagingFolder / "report.json", marker(false).dump());
-    write_text(folder / kStagingFolder / "labels/notes.txt", "mine");
-    expected = "notes.txt: is no file of dynains";
-  }
-  CHECK_THAT(refusal(folder), ContainsSubstring(expected));
-  CHECK(read_text(folder / "a.txt") == "old");
-  CHECK(read_text(other / "000000.label") == "precious");
-}
-
-TEST_CASE("A file of another owner in the place of new results is refused") {
-  TemporaryFolder folder;
-  write_results(folder);
-  OutputListing planned = kListing;
-  planned.scans.insert("000002");
-  const OutputFolder out = open(folder);
-  CHECK_THAT(message_of<IoError>([&] { out.check(planned, InputFiles()); }),
-             ContainsSubstring("000002.label: is in the way, and no part of earlier results"));
-}
-
-TEST_CASE("Files that a command reads are never removed, by any path to them") {
-  TemporaryFolder folder;
-  TemporaryFolder other;
-  write_results(folder);
+TEST_CASE("Files that a command reads are never replaced, by any path to them") {
+  const Place place;
+  write_results(place.out);
+  write_results(place.partial);
   const auto refusal_with = [&](const fs::path& input) {
     InputFiles inputs;
     inputs.add(input);
-    return message_of<IoError>([&] { open(folder).check(kListing, inputs); });
+    return place.refusal(true, inputs);
   };
-  fs::create_symlink(folder / "labels/000001.label", other / "link");
-  fs::create_hard_link(folder / "map.ply", other / "hard");
-  fs::create_directory_symlink(folder / "labels", other / "scans");
-  CHECK_THAT(refusal_with(other / "link"),
-             ContainsSubstring((folder / "labels/000001.label").string() +
-                               ": is read by this command, as " + (other / "link").string()));
-  CHECK_THAT(refusal_with(other / "hard"), ContainsSubstring("map.ply: is read by this command"));
-  CHECK_THAT(refusal_with(other / "scans"), ContainsSubstring("labels: is read by this command"));
-  CHECK_THAT(refusal_with(folder.path()), ContainsSubstring("is read by this command"));
-  CHECK(refusal_with(folder / "mine.txt") == kNoRefusal);
-  CHECK(refusal_with(other / "nothing") == kNoRefusal);
+  fs::create_symlink(place.out / "labels/000001.label", place.root / "link");
+  fs::create_hard_link(place.out / "map.ply", place.root / "hard");
+  fs::create_directory_symlink(place.out / "labels", place.root / "scans");
+  CHECK_THAT(refusal_with(place.root / "link"),
+             ContainsSubstring((place.out / "labels/000001.label").string() +
+                               ": is read by this command, as " + (place.root / "link").string()));
+  CHECK_THAT(refusal_with(place.root / "hard"), ContainsSubstring("map.ply: is read by this"));
+  CHECK_THAT(refusal_with(place.root / "scans"), ContainsSubstring("labels: is read by this"));
+  CHECK_THAT(refusal_with(place.out), ContainsSubstring("is read by this command"));
+  CHECK_THAT(refusal_with(place.partial / "labels"), ContainsSubstring("is read by this command"));
+  CHECK(read_text(place.partial / "a.txt") == "old");
+  CHECK(refusal_with(place.root / "nothing") == kNoRefusal);
 }
 
-TEST_CASE("New results replace listed files when they are put in place, and nothing else") {
-  TemporaryFolder folder;
-  write_results(folder);
-  write_text(folder / "labels/.000001.label.0123456789abcdef.tmp", "half");
-  const OutputListing planned = {{"a.txt"}, {{"labels", ".label"}, {"clean", ".bin"}}, {"000001"}};
-  OutputFolder out = open(folder);
+TEST_CASE("Two commands never write one output") {
+  const Place place;
   {
-    OutputChange change(out, OutputChange::Mode::kStaged, marker(false), planned);
-    write_text(change.folder() / "a.txt", "new");
-    write_text(change.folder() / "labels/000001.label", "new");
-    write_text(change.folder() / "clean/000001.bin", "new");
-    CHECK(read_text(folder / "a.txt") == "old");
-    CHECK(open(folder).is_complete());
-    CHECK(open(folder).staging() != nullptr);
-    change.put_in_place([&] {
-      CHECK_FALSE(open(folder).is_complete());
-      CHECK_FALSE(fs::exists(folder / "labels/000000.label"));
-    });
-    CHECK_FALSE(open(folder).is_complete());
-    change.finish(marker(true), planned);
+    const auto out = place.begin();
+    CHECK_THROWS_AS(place.begin(), UsageError);
+    CHECK(fs::exists(place.partial / "report.json"));
+    out->finish(begin_marker(kKind));
   }
-  CHECK(open(folder).is_complete());
-  CHECK(open(folder).listing().scans == planned.scans);
-  CHECK(read_text(folder / "a.txt") == "new");
-  CHECK(read_text(folder / "labels/000001.label") == "new");
-  CHECK(read_text(folder / "clean/000001.bin") == "new");
-  CHECK_FALSE(fs::exists(folder / "map.ply"));
-  CHECK_FALSE(fs::exists(folder / "labels/000000.label"));
-  CHECK_FALSE(fs::exists(folder / "labels/.000001.label.0123456789abcdef.tmp"));
-  CHECK_FALSE(fs::exists(folder / kStagingFolder));
-  check_foreign_files(folder);
-}
-
-TEST_CASE("New results that are not put in place leave the earlier ones as they were") {
-  TemporaryFolder folder;
-  write_results(folder);
   {
-    OutputFolder out = open(folder);
-    OutputChange change(out, OutputChange::Mode::kStaged, marker(false), kListing);
-    write_text(change.folder() / "labels/000001.label", "new");
+    const ResultFolder reader(Folder(place.out), kKind);
+    CHECK_THROWS_AS(place.begin(), UsageError);
   }
-  CHECK(open(folder).is_complete());
-  CHECK(read_text(folder / "labels/000001.label") == "old");
-  CHECK_FALSE(fs::exists(folder / kStagingFolder));
-  check_foreign_files(folder);
-
-  // State after a command was killed.
-  write_text(folder / kStagingFolder / "report.json", marker(false).dump());
-  write_text(folder / kStagingFolder / "labels/000001.label", "new");
-  write_text(folder / kStagingFolder / "labels/.000000.label.0123456789abcdef.tmp", "half");
-  OutputFolder out = open(folder);
-  out.check(kListing, InputFiles());
-  out.discard_staging();
-  CHECK_FALSE(fs::exists(folder / kStagingFolder));
-  CHECK(read_text(folder / "labels/000001.label") == "old");
-}
-
-TEST_CASE("Results in place keep what they list, and lose what only the earlier ones list") {
-  TemporaryFolder folder;
-  write_results(folder);
-  OutputFolder out = open(folder);
+  const fs::path file = place.root / "map.ply";
   {
-    OutputChange change(out, OutputChange::Mode::kInPlace, marker(false), kListing);
-    CHECK(change.folder() == folder.path());
-    CHECK_FALSE(open(folder).is_complete());
-    CHECK(read_text(folder / "labels/000000.label") == "old");
+    OutputFile first(file, false, InputFiles());
+    CHECK_THROWS_AS(OutputFile(file, true, InputFiles()), UsageError);
+    OutputFile other(place.root / "other.ply", false, InputFiles());
+    write_text(first.path(), "first");
+    write_text(other.path(), "other");
+    first.put_in_place();
+    other.put_in_place();
   }
-  const OutputListing fewer = {{"a.txt"}, {{"labels", ".label"}}, {"000000"}};
-  const OutputChange change(out, OutputChange::Mode::kInPlace, marker(false, fewer), fewer);
-  CHECK_FALSE(fs::exists(folder / "map.ply"));
-  CHECK_FALSE(fs::exists(folder / "labels/000001.label"));
-  CHECK(open(folder).listing().scans == fewer.scans);
-  check_foreign_files(folder);
+  CHECK(read_text(file) == "first");
+  CHECK(read_text(place.root / "other.ply") == "other");
+  CHECK_FALSE(fs::exists(file.string() + ".partial"));
+  // Nobody replaces the folder of a file that is being written.
+  const OutputFile within(place.out / "map.ply", false, InputFiles());
+  CHECK_THROWS_AS(place.begin(), UsageError);
 }
 
-TEST_CASE("A temporary file that is being written is not removed as a leftover") {
-  TemporaryFolder folder;
-  write_results(folder);
-  AtomicFile file(folder / "labels/000000.label");
-  OutputFolder out = open(folder);
-  const OutputChange change(out, OutputChange::Mode::kInPlace, marker(false), kListing);
-  file.commit();
-  CHECK(read_text(folder / "labels/000000.label").empty());
+TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a new one") {
+  const TemporaryFolder root;
+  const fs::path file = root / "map.ply";
+  const auto refusal = [&](bool may_replace) {
+    return message_of<IoError>([&] { OutputFile(file, may_replace, InputFiles()); });
+  };
+  SECTION("a file") {
+    write_text(file, "mine");
+    CHECK_THAT(refusal(false), ContainsSubstring("map.ply: exists"));
+    OutputFile output(file, true, InputFiles());
+    write_text(output.path(), "new");
+    CHECK(read_text(file) == "mine");
+    output.put_in_place();
+    CHECK(read_text(file) == "new");
+  }
+  SECTION("a file that is read") {
+    write_text(file, "mine");
+    InputFiles inputs;
+    inputs.add(file);
+    CHECK_THAT(message_of<IoError>([&] { OutputFile(file, true, inputs); }),
+               ContainsSubstring("is read by this command"));
+  }
+  SECTION("a folder, and a link that leads nowhere") {
+    GENERATE(true, false) ? fs::create_directory(file) : (fs::create_symlink("none", file), true);
+    CHECK_THAT(refusal(true),
+               ContainsSubstring("map.ply: is a link or a folder") || ContainsSubstring("none: "));
+  }
+  SECTION("a file that came meanwhile") {
+    OutputFile output(file, true, InputFiles());
+    write_text(output.path(), "new");
+    write_text(file, "mine");
+    CHECK_THAT(message_of<IoError>([&] { output.put_in_place(); }),
+               ContainsSubstring("map.ply: cannot be put in place: File exists"));
+    CHECK(read_text(file) == "mine");
+    // What was made is not lost.
+    CHECK(read_text(output.path()) == "new");
+  }
+  SECTION("what a killed command left") {
+    const fs::path partial = file.string() + ".partial";
+    fs::create_directory(partial);
+    SECTION("of ours") {
+      Json json = begin_marker({"file", "partial.json"});
+      json["outputs"] = OutputListing{{"map.ply"}, {}, {}}.to_json();
+      write_text(partial / "partial.json", json.dump());
+      write_text(partial / "map.ply", "half");
+      OutputFile output(file, false, InputFiles());
+      CHECK_FALSE(fs::exists(output.path()));
+    }
+    SECTION("of others") {
+      write_text(partial / "map.ply", "mine");
+      CHECK_THAT(refusal(true), StartsWith(partial.string()));
+      CHECK(read_text(partial / "map.ply") == "mine");
+    }
+  }
+}
+
+TEST_CASE("A file is added to results, and replaced if it was added before") {
+  const Place place;
+  write_results(place.out);
+  ResultFolder results(Folder(place.out), kKind);
+  for (const char* text : {"first", "second"}) {
+    AddedFile page(results, "view.html");
+    write_text(page.path(), text);
+    CHECK_FALSE(read_text(place.out / "report.json").empty());
+    page.put_in_place(results.marker());
+    CHECK(read_text(place.out / "view.html") == text);
+  }
+  CHECK(results.listing().contains("", "view.html"));
+  CHECK(results.is_complete());
+  results.check(InputFiles());
+  write_text(place.out / "other.html", "mine");
+  CHECK_THAT(message_of<IoError>([&] { AddedFile(results, "other.html"); }),
+             ContainsSubstring("other.html: is in the way"));
+}
+
+TEST_CASE("Names of unfinished outputs and the current folder are no places for results") {
+  const Place place;
+  CHECK_THROWS_AS(OutputFolder(place.partial, kKind, kListing, true, InputFiles()), ConfigError);
+  CHECK_THROWS_AS(OutputFile(place.partial, true, InputFiles()), ConfigError);
+  const fs::path before = fs::current_path();
+  fs::create_directory(place.out);
+  fs::current_path(place.out);
+  CHECK_THAT(place.refusal(), ContainsSubstring("is the current folder"));
+  fs::current_path(before);
 }
 
 TEST_CASE("A folder below a file cannot be created") {
@@ -294,32 +392,4 @@ TEST_CASE("A folder below a file cannot be created") {
   write_text(folder / "file", "");
   CHECK_THAT(message_of<IoError>([&] { create_folder(folder / "file/below"); }),
              ContainsSubstring("file/below: cannot be created: Not a directory"));
-}
-
-TEST_CASE("A locked folder that was created for it and stays empty is removed") {
-  const TemporaryFolder folder;
-  const fs::path above = folder.path() / "above";
-  const fs::path out = above / "out";
-  {
-    const LockedFolder lock(out / "");
-    CHECK(fs::is_directory(out));
-    CHECK_THROWS_AS(LockedFolder(out), UsageError);
-  }
-  CHECK_FALSE(fs::exists(above));
-
-  fs::create_directory(above);
-  { const LockedFolder lock(out); }
-  CHECK_FALSE(fs::exists(out));
-  CHECK(fs::is_directory(above));
-
-  fs::create_directory(out);
-  { const LockedFolder lock(out); }
-  CHECK(fs::is_directory(out));
-
-  const fs::path other = folder.path() / "other";
-  {
-    const LockedFolder lock(other);
-    write_text(other / "result", "");
-  }
-  CHECK(fs::exists(other / "result"));
 }

@@ -124,8 +124,7 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
     CHECK(read_text(f.map) == expected_map(f));
   }
   SECTION("the run is complete as before, and --force removes the map with it") {
-    CHECK_THAT(start({"run", f.seq, "--out", f.out, "--resume"}).out,
-               ContainsSubstring("complete already"));
+    CHECK_THAT(start({"run", f.seq, "--out", f.out}).err, ContainsSubstring("earlier results"));
     REQUIRE(start({"run", f.seq, "--out", f.out, "--force"}).code == 0);
     CHECK_FALSE(fs::exists(f.map));
   }

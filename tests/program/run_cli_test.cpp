@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
+#include "run/output_folder.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
 
@@ -61,7 +61,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
   const std::vector<std::vector<std::string>> calls = {
       {"run", seq, "--out", out},
       {"run", seq, "--out", out},
-      {"run", seq, "--out", out, "--resume"},
       {"run", seq, "--out", seq, "--force"},
       {"run", missing, "--out", out},
       {"run", seq, "--out", missing, "--config", missing},
@@ -296,8 +295,6 @@ TEST_CASE("Only --force replaces earlier results, and it replaces all of them") 
   const Fixture fixture;
   const std::string map = fixture.out + "/first.pcd";
   REQUIRE(fixture.run({"--write-online", "--map", map}).code == 0);
-  write_text(fixture.out + "/notes.txt", "mine");
-
   const std::string before = read_text(fixture.out + "/report.json");
   const Outcome refused = fixture.run();
   CHECK(refused.code == 1);
@@ -310,28 +307,38 @@ TEST_CASE("Only --force replaces earlier results, and it replaces all of them") 
   CHECK_FALSE(fs::exists(fixture.out + "/online"));
   CHECK_FALSE(fs::exists(map));
   CHECK(fs::exists(fixture.out + "/static_map.ply"));
+
+  write_text(fixture.out + "/notes.txt", "mine");
+  const Outcome foreign = fixture.run({"--force"});
+  CHECK(foreign.code == 1);
+  CHECK_THAT(foreign.err, ContainsSubstring(fixture.out + "/notes.txt: is no file of the results"));
   CHECK(read_text(fixture.out + "/notes.txt") == "mine");
+  CHECK(fixture.labels() == 5);
 }
 
-TEST_CASE("Only --force replaces a map in another folder, and it never replaces a scan") {
+TEST_CASE("A map in another folder is replaced with the results that name it, and no other map") {
   const Fixture fixture;
   const std::string map = fixture.folder / "maps/of all.ply";
   write_text(map, "of another run");
-  const Outcome refused = fixture.run({"--map", map});
-  CHECK(refused.code == 1);
-  CHECK_THAT(refused.err, ContainsSubstring(map + ": exists") && ContainsSubstring("--force"));
+  const auto check_refused = [&](const Outcome& refused) {
+    CHECK(refused.code == 1);
+    CHECK_THAT(refused.err, ContainsSubstring(map + ": exists"));
+    CHECK(count_entries(fixture.folder / "maps") == 1);
+  };
+  check_refused(fixture.run({"--map", map}));
+  check_refused(fixture.run({"--map", map, "--force"}));
   CHECK(read_text(map) == "of another run");
   CHECK_FALSE(fs::exists(fixture.out));
+  REQUIRE(fixture.run().code == 0);
+  check_refused(fixture.run({"--map", map, "--force"}));
+  CHECK(read_text(map) == "of another run");
 
-  // Temporary files of a killed run are removed, files of other owners stay.
-  const std::string leftover = fixture.folder / "maps/.of all.ply.0123456789abcdef.tmp";
-  const std::string foreign = fixture.folder / "maps/.of some.ply.0123456789abcdef.tmp";
-  write_text(leftover, "half");
-  write_text(foreign, "half");
+  fs::remove(map);
   REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
+  check_refused(start({"run", fixture.seq, "--out", fixture.out + "2", "--map", map, "--force"}));
+  REQUIRE(fixture.run({"--map", map, "--force", "--end", "4"}).code == 0);
   CHECK(read_points(map).positions.size() == fixture.report()["static_map"]["points"]);
-  CHECK_FALSE(fs::exists(leftover));
-  CHECK(fs::exists(foreign));
+  CHECK(count_entries(fixture.folder / "maps") == 1);
 
   const std::string among_scans = fixture.seq + "/velodyne/000003.ply";
   const Outcome never = fixture.run({"--map", among_scans, "--force"});
@@ -352,13 +359,13 @@ TEST_CASE("A run never removes or replaces a file that it reads") {
   const std::string clean = fixture.out + "/clean";
   const std::string poses = fixture.seq + "/poses.txt";
   CHECK_THAT(refusal({"run", clean, "--poses", poses, "--out", fixture.out, "--force"}),
-             ContainsSubstring(clean + ": is read by this command, as " + clean));
+             ContainsSubstring(clean + "/000000.bin: is read by this command, as " + clean));
 
   // Access through links: to the folder, to one scan, and to the poses.
   const std::string link = fixture.folder / "link";
   fs::create_directory_symlink(clean, link);
   CHECK_THAT(refusal({"run", link, "--poses", poses, "--out", fixture.out, "--force"}),
-             ContainsSubstring(clean + ": is read by this command, as " + link));
+             ContainsSubstring(clean + "/000000.bin: is read by this command, as " + link));
   const std::string scan = fixture.seq + "/velodyne/000003.bin";
   const std::string real = fixture.folder / "real.ply";
   fs::rename(scan, real);
@@ -386,7 +393,7 @@ TEST_CASE("A folder with a report that run did not write belongs to another owne
   write_text(precious, "by hand");
   for (const char* report : {"{}", R"({"program": "dynains", "complete": true})"}) {
     write_text(fixture.out + "/report.json", report);
-    for (const char* flag : {"--force", "--resume", "--quiet"}) {
+    for (const char* flag : {"--force", "--quiet"}) {
       CAPTURE(report, flag);
       const Outcome refused = fixture.run({flag});
       CHECK(refused.code == 1);
@@ -398,39 +405,26 @@ TEST_CASE("A folder with a report that run did not write belongs to another owne
 
 TEST_CASE("Two runs never write one map at a time") {
   const Fixture fixture;
-  const std::string map = fixture.folder / "maps/map.ply";
-  fs::create_directories(fixture.folder / "maps");
+  const std::string map = fixture.folder / "map.ply";
   {
-    AtomicFile other(map);
-    other.stream() << "of another run";
+    program::OutputFile other(map, false, program::InputFiles());
+    write_text(other.path(), "of another run");
     const Outcome refused = fixture.run({"--map", map});
     CHECK(refused.code == 2);
-    CHECK_THAT(refused.err, ContainsSubstring(map + ": is being written by another run"));
+    CHECK_THAT(refused.err, ContainsSubstring(map + ".partial: is in use"));
     CHECK_FALSE(fs::exists(fixture.out));
-    other.commit();
-    CHECK(read_text(map) == "of another run");
-  }
-  {
-    const FolderLock other(fixture.folder / "maps");
-    const Outcome refused = fixture.run({"--map", map, "--force"});
-    CHECK(refused.code == 2);
-    CHECK_THAT(refused.err, ContainsSubstring("maps: is in use"));
+    other.put_in_place();
   }
   CHECK(read_text(map) == "of another run");
-  CHECK(count_entries(fixture.folder / "maps") == 1);
-  const FolderLock beside(fixture.folder / "maps", FolderLock::Mode::kShared);
-  CHECK(fixture.run({"--map", map, "--force"}).code == 0);
 }
 
 TEST_CASE("Until the results of --force are complete, the earlier ones stay as they are") {
   const Fixture fixture(200);
   const std::string map = fixture.folder / "map.ply";
-  const std::vector<std::string> earlier_flags = {"--end", "9", "--map", map};
-  REQUIRE(fixture.run(earlier_flags).code == 0);
+  REQUIRE(fixture.run({"--end", "9", "--map", map}).code == 0);
   const auto contents = [&] {
     std::vector<std::string> files = {read_text(map)};
     for (const auto& entry : fs::recursive_directory_iterator(fixture.out)) {
-      if (entry.path().string().find(".dynains_staging") != std::string::npos) continue;
       files.push_back(entry.path().string());
       if (entry.is_regular_file()) files.push_back(read_text(entry.path()));
     }
@@ -438,124 +432,54 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
     return files;
   };
   const std::vector<std::string> before = contents();
-  const std::string staging = fixture.out + "/.dynains_staging";
+  const std::string partial = fixture.out + ".partial";
   const auto end_by = [&](int signal) {
     Process process({"run", fixture.seq, "--out", fixture.out, "--map", map, "--force"});
-    for (int i = 0; i < 10000 && !fs::exists(staging + "/labels/000000.label"); ++i) {
-      ::usleep(1000);
-    }
+    // What an earlier one has left is gone before the map is begun.
+    const auto is_writing = [&] {
+      return fs::exists(map + ".partial") && fs::exists(partial + "/labels/000000.label");
+    };
+    for (int i = 0; i < 10000 && !is_writing(); ++i) ::usleep(1000);
+    REQUIRE(is_writing());
     ::kill(process.id(), signal);
     return process.wait();
   };
 
   const Outcome interrupted = end_by(SIGINT);
   CHECK(interrupted.code == 130);
-  CHECK_THAT(interrupted.err, ContainsSubstring("interrupted; the earlier results in " +
-                                                fixture.out + " stay as they were"));
+  CHECK_THAT(interrupted.err, ContainsSubstring("interrupted; the results of ") &&
+                                  ContainsSubstring("stay in " + partial));
   CHECK(contents() == before);
-  CHECK_FALSE(fs::exists(staging));
-  CHECK(count_entries(fixture.folder.path()) == 3);
+  CHECK(nlohmann::json::parse(read_text(partial + "/report.json"))["complete"] == false);
+  CHECK_FALSE(fs::exists(map + ".partial"));
 
-  // A killed run is resumed with its own flags. With the flags of the earlier run, nothing is left
-  // to do.
   CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
   CHECK(contents() == before);
-  CHECK(fs::exists(staging));
-  CHECK_THAT(fixture.run({"--map", map, "--window", "3", "--resume"}).err,
-             ContainsSubstring("results of other flags"));
-  REQUIRE(fixture.run({"--map", map, "--resume"}).code == 0);
-  CHECK(fixture.report()["scans"] == 200);
+  CHECK(fs::exists(map + ".partial"));
+  REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
   CHECK(fixture.labels() == 200);
-  CHECK_FALSE(fs::exists(staging));
   CHECK(count_entries(fixture.folder.path()) == 3);
-  CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
-  CHECK_THAT(fixture.run({"--map", map, "--resume"}).out, ContainsSubstring("complete already"));
-  CHECK_FALSE(fs::exists(staging));
 }
 
-TEST_CASE("A run that was killed while it replaced results is completed by --resume") {
+TEST_CASE("A run that was killed between its map and its folder is repeated with --force") {
   const Fixture fixture;
-  REQUIRE(fixture.run({"--window", "5", "--write-online"}).code == 0);
-  const nlohmann::json earlier = fixture.report();
-  REQUIRE(fixture.run({"--force", "--end", "8"}).code == 0);
-  const nlohmann::json report = fixture.report();
-  const std::string map = read_text(fixture.out + "/static_map.ply");
+  const std::string map = fixture.folder / "map.ply";
+  REQUIRE(fixture.run({"--map", map}).code == 0);
+  const std::string expected = read_text(map);
+  fs::rename(fixture.out, fixture.out + ".partial");
+  REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
+  CHECK(read_text(map) == expected);
+  CHECK(count_entries(fixture.folder.path()) == 3);
 
-  // The marker has the new request and lists the earlier files. Some of them exist.
-  nlohmann::json marker = report;
-  marker["complete"] = false;
-  marker["outputs"] = earlier["outputs"];
-  write_text(fixture.out + "/report.json", marker.dump());
-  fs::remove(fixture.out + "/static_map.ply");
-  write_text(fixture.out + "/online/000003.label", "earlier");
-  write_text(fixture.out + "/labels/000011.label", "earlier");
-  write_text(fixture.out + "/.dynains_staging/report.json", report.dump());
-  write_text(fixture.out + "/.dynains_staging/static_map.ply", map);
-  const Outcome resumed = fixture.run({"--resume", "--end", "8"});
-  CAPTURE(resumed.err);
-  REQUIRE(resumed.code == 0);
-  CHECK(read_text(fixture.out + "/static_map.ply") == map);
-  CHECK(fixture.labels() == 9);
-  CHECK(count_entries(fixture.out) == 7);
-  CHECK(fixture.report()["outputs"] == report["outputs"]);
-}
-
-TEST_CASE("Flag --resume completes the requested run and no other") {
-  const Fixture fixture;
-  const std::string map = fixture.folder / "a/map.ply";
-  fs::create_directories(fixture.folder / "a");
-  fs::create_directories(fixture.folder / "b");
-  REQUIRE(fixture.run({"--map", map, "--write-clean"}).code == 0);
-  const Outcome again = fixture.run({"--map", map, "--write-clean", "--resume"});
-  CHECK(again.code == 0);
-  CHECK_THAT(again.out, ContainsSubstring("complete already"));
-
-  for (const std::vector<std::string>& other :
-       {std::vector<std::string>{"--map", fixture.folder / "b/map.ply", "--write-clean"},
-        std::vector<std::string>{"--map", map, "--write-clean", "--frame", "world"}}) {
-    std::vector<std::string> flags = other;
-    flags.push_back("--resume");
-    const Outcome refused = fixture.run(flags);
-    CHECK(refused.code == 1);
-    CHECK_THAT(refused.err, ContainsSubstring("results of other flags"));
-    CHECK(count_lines(refused.err) == 1);
-  }
-  CHECK(count_entries(fixture.folder / "b") == 0);
-
-  // Missing files are written again.
-  for (const std::string& lost :
-       {map, fixture.out + "/labels/000003.label", fixture.out + "/causes/000004.cause",
-        fixture.out + "/clean/000005.bin", fixture.out + "/timing.csv",
-        fixture.out + "/dynamic_points.ply"}) {
-    CAPTURE(lost);
-    fs::remove(lost);
-    const Outcome healed = fixture.run({"--map", map, "--write-clean", "--resume"});
-    CHECK(healed.code == 0);
-    CHECK_THAT(healed.out, ContainsSubstring("12 scans"));
-    CHECK(fs::exists(lost));
-  }
-}
-
-TEST_CASE("Flag --resume names what differs, with both values") {
-  const Fixture fixture;
-  REQUIRE(fixture.run({"--window", "5"}).code == 0);
-  const auto refusal = [&](std::vector<std::string> flags) {
-    flags.push_back("--resume");
-    const Outcome refused = fixture.run(flags);
-    CHECK(refused.code == 1);
-    return refused.err;
-  };
-  CHECK_THAT(refusal({}), ContainsSubstring("(window was 5, is "));
-  CHECK_THAT(refusal({"--window", "5", "--end", "8", "--map", fixture.out + "/a.ply"}),
-             ContainsSubstring("(last_scan was \"000011\", is \"000008\", poses or times differ, "
-                               "map was \"static_map.ply\", is \"a.ply\");"));
-  CHECK_THAT(
-      refusal({"--window", "6", "--end", "8", "--map", fixture.out + "/a.ply", "--write-clean"}),
-      ContainsSubstring(", is \"a.ply\", and 2 more);"));
-  nlohmann::json report = fixture.report();
-  report.erase("request");
-  write_text(fixture.out + "/report.json", report.dump());
-  CHECK_THAT(refusal({"--window", "5"}), ContainsSubstring("(report.json does not tell of them)"));
+  // A map that was not put in place yet is not the one of that name.
+  fs::rename(fixture.out, fixture.out + ".partial");
+  fs::create_directory(map + ".partial");
+  fs::rename(map, map + ".partial/map.ply");
+  write_text(map, "mine");
+  const Outcome refused = fixture.run({"--map", map, "--force"});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring(map + ": exists"));
+  CHECK(read_text(map) == "mine");
 }
 
 TEST_CASE("Different spellings of a path name one place") {
@@ -574,10 +498,10 @@ TEST_CASE("Different spellings of a path name one place") {
     std::vector<std::string> arguments = {"run", "a seq", "--quiet"};
     arguments.insert(arguments.end(), flags.begin(), flags.end());
     REQUIRE(start(arguments).code == 0);
-    arguments.push_back("--resume");
-    const Outcome resumed = start(arguments);
-    CAPTURE(resumed.err);
-    CHECK(resumed.code == 0);
+    arguments.push_back("--force");
+    const Outcome again = start(arguments);
+    CAPTURE(again.err);
+    CHECK(again.code == 0);
   }
   const auto map_of = [](const std::string& folder) {
     return nlohmann::json::parse(read_text(folder + "/report.json"))["static_map"]["file"];
@@ -615,8 +539,7 @@ TEST_CASE("A folder that another run writes to is refused, and stays as it is") 
   const std::string before = read_text(fixture.out + "/report.json");
   {
     const FolderLock other(fixture.out);
-    for (const std::vector<std::string>& flags :
-         {std::vector<std::string>{}, {"--force"}, {"--resume"}}) {
+    for (const std::vector<std::string>& flags : {std::vector<std::string>{}, {"--force"}}) {
       CAPTURE(flags);
       const Outcome refused = fixture.run(flags);
       CHECK(refused.code == 2);
@@ -720,7 +643,7 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   }
   SECTION("no config file") {
     flags.insert(flags.end(), {"--config", "/no/such.cfg"});
-    expected = "/no/such.cfg: cannot be read";
+    expected = "/no/such.cfg: does not exist";
   }
   SECTION("a map that cannot be written") {
     flags.insert(flags.end(), {"--map", "/no/such/map.ply"});
@@ -740,7 +663,7 @@ TEST_CASE("An output folder that cannot be written") {
   const Outcome outcome = start({"run", fixture.seq, "--out", fixture.folder / "file/out"});
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err,
-             StartsWith("dynains: error: ") && ContainsSubstring("file/out: cannot be created"));
+             StartsWith("dynains: error: ") && ContainsSubstring("file: cannot be created"));
 }
 
 TEST_CASE("Strange scans get labels like all others") {
@@ -841,16 +764,18 @@ TEST_CASE("Maps far from the origin lose nothing") {
   }
 }
 
-TEST_CASE("Ctrl-C: run finishes the current scan, writes final results and exits with code 130") {
-  const Fixture fixture(400);
+TEST_CASE("Ctrl-C: run finishes the current scan, keeps the results so far, exits with code 130") {
+  Fixture fixture(400);
   Process process({"run", fixture.seq, "--out", fixture.out});
-  for (int i = 0; i < 10000 && !fs::exists(fixture.out + "/labels/000000.label"); ++i) {
+  for (int i = 0; i < 10000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
     ::usleep(1000);
   }
   ::kill(process.id(), SIGINT);
   const Outcome outcome = process.wait();
   CAPTURE(outcome.err);
   CHECK(outcome.code == 130);
+  CHECK_FALSE(fs::exists(fixture.out));
+  fixture.out += ".partial";
   const nlohmann::json report = fixture.report();
   CHECK(report["complete"] == false);
   const std::size_t scans = report["scans"];
@@ -868,7 +793,7 @@ TEST_CASE("A signal that is ignored at the start does not end a run") {
   const int signal = GENERATE(SIGINT, SIGTERM);
   Process process({"run", fixture.seq, "--out", fixture.out},
                   [signal] { std::signal(signal, SIG_IGN); });
-  for (int i = 0; i < 10000 && !fs::exists(fixture.out + "/labels/000000.label"); ++i) {
+  for (int i = 0; i < 10000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
     ::usleep(1000);
   }
   ::kill(process.id(), signal);
@@ -1045,5 +970,6 @@ TEST_CASE("A run that judges nothing is no success, and keeps earlier results") 
     CHECK(read_text(label) == before);
   }
   CHECK(start({"run", fixture.seq, "--out", fixture.out + "2"}).code == 1);
-  CHECK(nlohmann::json::parse(read_text(fixture.out + "2/report.json"))["complete"] == false);
+  CHECK_FALSE(fs::exists(fixture.out + "2"));
+  CHECK_FALSE(fs::exists(fixture.out + "2.partial"));
 }

@@ -95,8 +95,6 @@ TEST_CASE("simulate replaces only its own results, and only by --force") {
   REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
   CHECK(Recording(out).size() == 2);
 
-  CHECK_FALSE(fs::exists(out + "/.dynains_staging"));
-
   // A marker that lists no files, or the marker of a run, does not permit it either.
   REQUIRE(start({"run", out, "--out", folder / "run"}).code == 0);
   for (const std::string& marker : {std::string("{}"), read_text(folder / "run/report.json")}) {
@@ -117,24 +115,24 @@ TEST_CASE("Until a simulation by --force is complete, the earlier one stays as i
   TemporaryFolder folder;
   const std::string out = folder / "sim";
   REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
-  const std::string staging = out + "/.dynains_staging";
+  const std::string partial = out + ".partial";
   for (const int signal : {SIGINT, SIGKILL}) {
     Process process({"simulate", out, "--sensor", "vlp16", "--scans", "1000", "--force"});
-    for (int i = 0; i < 10000 && !fs::exists(staging + "/labels/000000.label"); ++i) {
+    for (int i = 0; i < 10000 && !fs::exists(partial + "/labels/000000.label"); ++i) {
       ::usleep(1000);
     }
     ::kill(process.id(), signal);
     const Outcome outcome = process.wait();
     CHECK(outcome.code == 128 + signal);
     CHECK(Recording(out).size() == 3);
-    CHECK(fs::exists(staging) == (signal == SIGKILL));
+    CHECK(fs::exists(partial) == (signal == SIGKILL));
   }
   const auto marker = [&] { return nlohmann::json::parse(read_text(out + "/simulation.json")); };
   CHECK(marker()["complete"] == true);
   REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
   CHECK(Recording(out).size() == 2);
   CHECK(marker()["outputs"]["scans"] == nlohmann::json({"000000", "000001"}));
-  CHECK_FALSE(fs::exists(staging));
+  CHECK_FALSE(fs::exists(partial));
 }
 
 TEST_CASE("simulate refuses a folder that another run writes to") {

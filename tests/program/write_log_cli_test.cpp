@@ -133,13 +133,15 @@ TEST_CASE(
   CHECK(messages_of(fixture.target) == expected);
   CHECK(count_entries(fixture.folder / "clean") == 1);
 
-  // The log can be run over again, and a complete run needs no second one.
+  // The log can be run over again, and --force replaces the one of the same results alone.
   CHECK(start({"run", fixture.target, "--out", fixture.folder / "again"}).code == 0);
   const std::string bytes = read_text(fixture.target);
-  CHECK(fixture.run({"--write-log", fixture.target, "--resume"}).code == 0);
-  fs::remove(fixture.target);
-  CHECK(fixture.run({"--write-log", fixture.target, "--resume"}).code == 0);
+  CHECK(fixture.run({"--write-log", fixture.target, "--force"}).code == 0);
   CHECK(read_text(fixture.target) == bytes);
+  const Outcome refused = start({"run", fixture.log, "--out", fixture.folder / "other", "--force",
+                                 "--write-log", fixture.target});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("drive.mcap: exists"));
 }
 
 TEST_CASE("Clouds without a verdict stay in the log as they are, and their number is told") {
@@ -197,7 +199,7 @@ TEST_CASE("A log that is a folder is written as one file, not into that folder")
   write_text(parts / "metadata.yaml", "relative_file_paths:\n  - parts_0.mcap\n");
   fixture.log = parts;
   CHECK_THAT(fixture.run({"--write-log", parts / "clean.mcap"}).err,
-             ContainsSubstring("the log is there"));
+             ContainsSubstring("the scans are there"));
   const fs::path target = fixture.folder / "clean.mcap";
   REQUIRE(fixture.run({"--write-log", target}).code == 0);
   CHECK(messages_of(target) == cleaned(parts, fixture.out, 0));
@@ -219,7 +221,7 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
       {{"--write-log", fixture.log, "--force"}, 1, "drive.mcap"},
       {{"--write-log", fixture.folder / "a.bag"}, 2, "ends in .mcap"},
       {{"--write-log", fs::path(fixture.out) / "a.mcap"}, 2, "outside of --out"},
-      {{"--write-log", fixture.folder / "none" / "a.mcap"}, 1, "is no folder"},
+      {{"--write-log", fixture.folder / "none" / "a.mcap"}, 1, "none: cannot be opened"},
       {{"--mark"}, 2, "--mark needs --write-log"}};
   for (const Case& one : cases) {
     const Outcome outcome = fixture.run(one.flags);
@@ -236,7 +238,7 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
   CHECK(read_text(fixture.folder / "drive.mcap") == before);
 }
 
-TEST_CASE("A log that does not fit on the disk is not there, and the other results are complete") {
+TEST_CASE("A log that does not fit on the disk leaves nothing, for the results are not whole") {
   Fixture fixture;
   const std::string target = fixture.folder / "big.mcap";
   // No other result is as large as the log.
@@ -253,12 +255,7 @@ TEST_CASE("A log that does not fit on the disk is not there, and the other resul
                                 limit_files);
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, ContainsSubstring("big.mcap"));
-  CHECK(count_entries(fixture.folder.path()) == 2);
-  const auto report = nlohmann::json::parse(read_text(fs::path(fixture.out) / "report.json"));
-  CHECK(report["complete"] == true);
-  // --resume makes up for it.
-  CHECK(
-      fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2", "--resume"}).code ==
-      0);
+  CHECK(count_entries(fixture.folder.path()) == 1);
+  CHECK(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}).code == 0);
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 0));
 }

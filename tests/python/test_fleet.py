@@ -80,7 +80,7 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
 
     def disturb():
         while not disturbed:
-            disturbed.extend(out.glob("drive6/labels/*.label"))
+            disturbed.extend(out.glob("drive6.partial/labels/*.label"))
             time.sleep(0.01)
         workers.workers[0].send_signal(signal.SIGKILL)
         workers.workers[1].send_signal(signal.SIGSTOP)
@@ -115,12 +115,27 @@ def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
 
 def test_a_worker_waits_for_a_folder_that_another_holds(drives, tmp_path, monkeypatch):
     monkeypatch.setattr(fleet, "_PATIENCE", 0.0)
-    job = (str(drives / "drive1"), str(tmp_path / "out"), {"resume": True})
-    assert fleet._clean_one(*job)["scans"] == 20
-    other = os.open(tmp_path / "out", os.O_RDONLY)
+    job = (str(drives / "drive1"), str(tmp_path / "out"), {})
+    (tmp_path / "out.partial").mkdir()
+    other = os.open(tmp_path / "out.partial", os.O_RDONLY)
     fcntl.flock(other, fcntl.LOCK_SH)
     assert "is in use" in fleet._clean_one(*job)["error"]
     os.close(other)
+    assert fleet._clean_one(*job)["scans"] == 20
+
+
+def test_finished_recordings_are_not_run_again_and_never_taken_for_others(drives, tmp_path):
+    job = (str(drives / "drive1"), str(tmp_path / "out"))
+    first = fleet._clean_one(*job, {})
+    label = tmp_path / "out" / "labels" / "000003.label"
+    label.unlink()
+    assert fleet._clean_one(*job, {}) == first
+    assert not label.exists()
+    assert "preset default, not paper" in fleet._clean_one(*job, {"preset": "paper"})["error"]
+    assert "update None" in fleet._clean_one(*job, {"update": "/city", "session": "x"})["error"]
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    (tmp_path / "out" / "report.json").write_text(json.dumps({**report, "complete": False}))
+    assert "holds earlier results" in fleet._clean_one(*job, {})["error"]
 
 
 def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives, tmp_path, capsys):
@@ -182,13 +197,29 @@ def test_names_of_files_of_the_fleet_are_refused(drives, tmp_path, capsys):
     (tmp_path / "fleet.json").mkdir()
     for file in (drives / "drive1").iterdir():
         (tmp_path / "fleet.json" / file.name).symlink_to(file)
-    (tmp_path / "fleet.json.part.mcap").write_text("x")
-    for name in ("fleet.json", "fleet.json.part.mcap"):
-        with pytest.raises(dynains.IoError, match=f"{name}: its results would"):
-            fleet.find_recordings([tmp_path / name])
+    with pytest.raises(dynains.IoError, match="fleet.json: its results would"):
+        fleet.find_recordings([tmp_path / "fleet.json"])
     with pytest.raises(dynains.IoError, match="drive1: its results would"):
         fleet.clean({"fleet.json": drives / "drive1"}, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_report_of_others_is_not_replaced(drives, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir()
+    report = out / "fleet.json"
+    precious = tmp_path / "precious.json"
+    precious.write_text('{"drive1": {"recording": "drive1"}}')
+    report.symlink_to(precious)
+    with pytest.raises(dynains.IoError, match="was not written by a fleet"):
+        fleet.clean({"drive1": drives / "drive1"}, out)
+    report.unlink()
+    for text in ("mine", '{"drive1": 3}', "[]"):
+        report.write_text(text)
+        with pytest.raises(dynains.IoError, match="was not written by a fleet"):
+            fleet.clean({"drive1": drives / "drive1"}, out)
+        assert report.read_text() == text
+    assert os.listdir(out) == ["fleet.json"]
 
 
 def test_recordings_of_one_name_are_refused(drives, tmp_path):

@@ -41,14 +41,14 @@ Tree recording_of_clouds() {
 
 Parts make_parts() {
   Parts parts;
-  const Scenario stopped = resumed_run({});
   const Rehearsal run(fresh_run({"--write-online", "--write-clean"}));
   parts.kitti = below(run.after(), "seq");
   parts.complete = below(run.after(), "disk/out");
   parts.clouds = recording_of_clouds();
-  parts.unfinished = below(Rehearsal(stopped).before(), "disk/out");
-  parts.unfinished.erase("notes.txt");
-  parts.unfinished.erase("labels/notes.txt");
+  parts.unfinished = parts.complete;
+  auto report = nlohmann::ordered_json::parse(parts.complete.at("report.json").bytes.text());
+  report["complete"] = false;
+  parts.unfinished["report.json"].bytes = report.dump();
   parts.simulated = below(Rehearsal(simulation()).after(), "disk/out");
   return parts;
 }
@@ -143,7 +143,7 @@ class RandomStart {
   bool may_change(const std::string& path) const {
     const bool is_eval = command() == "eval";
     if (is_input(path)) return false;
-    if (is_target(path)) return start_.replaces || is_eval;
+    if (is_target(path) && is_eval) return true;
     if (!out_ || !is_below(path, *out_)) return false;
     const Kind kind = before_.at(path).kind;
     // A folder may be removed if it is empty or holds only files of the program.
@@ -153,8 +153,9 @@ class RandomStart {
   bool may_appear(const std::string& path) const {
     if (is_target(path)) return true;
     const std::string name = path.substr(path.rfind('/') + 1);
-    // After a failed call, a temporary file may stay.
-    if (!start_.fault.empty() && name.front() == '.' && ends_with(name, ".tmp")) return true;
+    // After a failed call, a temporary file and an unfinished output may stay.
+    const bool is_partial = path.find(".partial") != path.npos || ends_with(name, ".tmp");
+    if (!start_.fault.empty() && is_partial) return true;
     if (!out_) return false;
     if (path == *out_ || is_below(*out_, path)) return true;
     if (!is_below(path, *out_)) return false;
@@ -185,7 +186,9 @@ class RandomStart {
     if (!out_ || command() != "run") return {};
     const Claim claim = claim_of(below(after_, *out_));
     if (outcome_.code == 0) return claim == Claim::kComplete ? "" : "exit code 0, but not complete";
-    if (claim != Claim::kComplete || start_.full || !start_.closed.empty()) return {};
+    // A call that failed after the new results were in place is an error, too.
+    const bool is_disturbed = start_.full || !start_.closed.empty() || !start_.fault.empty();
+    if (claim != Claim::kComplete || is_disturbed) return {};
     for (const std::string& path : world_.ours) {
       const auto earlier = before_.find(path);
       const auto now = after_.find(path);

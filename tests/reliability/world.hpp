@@ -24,7 +24,7 @@ struct Parts {
   Tree kitti;       ///< a recording
   Tree clouds;      ///< a recording of .ply files
   Tree complete;    ///< results of run over kitti
-  Tree unfinished;  ///< results of a run that was stopped
+  Tree unfinished;  ///< results of a run, marked as unfinished
   Tree simulated;   ///< results of simulate
 };
 
@@ -41,7 +41,7 @@ struct Start {
   std::vector<std::string> inputs;   ///< files and folders that the arguments name as input
   std::string out;                   ///< of run and simulate
   std::vector<std::string> targets;  ///< files that the arguments name as output
-  bool replaces = false;             ///< --force or --resume
+  bool replaces = false;             ///< --force
   std::vector<int> closed;           ///< descriptors
   bool full = false;                 ///< standard output is full
   std::string fault;                 ///< as in shim.cpp
@@ -288,7 +288,7 @@ class WorldMaker {
     start.inputs = {input(world)};
     start.arguments = {"run", start.inputs[0], "--out", start.out};
     if (chance(0.6)) {
-      start.arguments.push_back(chance(0.6) ? "--force" : "--resume");
+      start.arguments.emplace_back("--force");
       start.replaces = true;
     }
     if (chance(0.3)) add_target(world, start, "--map");

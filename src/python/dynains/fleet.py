@@ -4,13 +4,15 @@
 
 A recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
 depend on the workers, their number, or the order. A task of a worker that dies is given to another
-worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. Run the command again to complete what is missing.
+worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. The same
+command again runs over those that have no results yet.
 """
 
 import argparse
 import fcntl
 import json
 import os
+import secrets
 import sys
 import time
 from contextlib import contextmanager
@@ -22,7 +24,6 @@ from . import ConfigError, IoError, PoseError, Recording, UsageError, run
 __all__ = ["clean", "find_recordings"]
 
 _REPORT = "fleet.json"
-_LOCK = ".fleet.lock"
 _PATIENCE = 600.0  # s, for a folder that another process holds
 
 _LOGS = {".mcap", ".db3", ".bag"}
@@ -58,7 +59,7 @@ def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
 
 
 def _check_name(name: str, recording: PathLike) -> None:
-    if name in (_REPORT, _REPORT + ".part", _LOCK):
+    if name == _REPORT:
         raise IoError(
             f"{recording}: its results would have the name of a file of the fleet, {name}; rename it"
         )
@@ -120,36 +121,73 @@ _ERRORS = (ConfigError, IoError, PoseError, UsageError)
 
 
 def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
-    """Runs over one recording. Returns its result, with the warnings, or its error."""
+    """Runs over one recording, unless OUT has its results. Returns them, or the error."""
     try:
-        result = _when_free(lambda: run(recording, out, **arguments))
+        report = _finished(Path(out), arguments)
+        if report is None:
+            report = _when_free(lambda: run(recording, out, **arguments)).report
     except _ERRORS as error:
         return {"recording": recording, "error": str(error)}
-    return {
-        "recording": recording,
-        "scans": result.scans,
-        "points": result.points,
-        "labels": result.label_counts,
-        "warnings": result.report.get("doubts", {}).get("warnings", []),
-    }
+    result = {key: report[key] for key in ("scans", "points", "labels")}
+    warnings = report.get("doubts", {}).get("warnings", [])
+    return {"recording": recording, **result, "warnings": warnings}
+
+
+def _finished(out: Path, arguments: Dict[str, Any]) -> Optional[Dict[str, Any]]:
+    """The report of a finished run by these arguments, as far as it has them; None without one.
+
+    Raises UsageError if it tells of others.
+    """
+    try:
+        report = json.loads((out / "report.json").read_text())
+    except (OSError, ValueError):
+        return None
+    if not isinstance(report, dict) or not report.get("complete"):
+        return None
+    made = {"preset": report.get("preset"), **report.get("request", {})}
+    for name, otherwise in (("preset", "default"), ("update", None), ("session", None)):
+        wanted = arguments.get(name, otherwise)
+        if made.get(name) != wanted:
+            raise UsageError(
+                f"{out}: holds results with {name} {made.get(name)}, not {wanted}; choose another --out"
+            )
+    return report
 
 
 @contextmanager
 def _locked(out: Path):
     """Raises UsageError if another fleet works in the folder."""
     out.mkdir(parents=True, exist_ok=True)
-    with open(out / _LOCK, "w") as lock:
+    folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
+    try:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise UsageError(f"{out}: another fleet works in this folder") from error
         yield
+    finally:
+        os.close(folder)
+
+
+def _check_report(file: Path) -> None:
+    """Raises IoError unless it is the report of a fleet, or nothing."""
+    if not os.path.lexists(file):
+        return
+    try:
+        is_report = all("recording" in result for result in json.loads(file.read_text()).values())
+    except (OSError, ValueError, AttributeError, TypeError):
+        is_report = False
+    if file.is_symlink() or not is_report:
+        raise IoError(f"{file}: was not written by a fleet; move it away, or choose another folder")
 
 
 def _write_report(out: Path, results: Dict[str, Dict[str, Any]]) -> None:
     text = json.dumps({name: results[name] for name in sorted(results)}, indent=2) + "\n"
-    staged = out / (_REPORT + ".part")
-    staged.write_text(text)
+    staged = out / f".{_REPORT}.{secrets.token_hex(8)}.tmp"
+    with open(staged, "x") as file:  # no file or link of others
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
     os.replace(staged, out / _REPORT)
 
 
@@ -180,12 +218,13 @@ def clean(
     out = Path(out).resolve()
     for name, path in recordings.items():
         _check_name(name, path)
-    common = {**arguments, "resume": True, "one_thread": True}
+    common = {**arguments, "one_thread": True}
     jobs = {
         name: (str(path), str(out / name), {**common, **_session(city, name)})
         for name, path in recordings.items()
     }
     with _locked(out):
+        _check_report(out / _REPORT)
         cluster = scheduler or LocalCluster(
             n_workers=workers, threads_per_worker=1, dashboard_address=None
         )
