@@ -94,7 +94,6 @@ Surface PointGrid::surface_at(const Eigen::Vector3d& point, const Eigen::Vector3
   constexpr double kLine = 0.06;      // ratio of variances across and along a line
   constexpr double kFlat = 0.25;      // ratio of variances across and along a plane
   constexpr double kUpright = 0.85;   // cosine
-  constexpr double kClutter = 0.1;    // weight
   Surface surface;
   const Neighbours near = neighbours_of(point);
   if (near.count < kFewest) return surface;
@@ -119,7 +118,7 @@ Surface PointGrid::surface_at(const Eigen::Vector3d& point, const Eigen::Vector3
   const auto direction = [&](std::size_t k) {
     return Eigen::Vector3d(eigen.vectors[order[k]].data());
   };
-  surface.directions = {direction(0), direction(1), direction(2)};
+  surface.directions = {direction(0), direction(1)};
   const bool is_line = value(1) < kLine * value(2);
   const bool is_thin = value(0) < kThickness * kThickness && value(0) < kFlat * value(1);
   if (is_line) {
@@ -127,9 +126,8 @@ Surface PointGrid::surface_at(const Eigen::Vector3d& point, const Eigen::Vector3
   } else if (is_thin) {
     surface.direction_count = 1;
   } else {
-    surface.direction_count = 3;
-    surface.mean = *near.points[0];
-    surface.weight = kClutter;
+    surface.direction_count = 2;
+    surface.variance = value(1);
   }
   return surface;
 }

@@ -16,10 +16,10 @@ VoxelKey voxel_of(const Eigen::Vector3d& point, double edge);
 
 /// A plane, an upright pole, or clutter: directions in which it tells where a point is.
 struct Surface {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< m; of clutter: its nearest point
-  std::array<Eigen::Vector3d, 3> directions;       ///< unit vectors
-  std::size_t direction_count = 0;                 ///< 1: plane, 2: pole, 3: clutter, 0: nothing
-  double weight = 1.0;                             ///< clutter is less certain
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< m
+  std::array<Eigen::Vector3d, 2> directions;       ///< unit vectors
+  std::size_t direction_count = 0;                 ///< 1: plane, 2: pole or clutter, 0: nothing
+  double variance = 0.0;                           ///< m^2, of clutter across its longest extent
 };
 
 /// Points in a hash table of voxels, no two of one voxel nearer than a spacing.

@@ -67,15 +67,31 @@ class Odometry::Loop {
                     std::to_string(mean_time_) + " s");
   }
 
-  /// At constant velocity; a long pause tells nothing of the velocity.
+  /// At constant velocity.
   Pose predicted_motion(double period) const {
-    constexpr double kLongestPause = 1.0;  // s
-    if (period_ <= 0.0 || period > kLongestPause) return Pose::Identity();
+    if (period_ <= 0.0) return Pose::Identity();
     return extrapolate(Pose::Identity(), T_last_newest_, period / period_);
+  }
+
+  bool are_scans_missing(double period) const {
+    constexpr double kMissing = 1.5;  // periods
+    return period_ > 0.0 && period > kMissing * period_;
+  }
+
+  /// The first motions are not predicted, and neither is what happens while scans are missing.
+  bool is_predictable(double period) const {
+    constexpr std::size_t kSearched = 3;  // motions
+    return scan_count_ > kSearched && !are_scans_missing(period);
+  }
+
+  bool is_after_gap(double period) const {
+    constexpr double kLongest = 1.0;  // s, at constant velocity within some metres
+    return period > kLongest && are_scans_missing(period);
   }
 
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
+    if (is_after_gap(period)) return OdometryLoss::kGap;
     constexpr int kMostTurns = 4;
     constexpr std::size_t kFewest = 100;  // points
     constexpr double kLeastFit = 0.2;
@@ -92,9 +108,8 @@ class Odometry::Loop {
       if (scan_count_ == 0) return OdometryLoss::kNone;
       if (first_) start_map(T_last_newest, period);
       Alignment best = align(points, map_, T_world_last_ * T_last_newest, scale, finest);
-      // The first motion is not predicted.
-      if (turn == 0 && (first_ || best.fit < kLeastFit)) {
-        const Alignment found = search(points, map_, T_world_last_, finest);
+      if (turn == 0 && (!is_predictable(period) || best.fit < kLeastFit)) {
+        const Alignment found = search(points, map_, T_world_last_ * T_last_newest, finest);
         if (found.score > best.score) best = found;
       }
       result.fit = best.fit;

@@ -12,8 +12,7 @@ namespace {
 using NormalEquations = detail::NormalEquations<6>;
 using Vector = NormalEquations::Vector;
 
-constexpr double kFinest = 0.1;  // m, scale at which alignments are compared
-constexpr double kArm = 10.0;    // m, at which a rotation counts as a translation
+constexpr double kArm = 10.0;  // m, at which a rotation counts as a translation
 
 /// A point of the scan and what it lies on.
 struct Match {
@@ -54,7 +53,7 @@ NormalEquations equations_at(const std::vector<Match>& matches, const Pose& T, d
   for (const Match& match : matches) {
     const Eigen::Vector3d arm = T.linear() * match.point;
     const Eigen::Vector3d gap = arm + T.translation() - match.surface.mean;
-    const double weight = match.surface.weight * weight_of(squared_distance(match, T), scale);
+    const double weight = weight_of(squared_distance(match, T) + match.surface.variance, scale);
     for (std::size_t k = 0; k < match.surface.direction_count; ++k) {
       const Eigen::Vector3d& n = match.surface.directions[k];
       const Eigen::Vector3d turn = arm.cross(n) / kArm;
@@ -111,14 +110,15 @@ double length_of(const Vector& step) {
 }
 
 /// Fills in how well the points fit.
-void rate(const std::vector<Match>& matches, std::size_t points, Alignment& alignment) {
+void rate(const std::vector<Match>& matches, std::size_t points, double scale,
+          Alignment& alignment) {
   constexpr double kNear = 0.2;  // m
   std::size_t near = 0;
   double weights = 0.0;
   for (const Match& match : matches) {
     const double squared = squared_distance(match, alignment.T_map_scan);
     if (squared < kNear * kNear) ++near;
-    weights += weight_of(squared, kFinest);
+    weights += weight_of(squared, scale);
   }
   const double count = static_cast<double>(std::max<std::size_t>(1, points));
   alignment.fit = static_cast<double>(near) / count;
@@ -148,7 +148,7 @@ Alignment align(const std::vector<Eigen::Vector3d>& points, const LocalMap& map,
     if (longest < kConverged && scale <= finest) break;
     scale = std::max(finest, 0.6 * scale);
   }
-  rate(matches, points.size(), result);
+  rate(matches, points.size(), finest, result);
   return result;
 }
 

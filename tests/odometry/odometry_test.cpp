@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstring>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -102,6 +103,42 @@ TEST_CASE("Points with times: motions to 3 cm, wherever in the turn the stamp is
       CHECK(error_of_motion(scans, shift) < 0.03);
     }
   }
+}
+
+TEST_CASE("16 beams on a highway: the odometry moves with the road, not with the traffic") {
+  for (const std::uint64_t seed : {202, 204}) {
+    simulation::Config config = place(simulation::Scene::kHighway, 12);
+    config.seed = seed;
+    const Drive found = drive(config, {});
+    CAPTURE(seed, worst_error(found));
+    CHECK(found.exact.back().translation().norm() > 20.0);
+    CHECK(worst_error(found) < 4.0);
+    const Pose motion = found.estimated[10].inverse() * found.estimated[11];
+    const Pose exact = found.exact[10].inverse() * found.exact[11];
+    CHECK((motion.translation() - exact.translation()).norm() < 0.15);
+  }
+}
+
+TEST_CASE("Some lost scans are bridged, and a longer gap ends the track") {
+  simulation::Config config = place(simulation::Scene::kUrban, 26);
+  config.ego_speed = 10.0;
+  simulation::Simulator street(config);
+  Odometry odometry{OdometryConfig()};
+  const Pose T_first_world = street.scan(0).T_world_sensor.inverse();
+  const auto push = [&](std::size_t i) {
+    const auto scan = street.scan(i);
+    const OdometryResult found = odometry.push(points_of(scan), {}, scan.time);
+    const Pose exact = T_first_world * scan.T_world_sensor;
+    const double error = (found.T_world_sensor.translation() - exact.translation()).norm();
+    return std::make_pair(found.loss, error);
+  };
+  for (std::size_t i = 0; i < 8; ++i) REQUIRE(push(i).first == OdometryLoss::kNone);
+  const auto [loss, error] = push(13);
+  CHECK(loss == OdometryLoss::kNone);
+  CHECK(error < 0.2);
+  CHECK(push(14).first == OdometryLoss::kNone);
+  CHECK(push(25).first == OdometryLoss::kGap);
+  CHECK(push(15).first == OdometryLoss::kNone);
 }
 
 TEST_CASE("Same scans, same bits") {

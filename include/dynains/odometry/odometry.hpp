@@ -37,11 +37,13 @@ struct OdometryConfig {
 enum class OdometryLoss : unsigned char {
   kNone,
   kFewPoints,  ///< too few points for a registration
-  kNoOverlap   ///< the scan does not fit to the map anywhere near the predicted pose
+  kNoOverlap,  ///< the scan does not fit to the map anywhere near the predicted pose
+  kGap         ///< scans are missing for longer than a motion can be predicted
 };
 
-constexpr std::array<const char*, 3> value_names(OdometryLoss) {
-  return {"none", "too few points", "no overlap with the scans before"};
+constexpr std::array<const char*, 4> value_names(OdometryLoss) {
+  return {"none", "too few points", "no overlap with the scans before",
+          "too long after the scan before"};
 }
 
 /// The answer to one scan.
@@ -62,7 +64,7 @@ struct OdometryResult {
 /// its points if they have times, and registered point to plane (poles: point to line) to a map of
 /// voxels (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
 /// and Singh 2016). Then the remover judges the scan, and only points that do not move enter the
-/// map. The first motion is searched for up to 3 m. Same scans, same bits.
+/// map. The first motions are searched for up to 3 m. Same scans, same bits.
 class Odometry {
  public:
   using Config = OdometryConfig;
