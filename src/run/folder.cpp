@@ -120,7 +120,8 @@ void Folder::check_replaceable(const std::string& name) const {
       (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0;
   if (is_of_others || is_protected) fail_with(path_ / name, "cannot be replaced", EPERM);
   if ((status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0) {
-    fail_with(path_ / name, "cannot be replaced: something is mounted there", EBUSY);
+    throw IoError((path_ / name).string() +
+                  ": is mounted and cannot be replaced; choose a folder in it");
   }
 }
 

@@ -125,6 +125,10 @@ if mount -t tmpfs -o size=600k tmpfs "$disk" 2>/dev/null; then
   mount -o remount,size=64m "$disk"
   "$program" run "$seq" --out "$disk/out" --quiet || fail "full disk: again"
   same "$work/expected" "$disk/out" || fail "full disk: other bytes"
+  rm -r "${disk:?}/out"
+  "$program" run "$seq" --out "$disk" --quiet 2>"$work/err" && fail "a mounted folder was replaced"
+  grep -q 'choose a folder in it' "$work/err" || fail "a mounted folder: $(cat "$work/err")"
+  "$program" run "$seq" --out "$disk/out" --quiet || fail "a folder that is mounted: below it"
 
   echo "--- a file system that is read-only"
   mount -o remount,ro "$disk"
