@@ -46,20 +46,22 @@ macro(dynains_part part option description)
 endmacro()
 
 set(json nlohmann_json=nlohmann-json3-dev)
+set(search nanoflann=libnanoflann-dev)
 dynains_part(program DYNAINS_BUILD_PROGRAM "program" CLI11=libcli11-dev
-  PNG=libpng-dev ZLIB=zlib1g-dev ${json})
+  PNG=libpng-dev ZLIB=zlib1g-dev ${json} ${search})
 if(NOT DYNAINS_BUILD_PYTHON STREQUAL "OFF")
   find_package(Python3 QUIET COMPONENTS Interpreter Development.Module)
 endif()
 dynains_part(python DYNAINS_BUILD_PYTHON "Python module"
-  Python3=python3-dev pybind11=pybind11-dev PNG=libpng-dev ZLIB=zlib1g-dev ${json})
+  Python3=python3-dev pybind11=pybind11-dev PNG=libpng-dev ZLIB=zlib1g-dev ${json}
+  ${search})
 dynains_part(remover DYNAINS_BUILD_REMOVER "compiled remover")
 if(dynains_has_program OR dynains_has_python)
   set(dynains_has_components ON)
   set(dynains_has_evaluation ON)
 else()
-  dynains_part(components DYNAINS_BUILD_COMPONENTS "io, poses and simulation components")
-  dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "city and evaluation components" ${json})
+  dynains_part(components DYNAINS_BUILD_COMPONENTS "io, poses and simulation components" ${search})
+  dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "city and evaluation components" ${json} ${search})
 endif()
 
 # dynains_log_library(<name> <header> <description> [<package>]): a library that some files need. It

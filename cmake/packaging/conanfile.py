@@ -34,6 +34,7 @@ class Dynains(ConanFile):
 
     def requirements(self):
         self.requires("eigen/3.4.0", transitive_headers=True)
+        self.requires("nanoflann/1.6.1")
         self.requires("nlohmann_json/3.11.3")
 
     def layout(self):

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
@@ -15,15 +15,18 @@
 namespace dynains {
 
 /// Points of one scan: above the ground, 2 m to `farthest` from the sensor, one per voxel of 0.25
-/// m.
+/// m, in the order of the scan.
 class Landmarks {
  public:
   /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
   /// `farthest`: m, (2, 1000].
   Landmarks(PointsView points, const Mounting& mounting, double farthest = 40.0);
+  ~Landmarks();
+  Landmarks(Landmarks&&) noexcept;
+  Landmarks& operator=(Landmarks&&) noexcept;
 
-  std::size_t size() const { return points_.size(); }
-  const std::vector<Eigen::Vector3d>& points() const { return points_; }
+  std::size_t size() const { return points().size(); }
+  const std::vector<Eigen::Vector3d>& points() const;
   /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
   /// occlusion. `most`: compared points, about.
   Agreement compare(const Landmarks& other, const Pose& T_this_other,
@@ -32,19 +35,8 @@ class Landmarks {
   double distance_to(const Eigen::Vector3d& p) const;
 
  private:
-  // Points of a vertical column of cells: a range of `points_`.
-  struct Column {
-    std::uint32_t begin = 0;
-    std::uint32_t end = 0;
-  };
-
-  // Number of the column along one axis, [0, 2 * half_) for points near enough.
-  int column_of(double coordinate) const;
-  std::size_t index_of(int column_x, int column_y) const;
-
-  int half_ = 0;                         // columns from the sensor to each side of the grid
-  std::vector<Column> columns_;          // square grid around the sensor, row-major
-  std::vector<Eigen::Vector3d> points_;  // by column, ascending along z in each
+  struct Tree;
+  std::unique_ptr<const Tree> tree_;
 };
 
 /// The mounting that a sample of the points of one scan (m, sensor frame) shows.

@@ -1,9 +1,9 @@
 """pip install --no-build-isolation ./src/python
 
-Needs nothing from the network: setuptools, CMake, a compiler, Eigen, nlohmann-json, libpng, zlib,
-pybind11 and NumPy as installed on the system. CMAKE_ARGS adds arguments for the configuration by
-CMake, CMAKE_BUILD_ARGS for the build. DYNAINS_BUILD_DIR names a build folder whose module is taken
-instead of a new one.
+Needs nothing from the network: setuptools, CMake, a compiler, Eigen, nlohmann-json, nanoflann,
+libpng, zlib, pybind11 and NumPy as installed on the system. CMAKE_ARGS adds arguments for the
+configuration by CMake, CMAKE_BUILD_ARGS for the build. DYNAINS_BUILD_DIR names a build folder whose
+module is taken instead of a new one.
 """
 
 import os

@@ -65,8 +65,8 @@ grep -q '^/build' "$source_dir/.dockerignore" || fail "build folders are copied"
 # The first stage has what the program needs by cmake/dynainsParts.cmake.
 needs=$(sed -n '/^dynains_part(program /,/)/p' "$source_dir/cmake/dynainsParts.cmake" |
   grep -o '=[a-z0-9-]*' | tr -d =)
-json=$(sed -n 's/^set(json [^=]*=\(.*\))$/\1/p' "$source_dir/cmake/dynainsParts.cmake")
-for package in libeigen3-dev $json $needs; do
+common=$(sed -n 's/^set([a-z]* [A-Za-z_]*=\(.*-dev\))$/\1/p' "$source_dir/cmake/dynainsParts.cmake")
+for package in libeigen3-dev $common $needs; do
   [[ " ${packages[1]} " == *" $package "* ]] || fail "the first stage lacks $package"
 done
 

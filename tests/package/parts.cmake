@@ -3,7 +3,7 @@
 # the option that builds the components.
 set(common -G "${GENERATOR}" -DCMAKE_CXX_COMPILER=${COMPILER} -DEigen3_DIR=${EIGEN_DIR})
 set(without "")
-foreach(package Catch2 CLI11 PNG nlohmann_json pybind11 Python3)
+foreach(package Catch2 CLI11 PNG nanoflann nlohmann_json pybind11 Python3)
   list(APPEND without -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
 endforeach()
 
@@ -24,6 +24,7 @@ if(NOT result EQUAL 0)
   message(FATAL_ERROR "cannot be configured with Eigen and a compiler alone:\n${output}")
 endif()
 expect("no program: not found: CLI11 .Debian: libcli11-dev." "no Python module: not found: "
+  "no io, poses and simulation components: not found: nanoflann"
   "no city and evaluation components: not found: nlohmann_json" "no tests: not found: Catch2")
 
 # vcpkg builds the target install alone. A dry run of make tells what that builds, one of Ninja not.
