@@ -439,7 +439,7 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
     const auto is_writing = [&] {
       return fs::exists(map + ".partial") && fs::exists(partial + "/labels/000000.label");
     };
-    for (int i = 0; i < 10000 && !is_writing(); ++i) ::usleep(1000);
+    for (int i = 0; i < 60000 && !is_writing(); ++i) ::usleep(1000);
     REQUIRE(is_writing());
     ::kill(process.id(), signal);
     return process.wait();
@@ -767,7 +767,7 @@ TEST_CASE("Maps far from the origin lose nothing") {
 TEST_CASE("Ctrl-C: run finishes the current scan, keeps the results so far, exits with code 130") {
   Fixture fixture(400);
   Process process({"run", fixture.seq, "--out", fixture.out});
-  for (int i = 0; i < 10000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
+  for (int i = 0; i < 60000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
     ::usleep(1000);
   }
   ::kill(process.id(), SIGINT);
@@ -793,7 +793,7 @@ TEST_CASE("A signal that is ignored at the start does not end a run") {
   const int signal = GENERATE(SIGINT, SIGTERM);
   Process process({"run", fixture.seq, "--out", fixture.out},
                   [signal] { std::signal(signal, SIG_IGN); });
-  for (int i = 0; i < 10000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
+  for (int i = 0; i < 60000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
     ::usleep(1000);
   }
   ::kill(process.id(), signal);

@@ -118,7 +118,7 @@ TEST_CASE("Until a simulation by --force is complete, the earlier one stays as i
   const std::string partial = out + ".partial";
   for (const int signal : {SIGINT, SIGKILL}) {
     Process process({"simulate", out, "--sensor", "vlp16", "--scans", "1000", "--force"});
-    for (int i = 0; i < 10000 && !fs::exists(partial + "/labels/000000.label"); ++i) {
+    for (int i = 0; i < 60000 && !fs::exists(partial + "/labels/000000.label"); ++i) {
       ::usleep(1000);
     }
     ::kill(process.id(), signal);
