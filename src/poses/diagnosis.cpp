@@ -1,36 +1,49 @@
 #include "dynains/poses/diagnosis.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <iomanip>
+#include <functional>
+#include <limits>
 #include <map>
 #include <optional>
-#include <sstream>
-#include <string>
 #include <utility>
+#include <vector>
 
-#include "agreement_sum.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
+#include "given_motion.hpp"
 #include "in_two_threads.hpp"
 #include "io/finite_points.hpp"
-#include "io/text.hpp"
 #include "landmarks.hpp"
-#include "lost_scans.hpp"
-#include "point_time_faults.hpp"
-#include "pose_diagnosis.hpp"
+#include "openings.hpp"
 #include "pose_fit.hpp"
-#include "pose_shift.hpp"
+#include "readings.hpp"
 
 namespace dynains {
 namespace {
 
-constexpr std::size_t kPairs = 8;   // pairs of scans that are compared
-constexpr std::size_t kStride = 5;  // from one scan of a pair to the other
-constexpr double kFast = 2.0;       // m from scan to scan; overlap of pairs is small beyond it
+constexpr double kLeastAgreement = 0.5;       // share; wrong poses of a moving sensor stay below it
+constexpr std::size_t kFewestCompared = 200;  // compared points of a sample
+constexpr std::size_t kFewestLandmarks = 60;  // of a scan that is compared
+constexpr std::size_t kFewestMotions = 6;     // registered, for a decision
+constexpr std::size_t kFewestPairs = 3;       // of neighbours, for a statement about their error
+constexpr double kExact = 0.03;  // m at points 10 m away; registrations are worse rarely
+constexpr double kRough = 0.4;   // m at points 10 m away; more is not inexact but wrong
+constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
+constexpr double kInexactRotation = 0.0045;   // rad
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+/// Whether the gap of `a` is clearly smaller than that of `b`.
+bool is_clearly_better(const Agreement& a, const Agreement& b) {
+  return a.gap < 0.85 * b.gap - 0.01;
+}
+
+/// Whether scans agree: share >= kLeastAgreement, or (few beams, fast motion) share >= 0.2 and a
+/// clearly smaller gap than `standing`, the agreement without motion.
+bool fits(const Agreement& agreement, const Agreement& standing) {
+  return agreement.share >= kLeastAgreement ||
+         (agreement.share >= 0.2 && is_clearly_better(agreement, standing));
+}
 
 /// Two scans, some scans apart.
 struct Pair {
@@ -45,8 +58,8 @@ class ScanSample {
  public:
   explicit ScanSample(const Recording& recording) : recording_(recording) {}
 
-  /// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last`, which live
-  /// as long as this. Throws IoError.
+  /// At most `most` evenly spread pairs (i, i + stride) of the scans `first` to `last` that have
+  /// enough landmarks; they live as long as this. Throws IoError.
   std::vector<Pair> pairs(std::size_t first, std::size_t last, std::size_t stride,
                           std::size_t most) {
     const std::size_t starts = last - first + 1 - stride;
@@ -59,8 +72,9 @@ class ScanSample {
     read(scans);
     std::vector<Pair> pairs;
     for (std::size_t k = 0; k < scans.size(); k += 2) {
-      pairs.push_back({scans[k], scans[k + 1], scans_.at(scans[k]).landmarks,
-                       scans_.at(scans[k + 1]).landmarks});
+      const Landmarks &a = scans_.at(scans[k]).landmarks, &b = scans_.at(scans[k + 1]).landmarks;
+      if (std::min(a.size(), b.size()) < kFewestLandmarks) continue;
+      pairs.push_back({scans[k], scans[k + 1], a, b});
     }
     return pairs;
   }
@@ -131,511 +145,366 @@ class ScanSample {
   std::map<std::size_t, Scan> scans_;
 };
 
-constexpr std::size_t kAllPoints = 1200;  // compared points of a pair
-constexpr std::size_t kFewPoints = 150;
+using Pairs = std::vector<Pair>;
 
-Agreement agreement_under(const PoseConvention& convention, const Recording& recording,
-                          const std::vector<Pair>& pairs, std::size_t points = kAllPoints) {
-  AgreementSum sum;
+RegisteredMotion motion_of_pair(const Pair& pair) {
+  return {0, pair.first, pair.second, Pose::Identity(), {}, 0.0};
+}
+
+Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs) {
+  Agreement mean{0.0, 0.0, 0};  // weighted by points
   for (const Pair& pair : pairs) {
-    const auto T_a_b = motion_under(recording, convention, pair.first, pair.second);
-    if (T_a_b) sum.add(pair.a.compare(pair.b, *T_a_b, points));
+    const auto T_a_b = motion(motion_of_pair(pair));
+    if (!T_a_b) continue;
+    const Agreement one = pair.a.compare(pair.b, *T_a_b);
+    const auto points = static_cast<double>(one.points);
+    mean.share += points * one.share;
+    mean.gap += points * one.gap;
+    mean.points += one.points;
   }
-  return sum.mean();
+  if (mean.points == 0) return {};
+  const auto points = static_cast<double>(mean.points);
+  return {mean.share / points, mean.gap / points, mean.points};
 }
 
-/// Agreement under the identity: no motion.
-Agreement standing_agreement(const std::vector<Pair>& pairs) {
-  AgreementSum sum;
-  for (const Pair& pair : pairs) sum.add(pair.a.compare(pair.b, Pose::Identity()));
-  return sum.mean();
-}
+std::optional<Pose> no_motion(const RegisteredMotion& /*motion*/) { return Pose::Identity(); }
 
-/// A changed convention, and the options that select it.
-struct Change {
-  std::string meaning;
-  std::string option;
-  PoseConvention convention;
-};
-
-/// Appends a copy of each of `changes` that is also changed by `edit`.
-template <class Edit>
-void add_change(std::vector<Change>& changes, const std::string& meaning, const std::string& option,
-                Edit&& edit) {
-  const std::size_t count = changes.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    Change change = changes[i];
-    change.meaning += (change.meaning.empty() ? "" : ", and ") + meaning;
-    change.option += (change.option.empty() ? "" : " ") + option;
-    edit(change.convention);
-    changes.push_back(std::move(change));
-  }
-}
-
-/// Appends copies of `changes` in millimetres, then copies in centimetres.
-void add_units(std::vector<Change>& changes) {
-  struct Unit {
-    const char* name;
-    const char* flag;
-    double metres;
+/// The turns of a motion without its ways.
+BodyMotion turns_of(const BodyMotion& motion) {
+  return [motion](const RegisteredMotion& pair) {
+    auto T = motion(pair);
+    if (T) T->translation().setZero();
+    return T;
   };
-  const std::vector<Change> before = changes;
-  for (const Unit& unit : {Unit{"millimetres", "mm", 0.001}, Unit{"centimetres", "cm", 0.01}}) {
-    std::vector<Change> changed = before;
-    add_change(changed, std::string("translations are in ") + unit.name,
-               std::string("--pose-units ") + unit.flag,
-               [&](PoseConvention& c) { c.unit = unit.metres; });
-    changes.insert(changes.end(), changed.begin() + static_cast<std::ptrdiff_t>(before.size()),
-                   changed.end());
-  }
 }
 
-/// A shift is not combined with other changes: its effect is small.
-void add_shifts(std::vector<Change>& changes, const PoseConvention& given) {
-  for (const int shift : {1, -1, 2, -2}) {
-    Change change{
-        std::abs(shift) == 1 ? "the poses are off by one scan" : "the poses are off by two scans",
-        "--pose-shift " + std::to_string(given.shift + shift), given};
-    change.convention.shift = given.shift + shift;
-    changes.push_back(std::move(change));
-  }
-}
-
-/// All combinations of common mistakes, except options that were given.
-std::vector<Change> usual_mistakes(const Recording& recording) {
-  const PoseConvention& given = recording.convention();
-  std::vector<Change> changes = {{"", "", given}};
-  if (!given.invert) {
-    add_change(changes, "the poses are inverse (from the world to the sensor)", "--invert-poses",
-               [](PoseConvention& c) { c.invert = true; });
-  }
-  if (recording.has_quaternions() && given.quaternion == QuaternionOrder::kNone) {
-    const bool to_wxyz = recording.quaternion_order() == QuaternionOrder::kXyzw;
-    add_change(
-        changes,
-        to_wxyz ? "quaternions are in the order w x y z" : "quaternions are in the order x y z w",
-        to_wxyz ? "--quaternion-order wxyz" : "--quaternion-order xyzw",
-        [to_wxyz](PoseConvention& c) {
-          c.quaternion = to_wxyz ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
-        });
-  }
-  if (!given.left_handed) {
-    add_change(changes, "the poses are left-handed", "--left-handed-poses",
-               [](PoseConvention& c) { c.left_handed = true; });
-  }
-  if (given.frame == PoseFrame::kAuto) {
-    const bool is_camera = recording.has_calibration() && !recording.has_quaternions();
-    if (is_camera) {
-      add_change(changes, "the poses are those of the lidar, not of the camera",
-                 "--pose-frame lidar", [](PoseConvention& c) { c.frame = PoseFrame::kLidar; });
-    } else {
-      add_change(changes, "the poses are those of a camera", "--pose-frame camera",
-                 [](PoseConvention& c) { c.frame = PoseFrame::kCamera; });
-    }
-  }
-  if (given.unit == 1.0) add_units(changes);
-  changes.erase(changes.begin());  // no change at all
-  add_shifts(changes, given);
-  std::stable_sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
-    const auto flags = [](const Change& c) {
-      return std::count(c.option.begin(), c.option.end(), '-');
-    };
-    return flags(a) < flags(b);
-  });
-  return changes;
-}
-
-PoseVerdict judge(const Recording& recording, const Diagnosis& d) {
-  if (d.as_given.points < 200) return PoseVerdict::kUnknown;
-  const bool given_fits = fits(d.as_given, d.standing);
-  if (recording.frame() == PointFrame::kWorld) {
-    return given_fits ? PoseVerdict::kWorldFrame : PoseVerdict::kDisagree;
-  }
-  const Agreement* best = d.readings.empty() ? &d.as_given : &d.readings.front().agreement;
-  if (is_clearly_better(*best, d.as_given) && fits(*best, d.standing) &&
-      is_clearly_better(*best, d.standing)) {
-    return PoseVerdict::kOtherwise;
-  }
-  if (given_fits && !is_clearly_better(d.standing, d.as_given)) {
-    return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
-  }
-  return PoseVerdict::kDisagree;
-}
-
-/// Whether no other reading of the poses is clearly better.
-bool is_best(const Diagnosis& d) {
-  return is_passable(d.as_given, d.standing) &&
-         (d.readings.empty() || !is_clearly_better(d.readings.front().agreement, d.as_given));
-}
-
-/// Computes the agreement of `pairs` under the poses and under common mistakes.
-void compare(const Recording& recording, const std::vector<Pair>& pairs, std::size_t stride,
-             Diagnosis& d) {
-  d.stride = stride;
-  d.standing = standing_agreement(pairs);
-  d.as_given = agreement_under(recording.convention(), recording, pairs);
-  if (recording.frame() == PointFrame::kSensor) {
-    const std::vector<Change> changes = usual_mistakes(recording);
-    d.readings = in_two_threads(changes.size(), [&](std::size_t i) {
-      const Change& change = changes[i];
-      Agreement agreement = agreement_under(change.convention, recording, pairs, kFewPoints);
-      if (agreement.gap < kHopeless * d.as_given.gap ||
-          agreement.gap < kHopeless * d.standing.gap) {
-        agreement = agreement_under(change.convention, recording, pairs);
-      }
-      return PoseReading{change.meaning, change.option, change.convention, agreement};
-    });
-    // A reading with fewer changes stays first unless another one is clearly better.
-    for (std::size_t i = 1; i < d.readings.size(); ++i) {
-      if (is_clearly_better(d.readings[i].agreement, d.readings.front().agreement)) {
-        std::rotate(d.readings.begin(), d.readings.begin() + static_cast<std::ptrdiff_t>(i),
-                    d.readings.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      }
-    }
-  }
-  d.verdict = judge(recording, d);
-}
-
-/// Gaps of a pair under shifted poses; nothing if a pose is missing.
-std::optional<ShiftedGaps> shifted_gaps(const Recording& recording, const Pair& pair) {
-  ShiftedGaps gaps{};
-  PoseConvention convention = recording.convention();
-  convention.shift -= kFarthestShift;
-  for (double& gap : gaps) {
-    const auto T_a_b = motion_under(recording, convention, pair.first, pair.second);
-    if (!T_a_b) return std::nullopt;
-    gap = pair.a.compare(pair.b, *T_a_b).gap;
-    ++convention.shift;
-  }
-  return gaps;
-}
-
-/// Looks for poses that are shifted by one or two scans: that changes the agreement little, so it
-/// takes more pairs.
-void look_for_shift(const Recording& recording, ScanSample& sample, Diagnosis& d) {
-  constexpr std::size_t kManyPairs = 24;
-  const auto margin = static_cast<std::size_t>(kFarthestShift);
-  if (recording.size() < kLeastShiftPairs + kStride + 2 * margin) return;
-  const std::vector<Pair> pairs =
-      sample.pairs(margin, recording.size() - 1 - margin, kStride, kManyPairs);
-  const auto of_pairs = in_two_threads(
-      pairs.size(), [&](std::size_t k) { return shifted_gaps(recording, pairs[k]); });
-  std::vector<ShiftedGaps> gaps;
-  for (const auto& of_pair : of_pairs) {
-    if (of_pair) gaps.push_back(*of_pair);
-  }
-  const int shift = best_shift(gaps);
-  if (shift == 0) return;
-  // All readings that are shown come from the same pairs.
-  compare(recording, pairs, kStride, d);
-  const auto found = std::find_if(d.readings.begin(), d.readings.end(), [&](const PoseReading& r) {
-    return r.convention.shift == recording.convention().shift + shift;
-  });
-  std::rotate(d.readings.begin(), found, found + 1);
-  d.verdict = PoseVerdict::kOtherwise;
-}
-
-void describe_motion(const Recording& recording, Diagnosis& d) {
-  std::vector<double> periods;
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < recording.size(); ++i) {
-    periods.push_back(recording.time(i) - recording.time(i - 1));
-    steps.push_back(
-        (recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation())
-            .norm());
-  }
-  d.period = median(periods);
-  d.step = median(steps);
-  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+BodyMotion given_motion(const Recording& recording) {
+  return motion_under(recording, Reading{recording.convention(), recording.time_offset(), 0});
 }
 
 struct SampledPairs {
-  std::vector<Pair> pairs;  // (i, i + stride)
+  Pairs pairs;  // (i, i + stride)
   std::size_t stride = 0;
 };
 
-/// Pairs of neighbours if these do not agree without motion. Else the stride increases until pairs
-/// do not: scans farther apart show more of the motion of a slow sensor.
-SampledPairs sample_pairs(const Recording& recording, ScanSample& sample) {
+/// Pairs of neighbours if these do not agree without motion, or if the sensor moves or turns so
+/// fast that scans farther apart see other places. Else the stride increases until pairs do not
+/// agree: scans farther apart show more of the motion of a slow sensor.
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double step,
+                          double turn) {
+  constexpr std::size_t kPairs = 8;
+  constexpr std::size_t kStride = 5;       // scans
+  constexpr double kFast = 2.0;            // m from scan to scan
+  constexpr double kTurning = 0.1;         // rad from scan to scan
   constexpr double kFastAgreement = 0.35;  // of neighbours
   const std::size_t scans = recording.size();
   if (scans < 2) return {};
+  const SampledPairs neighbours{sample.pairs(0, scans - 1, 1, kPairs), 1};
+  if (step > kFast || turn > kTurning || scans < 2 * kStride ||
+      agreement_under(no_motion, neighbours.pairs).share < kFastAgreement) {
+    return neighbours;
+  }
   SampledPairs result;
   for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
     result = {sample.pairs(0, scans - 1, stride, kPairs), stride};
-    if (standing_agreement(result.pairs).share < kLeastAgreement) break;
+    if (agreement_under(no_motion, result.pairs).share < kLeastAgreement) break;
   }
-  if (result.stride > kStride) return result;
-  // With the first scans of the pairs above.
-  const std::size_t last = result.pairs.empty() ? scans - 1 : scans - kStride;
-  SampledPairs neighbours{sample.pairs(0, last, 1, kPairs), 1};
-  const bool is_fast = standing_agreement(neighbours.pairs).share < kFastAgreement;
-  return is_fast || result.pairs.empty() ? neighbours : result;
+  return result;
 }
 
-/// Judges by the agreement of scans. Returns whether more pairs may show shifted poses.
-bool judge_agreement(const Recording& recording, ScanSample& sample, Diagnosis& d) {
-  const SampledPairs sampled = sample_pairs(recording, sample);
-  if (recording.size() == 1) sample.read({0});
-  sample.describe(d);
-  compare(recording, sampled.pairs, sampled.stride, d);
-  if (d.verdict == PoseVerdict::kDisagree && sampled.stride > 1 && d.step > kFast) {
-    // Fast and with few objects in sight, as on a motorway: such pairs may have only traffic in
-    // common, while neighbouring scans overlap.
-    Diagnosis near_by = d;
-    compare(recording, sample.pairs(0, recording.size() - 1, 1, kPairs), 1, near_by);
-    if (near_by.verdict == PoseVerdict::kDisagree && is_best(near_by)) {
-      near_by.verdict = PoseVerdict::kNoMotion;
+/// Sets the members of `d` that describe the motion. Returns the median turn from scan to scan,
+/// rad.
+double describe_motion(const Recording& recording, Diagnosis& d) {
+  std::vector<double> periods, steps, turns;
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    const Pose T = motion_between(recording, i - 1, i);
+    periods.push_back(recording.time(i) - recording.time(i - 1));
+    steps.push_back(T.translation().norm());
+    turns.push_back(angle_of(T.linear()));
+  }
+  if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
+  d.period = median(std::move(periods));
+  d.step = median(std::move(steps));
+  return median(std::move(turns));
+}
+
+/// Largest distance of which all coordinates of an axis are multiples, m; 0 if they are finer than
+/// a tenth of the way from scan to scan.
+double coarse_step(const std::vector<Pose>& poses) {
+  constexpr double kNear = 0.01;  // of a step
+  constexpr std::size_t kFewest = 5;
+  double coarsest = 0.0;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> values, differences;
+    for (const Pose& T : poses) values.push_back(T.translation()[axis]);
+    std::sort(values.begin(), values.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+    if (values.size() < kFewest) continue;
+    double step = kNever;
+    for (std::size_t i = 1; i < values.size(); ++i)
+      step = std::min(step, values[i] - values[i - 1]);
+    const bool is_grid = std::all_of(values.begin(), values.end(), [&](double value) {
+      const double steps = (value - values[0]) / step;
+      return std::abs(steps - std::round(steps)) < kNear;
+    });
+    const double way = (values.back() - values[0]) / static_cast<double>(poses.size());
+    if (is_grid && step > 0.1 * way) coarsest = std::max(coarsest, step);
+  }
+  return coarsest;
+}
+
+PoseFlaws flaws_of(const Recording& recording) {
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < recording.size(); ++i) poses.push_back(recording.T_world_sensor(i));
+  const bool are_equal = std::all_of(poses.begin(), poses.end(), [&](const Pose& T) {
+    return T.linear().isApprox(poses[0].linear(), 1e-9);
+  });
+  return {are_equal, coarse_step(poses)};
+}
+
+/// Whether poses and scans do not move alike at a fourth of the pairs between which one of them
+/// moves, as with poses that stand, those of another recording, or points of the world.
+bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion& given) {
+  constexpr double kMoving = 0.3;  // m at points 10 m away
+  constexpr double kMost = 0.7;    // ratio
+  constexpr double kArm = 10.0;    // m
+  std::size_t moving = 0, missed = 0;
+  for (const RegisteredMotion& motion : motions) {
+    const auto T = given(motion);
+    if (!T) continue;
+    const double by_poses = extent_of(*T, kArm);
+    const double by_scans = extent_of(motion.T_first_second, kArm);
+    if (!(std::max(by_poses, by_scans) > kMoving)) continue;
+    ++moving;
+    missed += error_at_points({motion}, given) > kMost * std::min(by_poses, by_scans) ? 1 : 0;
+  }
+  return 4 * missed > moving;
+}
+
+/// What scans show: landmarks of pairs, and registered motions.
+struct Evidence {
+  const Recording& recording;
+  Pairs pairs;
+  std::vector<RegisteredMotion> motions;
+  Agreement as_given, standing;
+
+  bool has_motions() const {
+    const auto is_step = [](const RegisteredMotion& m) { return m.second == m.first + 1; };
+    const auto steps = std::count_if(motions.begin(), motions.end(), is_step);
+    return motions.size() >= kFewestMotions && steps >= std::ptrdiff_t{kFewestPairs};
+  }
+  /// What can be compared under a motion that lacks poses for some scans, as those of shifted
+  /// poses at the ends of a recording.
+  Evidence where_known(const BodyMotion& motion) const {
+    Evidence known{recording, {}, {}, as_given, standing};
+    for (const Pair& pair : pairs) {
+      if (motion(motion_of_pair(pair))) known.pairs.push_back(pair);
     }
-    if (near_by.sound()) {
-      d = std::move(near_by);
-      return false;
+    for (const RegisteredMotion& one : motions) {
+      if (motion(one)) known.motions.push_back(one);
     }
+    if (known.pairs.size() < pairs.size()) {
+      known.as_given = agreement_under(given_motion(recording), known.pairs);
+      known.standing = agreement_under(no_motion, known.pairs);
+    }
+    return known;
   }
-  return d.verdict == PoseVerdict::kAgree;
+  /// The misfit (m) of a reading, by registered motions. Infinite if it explains no more than no
+  /// motion, or too few of the motions, if its unit or scale explains no more than turns alone, or
+  /// if landmarks meet better under the given poses.
+  double misfit_of_motions(const Reading& reading) const {
+    const BodyMotion motion = motion_under(recording, reading);
+    const Evidence known = where_known(motion);
+    const double error = error_at_points(known.motions, motion);
+    const bool is_explained =
+        2 * known.motions.size() > motions.size() &&
+        error < std::min(kRough, 0.5 * error_at_points(known.motions, no_motion)) &&
+        !miss_motion(known.motions, motion) &&
+        (!changes_ways(reading) ||
+         is_much_smaller(error, error_at_points(known.motions, turns_of(motion))));
+    const bool is_as_good = agreement_under(motion, known.pairs).gap <= known.as_given.gap;
+    return is_explained && is_as_good ? error : kNever;
+  }
+  /// The gap (m) under a reading, likewise.
+  double misfit_of_landmarks(const Reading& reading) const {
+    const BodyMotion motion = motion_under(recording, reading);
+    const Evidence known = where_known(motion);
+    const Agreement agreement = agreement_under(motion, known.pairs);
+    const bool is_explained =
+        fits(agreement, known.standing) && is_clearly_better(agreement, known.standing) &&
+        is_clearly_better(agreement, known.as_given) &&
+        (!changes_ways(reading) ||
+         is_clearly_better(agreement, agreement_under(turns_of(motion), known.pairs)));
+    return is_explained ? agreement.gap : kNever;
+  }
+
+ private:
+  bool changes_ways(const Reading& reading) const {
+    const PoseConvention& given = recording.convention();
+    return reading.convention.unit != given.unit || reading.convention.scale != given.scale;
+  }
+};
+
+/// The reading with the least misfit; a more complex one must be clearly better. Empty if none is
+/// clearly better than the given one, whose misfit is `as_given`.
+std::optional<Reading> best_reading(const std::vector<Reading>& readings, double as_given,
+                                    const std::function<double(const Reading&)>& misfit_of,
+                                    const std::function<bool(double, double)>& is_better) {
+  const std::vector<double> misfits =
+      in_two_threads(readings.size(), [&](std::size_t i) { return misfit_of(readings[i]); });
+  std::optional<Reading> best;
+  double least = as_given;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const bool is_as_simple = best && best->complexity == readings[i].complexity;
+    if (!(is_as_simple ? misfits[i] < least : is_better(misfits[i], least))) continue;
+    best = readings[i];
+    least = misfits[i];
+  }
+  return best;
 }
 
-/// Agreement of a few pairs (i, i + stride) of the scans `first` to `last`.
-PoseAgreement agreement_at(const Recording& recording, std::size_t first, std::size_t last,
-                           std::size_t stride) {
-  constexpr std::size_t kFewPairs = 4;
-  ScanSample sample(recording);
-  const std::vector<Pair> pairs = sample.pairs(first, last, stride, kFewPairs);
-  AgreementSum as_given;
-  for (const Pair& pair : pairs) {
-    as_given.add(pair.a.compare(pair.b, recording.T_world_sensor(pair.first).inverse() *
-                                            recording.T_world_sensor(pair.second)));
-  }
-  return {as_given.mean(), standing_agreement(pairs), stride};
+void propose(const Reading& reading, Diagnosis& d) {
+  d.verdict = PoseVerdict::kOtherwise;
+  d.proposal.convention = reading.convention;
+  d.proposal.time_offset = reading.time_offset;
 }
 
-constexpr const char* kWorldOption = "--frame world";
-
-/// Whether no point of a scan lies around the origin of the clouds, but most lie around the
-/// position of the sensor in the world.
-bool seems_in_world(const Recording& recording) {
-  constexpr double kNear = 40.0, kAround = 80.0;  // m
-  if (recording.frame() != PointFrame::kSensor || recording.size() == 0) return false;
-  const std::size_t middle = recording.size() / 2;
-  const RecordedScan scan = recording.read_scan(middle);
-  const Eigen::Vector3d position = recording.T_world_sensor(middle).translation();
-  std::size_t valid = 0, near_sensor = 0, near_origin = 0;
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const Eigen::Vector3d p = scan.point(i).position;
-    if (!p.allFinite() || p.isZero(0.0)) continue;
-    ++valid;
-    if ((p - position).norm() < kAround) ++near_sensor;
-    if (p.norm() < kNear) ++near_origin;
+/// Whether errors from one scan to the next exceed those that exact poses leave: by the noise of
+/// the registration, and by the motion within de-skewed scans, which is taken as even between two
+/// poses. If a sensor sways, the middle of a scan is off by an eighth of the change of motion, and
+/// that of the next scan by as much to the other side.
+bool is_inexact(const Recording& recording, const MotionError& steps) {
+  constexpr double kUneven = 0.25;
+  double translation = std::max(kInexactTranslation, 3.0 * steps.translation_noise);
+  double rotation = std::max(kInexactRotation, 3.0 * steps.rotation_noise);
+  if (recording.is_deskewed()) {
+    std::vector<double> translations, rotations;
+    for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
+      const Pose change =
+          motion_between(recording, i - 1, i).inverse() * motion_between(recording, i, i + 1);
+      translations.push_back(change.translation().norm());
+      rotations.push_back(angle_of(change.linear()));
+    }
+    translation = std::max(translation, kUneven * median(std::move(translations)));
+    rotation = std::max(rotation, kUneven * median(std::move(rotations)));
   }
-  return near_origin == 0 && valid > 0 && 2 * near_sensor > valid;
+  return steps.translation > translation || steps.rotation > rotation;
 }
 
-constexpr const char* kDeskewOption = "--deskew";
+/// By landmarks alone.
+PoseVerdict verdict_of_agreement(const Evidence& evidence) {
+  const Agreement &given = evidence.as_given, &standing = evidence.standing;
+  if (!fits(given, standing) || is_clearly_better(standing, given)) return PoseVerdict::kDisagree;
+  return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+}
 
-/// Diagnosis of the poses, without that of the rays.
-Diagnosis diagnose_poses(const Recording& recording) {
+void judge_by_landmarks(const Evidence& evidence, Diagnosis& d) {
+  const auto reading = best_reading(
+      usual_readings(evidence.recording), evidence.as_given.gap,
+      [&](const Reading& r) { return evidence.misfit_of_landmarks(r); },
+      [](double a, double b) {
+        return is_clearly_better({0.0, a, 0}, {0.0, b, 0});
+      });
+  if (reading) return propose(*reading, d);
+  d.verdict = verdict_of_agreement(evidence);
+  // Few objects in sight, as on a motorway, or few points: nothing explains scans clearly better.
+  constexpr double kPassable = 0.4;  // share
+  const Agreement &given = evidence.as_given, &standing = evidence.standing;
+  const bool is_as_good =
+      d.stride == 1 ? !is_clearly_better(standing, given) : given.gap < standing.gap;
+  if (d.verdict == PoseVerdict::kDisagree && given.share >= kPassable && is_as_good) {
+    d.verdict = PoseVerdict::kNoMotion;
+  }
+}
+
+void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
+  const Recording& recording = evidence.recording;
+  const std::vector<RegisteredMotion>& motions = evidence.motions;
+  const BodyMotion given = given_motion(recording);
+  const MotionError all = motion_error(motions, given);
+  const MotionError steps = motion_error(motions, given, Pose::Identity(), true);
+  d.translation_error = steps.translation;
+  d.rotation_error = steps.rotation;
+  d.registered_pairs = steps.pairs;
+  const bool is_exact = all.at_points < std::max(kExact, 2.0 * all.noise);
+  if (!is_exact) d.flaws = flaws_of(recording);
+  const bool is_flawed = d.flaws.has_equal_orientations || d.flaws.step > 0.0;
+  if (all.at_points > kExact && !is_flawed) {
+    std::vector<Reading> readings = usual_readings(recording);
+    if (!is_exact) {
+      for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);
+    }
+    const auto reading = best_reading(
+        readings, all.at_points, [&](const Reading& r) { return evidence.misfit_of_motions(r); },
+        is_much_smaller);
+    if (reading) return propose(*reading, d);
+  }
+  d.verdict = verdict_of_agreement(evidence);
+  if (all.at_points > kRough || miss_motion(motions, given)) {
+    d.verdict = PoseVerdict::kDisagree;
+  } else if (is_exact) {
+    if (d.verdict == PoseVerdict::kDisagree) d.verdict = PoseVerdict::kAgree;
+  } else if (d.verdict == PoseVerdict::kDisagree || is_inexact(recording, steps)) {
+    d.verdict = PoseVerdict::kInexact;
+  }
+  const bool is_uncertain = d.translation_error > kInexactTranslation ||
+                            d.rotation_error > kInexactRotation;  // as their noise is large, too
+  if (d.verdict != PoseVerdict::kInexact && d.verdict != PoseVerdict::kDisagree && is_uncertain) {
+    d.registered_pairs = 0;
+  }
+}
+
+/// The diagnosis under the options that `recording` has.
+Diagnosis diagnose_as_opened(const Recording& recording) {
   Diagnosis d;
   d.scan_files = recording.scan_file_count();
   d.pose_rows = recording.pose_count();
   d.scans = recording.size();
-  d.time_offset = recording.time_offset();
-  describe_motion(recording, d);
+  d.proposal = recording.options();
+  const double turn = describe_motion(recording, d);
   ScanSample sample(recording);
-  const bool may_be_shifted = judge_agreement(recording, sample, d);
-  if (d.verdict == PoseVerdict::kUnknown && seems_in_world(recording)) {
-    d.verdict = PoseVerdict::kDisagree;
-    d.option = kWorldOption;
+  const SampledPairs sampled = sample_pairs(recording, sample, d.step, turn);
+  if (recording.size() == 1) sample.read({0});
+  sample.describe(d);
+  d.stride = sampled.stride;
+  d.as_given = agreement_under(given_motion(recording), sampled.pairs);
+  d.standing = agreement_under(no_motion, sampled.pairs);
+  if (d.as_given.points < kFewestCompared) return d;
+  Evidence evidence{recording, sampled.pairs, {}, d.as_given, d.standing};
+  if (recording.frame() == PointFrame::kWorld) {
+    constexpr double kTellingWay = 5.0;  // m
+    d.verdict = follow_sensor(recording, kTellingWay).value_or(true)
+                    ? verdict_of_agreement(evidence)
+                    : PoseVerdict::kDisagree;
     return d;
   }
-  if (!accept_proven_poses(recording, d)) {
-    if (may_be_shifted) look_for_shift(recording, sample, d);
-    compare_with_registration(recording, d);
+  evidence.motions = register_motions(recording);
+  if (evidence.has_motions()) {
+    judge_by_motions(evidence, d);
+  } else {
+    judge_by_landmarks(evidence, d);
   }
-  if (!d.sound()) return d;
-  d.lost_scans = find_lost_clouds(recording);
-  if (d.lost_scans) d.verdict = PoseVerdict::kLostScans;
   return d;
-}
-
-/// Whether scans that do not agree as they are would agree if their points were de-skewed.
-bool would_agree_deskewed(const Recording& recording, const Diagnosis& d) {
-  const bool is_doubted =
-      d.verdict == PoseVerdict::kOtherwise || d.verdict == PoseVerdict::kBodyFrame ||
-      d.verdict == PoseVerdict::kTimeOffset || d.verdict == PoseVerdict::kScaled ||
-      d.verdict == PoseVerdict::kInexact || d.verdict == PoseVerdict::kDisagree;
-  const bool may_be_skewed = recording.columns().time && !recording.is_deskewed() &&
-                             recording.frame() == PointFrame::kSensor;
-  if (!is_doubted || !may_be_skewed) return false;
-  RecordingOptions options = recording.options();
-  options.deskew = true;
-  try {
-    const Recording deskewed(recording.folder(), options);
-    return diagnose_poses(deskewed).verdict == PoseVerdict::kAgree;
-  } catch (const IoError&) {
-    return false;  // the times of its points cannot be used
-  }
 }
 
 }  // namespace
 
 Diagnosis diagnose(const Recording& recording) {
-  Diagnosis d = diagnose_poses(recording);
-  if (would_agree_deskewed(recording, d)) {
-    d.verdict = PoseVerdict::kSkewed;
-    d.convention = recording.convention();
-    d.time_offset = recording.time_offset();
-    d.option = kDeskewOption;
-    return d;
-  }
-  if (d.verdict != PoseVerdict::kUnknown && recording.is_deskewed()) {
-    d.point_times = text_of(best_reading(point_times_gaps(recording, 0, recording.size() - 1)));
-    if (!d.point_times.empty()) {
-      d.verdict = PoseVerdict::kPointTimes;
-      d.option.clear();
-      return d;
+  Diagnosis d = diagnose_as_opened(recording);
+  const bool agrees = d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
+  if (agrees && !has_wrong_origin(recording)) return d;
+  for (const RecordingOptions& options : other_options(recording)) {
+    try {
+      const Recording other(recording.folder(), options);
+      if (diagnose_as_opened(other).verdict != PoseVerdict::kAgree) continue;
+    } catch (const IoError&) {
+      continue;  // it cannot be opened in this way
     }
-  }
-  if (d.sound() && d.scans > 0) d.ray_origin = find_ray_origin(recording, 0, d.scans - 1);
-  if (d.ray_origin) {
-    d.verdict = PoseVerdict::kRayOrigin;
-    d.option = option_for(*d.ray_origin);
+    d.verdict = PoseVerdict::kOtherwise;
+    d.proposal = options;
+    break;
   }
   return d;
-}
-
-PoseAgreement pose_agreement(const Recording& recording, std::size_t first, std::size_t last) {
-  const std::size_t stride = std::min(kStride, last - first);
-  if (stride == 0) return {};
-  const PoseAgreement agreement = agreement_at(recording, first, last, stride);
-  const double way = (recording.T_world_sensor(first + stride).translation() -
-                      recording.T_world_sensor(first).translation())
-                         .norm();
-  const bool is_fast = way > kFast * static_cast<double>(stride);
-  if (!agreement.doubtful() || stride == 1 || !is_fast) return agreement;
-  // As in diagnose(): neighbouring scans overlap more.
-  const PoseAgreement of_neighbours = agreement_at(recording, first, last, 1);
-  return of_neighbours.doubtful() ? agreement : of_neighbours;
-}
-
-namespace {
-
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;
-
-std::string fixed(double value, int digits) {
-  std::ostringstream text;
-  text::exact(text);
-  text << std::fixed << std::setprecision(digits) << value;
-  return text.str();
-}
-
-/// "12 cm and 0.3 deg from one scan to the next".
-std::string error_text(double translation, double rotation) {
-  return fixed(100.0 * translation, 0) + " cm and " + fixed(kDegrees * rotation, 1) +
-         " deg from one scan to the next";
-}
-
-std::string error_text(const Diagnosis& d) {
-  return error_text(d.translation_error, d.rotation_error);
-}
-
-std::string body_text(const Pose& T_body_sensor) {
-  constexpr double kUpright = 0.98;
-  const Eigen::AngleAxisd rotation(detail::Quaternion(T_body_sensor.linear()));
-  const Eigen::Vector3d t = T_body_sensor.translation();
-  std::string text;
-  if (std::abs(rotation.angle()) > 1e-6) {
-    const Eigen::Vector3d& axis = rotation.axis();
-    const bool is_yaw = std::abs(axis.z()) > kUpright;
-    const double degrees = kDegrees * rotation.angle() * (is_yaw && axis.z() < 0.0 ? -1.0 : 1.0);
-    text = std::string(is_yaw ? "is yawed by " : "is turned by ") + fixed(degrees, 1) + " deg";
-  }
-  if (t.norm() > 0.0) {
-    text += std::string(text.empty() ? "" : " and ") + "lies at (" + fixed(t.x(), 2) + ' ' +
-            fixed(t.y(), 2) + ' ' + fixed(t.z(), 2) + ") m";
-  }
-  return text;
-}
-
-}  // namespace
-
-std::string advice(const Diagnosis& d) {
-  // Without a known mounting, an option for it may be needed.
-  const std::string end = d.mounting.known ? "; no option is needed." : ".";
-  switch (d.verdict) {
-    case PoseVerdict::kAgree:
-      return "Scans and poses agree as they are" + end;
-    case PoseVerdict::kOtherwise:
-      return (fits(d.as_given, d.standing) ? "Scans agree better if " : "Scans agree if ") +
-             d.readings.front().meaning + ": pass " + d.readings.front().option + ".";
-    case PoseVerdict::kBodyFrame:
-      return "Scans agree if the poses are those of a body, such as an IMU or a vehicle, in which "
-             "the "
-             "lidar " +
-             body_text(d.convention.T_body_sensor) +
-             " (parts that the drive does not determine are 0): pass " + d.option + ".";
-    case PoseVerdict::kTimeOffset:
-      return "Scans agree better under the poses " + fixed(std::abs(d.time_offset), 3) + " s " +
-             (d.time_offset > 0.0 ? "after" : "before") + " their times: pass " + d.option + ".";
-    case PoseVerdict::kScaled:
-      return "Scans agree if all ways of the poses are " + fixed(d.convention.scale, 3) +
-             " times as long, as after an odometry with a wrong radius of wheels: pass " +
-             d.option + ".";
-    case PoseVerdict::kLostScans:
-      return std::string(d.lost_scans->shift > 0 ? "Clouds" : "Poses") +
-             " seem to be missing between the scans " + std::to_string(d.lost_scans->first) +
-             " and " + std::to_string(d.lost_scans->last) +
-             " (counted from 0): behind, scans agree with the poses " +
-             std::to_string(std::abs(d.lost_scans->shift)) + " rows " +
-             (d.lost_scans->shift > 0 ? "later" : "earlier") +
-             ". Give scans and poses times, or scans the numbers of their rows.";
-    case PoseVerdict::kInexact:
-      if (d.is_inexact_at_start) {
-        return "Scans and poses agree, but the poses of the first scans are inexact by about " +
-               error_text(d.start_translation_error, d.start_rotation_error) +
-               ", as those of an odometry that has not converged yet: expect losses there; run "
-               "--start leaves "
-               "them out.";
-      }
-      return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
-             ": expect losses; poses of a LiDAR odometry would do better.";
-    case PoseVerdict::kSkewed:
-      return std::string(
-                 "Scans agree if their points are moved to the place of the sensor at the time of "
-                 "the scan: pass ") +
-             kDeskewOption + ".";
-    case PoseVerdict::kPointTimes:
-      return "The times of points do not fit the motion: scans agree better " + d.point_times + '.';
-    case PoseVerdict::kRayOrigin:
-      return advice(*d.ray_origin);
-    case PoseVerdict::kNoMotion:
-      if (d.step * static_cast<double>(d.stride) > 1.0) {
-        return "Too little stands beside the way to tell what the poses mean; nothing speaks "
-               "against them.";
-      }
-      return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
-             "against them.";
-    case PoseVerdict::kDisagree:
-      if (d.option == kWorldOption) {
-        return std::string(
-                   "No point lies around the origin of the clouds, but most lie around the "
-                   "position of the sensor in the world: pass ") +
-               kWorldOption + '.';
-      }
-      if (d.standing.share >= kLeastAgreement && is_clearly_better(d.standing, d.as_given)) {
-        return "Scans agree best as if the sensor stood still, though the poses move: if the "
-               "points are in the frame of the world, pass --frame world; if the sensor did stand "
-               "still, the poses are wrong.";
-      }
-      return "Scans do not agree under these poses, nor under any usual mistake: they belong to "
-             "another recording or clock, or are far too inexact" +
-             (d.registered_pairs > 0 ? " (off by " + error_text(d) + ")." : std::string("."));
-    case PoseVerdict::kWorldFrame:
-      return "Points are in the frame of the world and agree there" + end;
-    case PoseVerdict::kUnknown:
-      return "There is too little to compare: at least two scans with walls, poles or trees within "
-             "40 m are needed.";
-  }
-  return {};
 }
 
 }  // namespace dynains

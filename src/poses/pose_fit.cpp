@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <utility>
 
-#include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
 #include "dynains/threads/background.hpp"
 #include "given_motion.hpp"
@@ -24,18 +22,15 @@ constexpr double kLever = 10.0;  // m, distance of the points at which a rotatio
 /// A scan, as planes and as landmarks.
 class ChainScan {
  public:
-  explicit ChainScan(PointBuffer points) : points_(std::move(points)), planes_(points_) {}
+  explicit ChainScan(const PointBuffer& points)
+      : planes_(points), landmarks_(points, mounting_of(points), kWayRange) {}
 
   const RegistrationScan& planes() const { return planes_; }
-  const Landmarks& landmarks() {
-    if (!landmarks_) landmarks_.emplace(points_, estimate_mounting(points_), kWayRange);
-    return *landmarks_;
-  }
+  const Landmarks& landmarks() const { return landmarks_; }
 
  private:
-  PointBuffer points_;
   RegistrationScan planes_;
-  std::optional<Landmarks> landmarks_;
+  Landmarks landmarks_;
 };
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
@@ -98,7 +93,8 @@ struct GuidedRegistration {
 
 /// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
 /// again.
-std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b, const Pose& T_a_b,
+std::optional<GuidedRegistration> register_along(const ChainScan& a, const ChainScan& b,
+                                                 const Pose& T_a_b,
                                                  const Eigen::Vector3d& direction,
                                                  double farthest) {
   constexpr double kDeviation = 0.04;  // m, of search_way()
@@ -114,8 +110,9 @@ std::optional<GuidedRegistration> register_along(ChainScan& a, ChainScan& b, con
 /// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
 /// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
 /// motion along it, or with the distant motion `given`: they can meet by oncoming traffic.
-std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registration& by_planes,
-                                      const Pose& given, double farthest) {
+std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
+                                      const Registration& by_planes, const Pose& given,
+                                      double farthest) {
   constexpr double kUncertain = 0.08;  // m; a narrow view tells less of other directions, too
   constexpr double kNear = 1.0;        // m
   constexpr double kDistant = 0.5;     // m
@@ -147,17 +144,24 @@ std::optional<CheckedMotion> complete(ChainScan& a, ChainScan& b, const Registra
                  best->way.deviation);
 }
 
-/// Registers b to a. Empty if the motion is uncertain.
-std::optional<CheckedMotion> register_both_ways(ChainScan& a, ChainScan& b, const Pose& given,
-                                                const std::vector<Pose>& guesses, double farthest) {
+/// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the
+/// `given` one: planes also meet that move with the sensor, as traffic, rails and the rings of
+/// beams do.
+std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainScan& b,
+                                                const Pose& given, const std::vector<Pose>& guesses,
+                                                double farthest) {
   constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
   constexpr double kUncertain = 0.06;  // m
-  const auto found = register_scans(a.planes(), b.planes(), guesses);
-  if (!found) return std::nullopt;
-  if (found->is_ambiguous || found->uncertainty > kOpen)
-    return complete(a, b, *found, given, farthest);
-  return checked(found, register_scans(b.planes(), a.planes(), {found->T_a_b.inverse()}),
-                 kUncertain, 0.0);
+  constexpr double kWorse = 1.02;      // ratio of gaps
+  const auto forth = register_scans(a.planes(), b.planes(), guesses);
+  if (!forth) return std::nullopt;
+  const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
+  const auto found =
+      is_open ? complete(a, b, *forth, given, farthest)
+              : checked(forth, register_scans(b.planes(), a.planes(), {forth->T_a_b.inverse()}),
+                        kUncertain, 0.0);
+  const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
+  return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
 }
 
 struct BothMotions {
@@ -236,25 +240,13 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
   return rotations;
 }
 
-}  // namespace
-
-namespace {
-
-/// Scans at which chains begin: 0, 2 and 4, the others evenly spread. `scans`: at least 2.
+/// Scans at which chains begin, evenly spread. `scans`: at least 2.
 std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   constexpr std::size_t kChains = 12;
-  constexpr std::size_t kAtStart = kStartScans / 2;
   std::vector<std::size_t> starts;
-  if (scans - 1 <= kChains) {
-    starts.resize(scans - 1);
-    std::iota(starts.begin(), starts.end(), std::size_t{0});
-    return starts;
-  }
-  for (std::size_t k = 0; k < kAtStart; ++k) starts.push_back(2 * k);
-  constexpr std::size_t kLast = kChains - kAtStart;
-  for (std::size_t k = 1; k <= kLast; ++k) {
-    const std::size_t start = k * (scans - 2) / kLast;
-    if (start > starts.back()) starts.push_back(start);
+  const std::size_t count = std::min(kChains, scans - 1);
+  for (std::size_t k = 0; k < count; ++k) {
+    starts.push_back(count == 1 ? 0 : k * (scans - 2) / (count - 1));
   }
   return starts;
 }
@@ -275,18 +267,17 @@ class Chain {
         kFarthestStep);
   }
 
-  /// Registers scans farther away, from the motion found before.
+  /// Registers scans ever farther away, from the motion found before.
   void finish() {
-    constexpr std::size_t kLongest = 16;        // scans
-    constexpr std::size_t kLongEnough = 4;      // scans
+    constexpr std::size_t kLongest = 9;         // scans
     constexpr double kFar = 3.0;                // m
     constexpr double kFarthestFromGuess = 1.5;  // m
     constexpr double kTurned = 0.25;            // rad
-    for (std::size_t step = 2; step <= kLongest && !motions_.empty(); step *= 2) {
-      const Pose& T = motions_.back().T_first_second;
-      const bool is_far = T.translation().norm() > kFar && step > kLongEnough;
-      if (is_far || angle_of(T.linear()) > kTurned || first_ + step >= recording_->size()) break;
-      const Pose guess = T * T;
+    for (std::size_t step = 3; step <= kLongest && !motions_.empty(); step *= 3) {
+      const Pose T = motions_.back().T_first_second;
+      const bool is_far = T.translation().norm() > kFar || angle_of(T.linear()) > kTurned;
+      if (is_far || first_ + step >= recording_->size()) break;
+      const Pose guess = T * T * T;
       if (!add(step, {guess}, kFarthestFromGuess)) break;
       const Pose& found = motions_.back().T_first_second;
       if ((found.translation() - guess.translation()).norm() < kFarthestFromGuess) continue;
@@ -345,37 +336,6 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   return motions;
 }
 
-std::optional<Pose> motion_under(const Recording& recording, const PoseConvention& convention,
-                                 std::size_t first, std::size_t second) {
-  const auto T_world_a = recording.pose_under(convention, first);
-  const auto T_world_b = recording.pose_under(convention, second);
-  if (!T_world_a || !T_world_b) return std::nullopt;
-  return T_world_a->inverse() * *T_world_b;
-}
-
-BodyMotion motion_under(const Recording& recording, const PoseConvention& convention) {
-  return [&recording, convention](const RegisteredMotion& motion) {
-    return motion_under(recording, convention, motion.first, motion.second);
-  };
-}
-
-std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const Pose& given,
-                                              std::size_t first, std::size_t second) {
-  constexpr double kUncertain = 0.05;  // m
-  constexpr double kDistinct = 0.5;    // m
-  std::vector<Pose> guesses = {given};
-  // In traffic of the own speed, no motion may fit as well.
-  if (given.translation().norm() > kDistinct) guesses.push_back(Pose::Identity());
-  const RegistrationScan scan_a(a);
-  const RegistrationScan scan_b(b);
-  const auto forth = register_scans(scan_a, scan_b, guesses);
-  if (!forth) return std::nullopt;
-  const auto found =
-      checked(forth, register_scans(scan_b, scan_a, {forth->T_a_b.inverse()}), kUncertain, 0.0);
-  if (!found) return std::nullopt;
-  return RegisteredMotion{first, first, second, found->T_a_b, found->difference, 0.0};
-}
-
 namespace {
 
 /// Weights of the axes of residuals, at most 1, from the differences of both registrations.
@@ -394,13 +354,12 @@ Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
 }  // namespace
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Pose& T_body_sensor, Motions which) {
+                         const Pose& T_body_sensor, bool only_steps) {
   std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
   const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
     const bool is_step = motion.second == motion.first + 1;
-    if (which != Motions::kAll && !is_step) continue;
-    if (which == Motions::kFirstSteps && motion.second >= kStartScans) continue;
+    if (only_steps && !is_step) continue;
     const auto T_body = body(motion);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
@@ -423,26 +382,8 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
   return error;
 }
 
-bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                      const BodyMotion& other) {
-  constexpr std::size_t kFewest = 12;
-  constexpr double kMost =
-      0.7;  // share of the motions; by chance, 17 of 24 are better in 3 % of cases
-  const Vector6 weights = weights_of_axes(motions);
-  std::size_t better = 0;
-  std::size_t count = 0;
-  for (const RegisteredMotion& motion : motions) {
-    const auto T_body = body(motion);
-    const auto T_other = other(motion);
-    if (!T_body || !T_other) continue;
-    const auto error = [&](const Pose& T) {
-      const auto identity = Pose::Identity();
-      return residual(T, motion.T_first_second, identity).cwiseProduct(weights).norm();
-    };
-    if (error(*T_body) < error(*T_other)) ++better;
-    ++count;
-  }
-  return count >= kFewest && static_cast<double>(better) > kMost * static_cast<double>(count);
+double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body) {
+  return motion_error(motions, body).at_points;
 }
 
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

@@ -24,28 +24,14 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Scans at the start of a recording, where an odometry has not converged yet.
-inline constexpr std::size_t kStartScans = 6;
-
-/// Registers pairs of scans at some places of a recording, three of them among the first
-/// kStartScans, neighbours and scans farther apart, in the order of the recording. The given poses
-/// are one of several first guesses. Pairs that determine no motion are left out. Throws IoError.
+/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart, in the
+/// order of the recording. The given poses are one of several first guesses. Pairs that determine
+/// no motion are left out, and those whose landmarks meet better under the given poses. Throws
+/// IoError.
 std::vector<RegisteredMotion> register_motions(const Recording& recording);
-
-/// The motion at which a registration of two scans ends that begins at `given`; empty if it is not
-/// certain. `a`, `b`: finite points, m, of the scans `first` and `second`.
-std::optional<RegisteredMotion> register_from(PointsView a, PointsView b, const Pose& given,
-                                              std::size_t first, std::size_t second);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
-
-/// Motion of the sensor between two scans, T_first_second, under a reading of the poses; empty if
-/// one of both has no pose.
-std::optional<Pose> motion_under(const Recording& recording, const PoseConvention& convention,
-                                 std::size_t first, std::size_t second);
-/// Returns motion_under() as a function of registered motions. `recording` must outlive it.
-BodyMotion motion_under(const Recording& recording, const PoseConvention& convention);
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
@@ -60,17 +46,12 @@ struct MotionError {
   std::size_t pairs = 0;
 };
 
-enum class Motions { kAll, kSteps, kFirstSteps };  ///< steps: between neighbouring scans
-
-/// `T_body_sensor`: of the body that moves.
+/// `T_body_sensor`: of the body that moves. `only_steps`: between neighbouring scans alone.
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Pose& T_body_sensor, Motions which = Motions::kAll);
+                         const Pose& T_body_sensor = Pose::Identity(), bool only_steps = false);
 
-/// Whether most motions agree better with `body` than with `other`, each compared with itself:
-/// noise of the registration hides small differences of medians. False for fewer than 12 motions
-/// with both.
-bool is_mostly_better(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                      const BodyMotion& other);
+/// MotionError::at_points of all motions.
+double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body);
 
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.

@@ -11,8 +11,8 @@ namespace {
 void check(const RecordingFlags& flags) {
   const RecordingCheck check = check_recording(Recording(flags.folder(), flags.options()));
   std::cout << check.findings << check.advice << std::flush;
-  if (!check.diagnosis.option.empty()) {
-    std::cout << "    dynains run " << flags.as_given(check.diagnosis.option) << " --out OUT\n";
+  if (!check.flags.empty()) {
+    std::cout << "    dynains run " << flags.as_given(check.flags) << " --out OUT\n";
   }
   std::cout << check.remark << std::flush;
   if (!check.passed) throw Finding{};
@@ -27,12 +27,13 @@ void add_check_command(CLI::App& app) {
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
       "points, "
-      "height\nand tilt of the sensor, and whether scans agree under the poses or under the usual "
-      "mistakes. Registers\nneighbouring scans, for the error of the poses in cm and deg, the "
-      "extrinsic calibration and the offset of\nthe clocks. Exits with 1 if a file is cut off, if "
-      "the "
-      "poses need another option or fit under none, or if\nscans are too far apart to be "
-      "compared.");
+      "height\nand tilt of the sensor. Registers scans, and tells whether they agree with the "
+      "poses, "
+      "under which option\nthey would, and how inexact the poses are, in cm and deg. Exits with 1 "
+      "if a "
+      "file is cut off, if the poses\nneed another option or fit under none, or if scans are too "
+      "far "
+      "apart to be compared.");
   command.callback([flags] { check(*flags); });
 }
 

@@ -27,10 +27,8 @@ struct CheckedRecording {
 };
 
 const char* name_of(PoseVerdict verdict) {
-  constexpr std::array<const char*, 14> kNames{
-      "agree",       "otherwise",  "body frame",  "time offset", "scaled",
-      "lost scans",  "inexact",    "no motion",   "disagree",    "skewed",
-      "point times", "ray origin", "world frame", "unknown"};
+  constexpr std::array<const char*, 6> kNames{"agree",     "inexact",  "no motion",
+                                              "otherwise", "disagree", "unknown"};
   static_assert(static_cast<std::size_t>(PoseVerdict::kUnknown) + 1 == kNames.size());
   return kNames.at(static_cast<std::size_t>(verdict));
 }
@@ -57,7 +55,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
   result.check = shared->read(program::check_recording);
   result.path = shared->get().folder().string();
   result.options = shared->options().attr("copy")();
-  for (const auto& [name, value] : to_options(result.diagnosis().option)) {
+  for (const auto& [name, value] : to_options(result.check.flags)) {
     result.options[name] = value;
   }
   return result;
@@ -65,7 +63,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
 
 std::string represent(const CheckedRecording& checked) {
   std::string text = checked.check.findings + checked.check.advice;
-  if (!checked.diagnosis().option.empty()) {
+  if (!checked.check.flags.empty()) {
     text += "    dynains.Recording(" + py::repr(py::str(checked.path)).cast<std::string>();
     for (const auto& [name, value] : checked.options) {
       const py::object shown = py::hasattr(value, "__fspath__")
@@ -111,8 +109,8 @@ void bind_check(py::module_& module) {
           "The verdict in words, and what to do.");
   add(
       "verdict", [](const Diagnosis& d) { return name_of(d.verdict); },
-      "'agree', 'otherwise' (under another convention), 'body frame', 'time offset', 'inexact', "
-      "'no motion', 'disagree', 'world frame' or 'unknown'.");
+      "'agree', 'inexact', 'no motion', 'otherwise' (under other options), 'disagree' or "
+      "'unknown'.");
   add(
       "translation_error",
       [registered](const Diagnosis& d) { return registered(d, d.translation_error); },

@@ -13,8 +13,8 @@
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/poses/pose_jumps.hpp"
 #include "lone_scans.hpp"
+#include "pose_advice.hpp"
 
 namespace dynains::program {
 namespace {
@@ -67,10 +67,6 @@ void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::
         remark_on_mounting(recording, d.mounting)}) {
     if (remark) text << "note: " << *remark << '\n';
   }
-  if (recording.frame() != PointFrame::kSensor || recording.size() < 3) return;
-  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, recording.size() - 1);
-  if (jumps.empty()) return;
-  text << "note: " << sentence_on(recording, jumps) << '\n';
 }
 
 /// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
@@ -117,11 +113,6 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
   text << "\nscans " << d.stride << " apart, placed by\n";
   add_line(text, "  poses as given", to_text(d.as_given));
   add_line(text, "  no motion at all", to_text(d.standing));
-  constexpr std::size_t kShown = 3;
-  for (std::size_t i = 0; i < std::min(kShown, d.readings.size()); ++i) {
-    add_line(text, "  " + d.readings[i].option, "");
-    add_line(text, "", to_text(d.readings[i].agreement));
-  }
   text << '\n';
   add_remarks(text, d);
   add_findings_in_scans(recording, d, text);
@@ -141,7 +132,8 @@ RecordingCheck check_recording(const Recording& recording) {
     lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
   }
   check.passed = sound && !lone;
-  if (!lone || !sound) check.advice = advice(check.diagnosis) + '\n';
+  if (!lone || !sound) check.advice = advice(recording, check.diagnosis) + '\n';
+  check.flags = proposed_flags(recording, check.diagnosis.proposal);
   if (lone) check.remark = *lone + ".\n";
   return check;
 }

@@ -12,6 +12,7 @@ struct RecordingCheck {
   Diagnosis diagnosis;
   std::string findings;  ///< counts, units, sensor, motion, agreement, remarks; lines of text
   std::string advice;    ///< on the poses, a line; empty if only `remark` matters
+  std::string flags;     ///< of `dynains run` that the advice proposes; empty: none
   std::string remark;    ///< on scans that are too far apart, a line; empty: none
   bool passed = false;   ///< whether a run needs no other options
 };

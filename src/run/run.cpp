@@ -105,7 +105,7 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
 }
 
 RunDescription describe(const RunPlan& plan, const RunSettings& settings,
-                        const PoseAgreement& agreement, const RunResults& results) {
+                        const Agreement& agreement, const RunResults& results) {
   const Recording& sequence = plan.sequence;
   RunDescription description;
   description.sequence = settings.recording;
@@ -116,7 +116,7 @@ RunDescription describe(const RunPlan& plan, const RunSettings& settings,
       sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
   description.missing_poses = sequence.missing_pose_count();
   description.log_ends_early = sequence.early_end().has_value();
-  description.agreement = agreement.as_given;
+  description.agreement = agreement;
   description.preset = settings.preset;
   description.map = plan.outputs.map_name();
   description.configuration = plan.configuration;
@@ -192,12 +192,12 @@ void write_log(const LogOutput& log, const RunPlan& plan, const fs::path& folder
 }
 
 /// Throws ConfigError if the scans disagree with the poses. Returns the agreement.
-PoseAgreement check_before(const RunPlan& plan, const RunSettings& settings,
-                           const RunListener& listener) {
+Agreement check_before(const RunPlan& plan, const RunSettings& settings,
+                       const RunListener& listener) {
   check_ranges(plan.sequence, plan.range, plan.config,
                settings.recording_flags.contains("--point-units"));
-  const StartCheck start = check_start(plan.sequence, plan.range, plan.config,
-                                       settings.accept_poses, settings.recording_as_given);
+  const StartCheck start =
+      check_start(plan.sequence, plan.range, plan.config, settings.accept_poses);
   for (const std::string& text : start.warnings) warn(listener, text);
   if (!start.refusal.empty()) {
     throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
@@ -243,7 +243,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
                          const RunListener& caller, OutputFolder& out, OutsideOutputs& outside) {
   std::vector<std::string> warnings = plan.sequence.warnings();
   const RunListener listener = with_memory(caller, warnings);
-  const PoseAgreement agreement = check_before(plan, settings, listener);
+  const Agreement agreement = check_before(plan, settings, listener);
   std::optional<SessionContribution> session;
   std::optional<SessionAlignment> alignment;
   // The results that are replaced may have added the session already.

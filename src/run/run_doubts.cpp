@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/parameters.hpp"
@@ -11,12 +12,35 @@ namespace {
 
 std::string percent(float share) { return std::to_string(std::lround(100.0F * share)) + " %"; }
 
-/// Adds a scan that begins an epoch against its pose, unless it follows a known jump at once.
-void add_misfit(const Recording& recording, std::size_t scan, std::vector<PoseJump>& jumps) {
-  const bool is_known = std::any_of(jumps.begin(), jumps.end(), [&](const PoseJump& jump) {
-    return jump.scan <= scan && scan <= jump.scan + 1;
-  });
-  if (!is_known) jumps.push_back(deviation_at(recording, scan));
+/// How far the given motion to scan `i` (from 1) lies from the nearer one of the motions before and
+/// after it.
+PoseJump jump_at(const Recording& recording, std::size_t i) {
+  const auto motion_to = [&](std::size_t k) {
+    return Pose(recording.T_world_sensor(k - 1).inverse() * recording.T_world_sensor(k));
+  };
+  std::optional<PoseJump> least;
+  for (const std::size_t k : {i - 1, i + 1}) {
+    if (k == 0 || k >= recording.size()) continue;
+    const Pose E = motion_to(k).inverse() * motion_to(i);
+    const double angle = Eigen::AngleAxisd(detail::Quaternion(E.linear())).angle();
+    const PoseJump jump{i, E.translation().norm(), 180.0 / M_PI * std::abs(angle)};
+    if (!least || jump.translation < least->translation) least = jump;
+  }
+  return least.value_or(PoseJump{i, 0.0, 0.0});
+}
+
+/// "poses jump 2 times, at scan 000030 by 1.50 m and 0.0 deg, ...": at most five of them.
+std::string text_of(const std::vector<PoseJump>& jumps, const Recording& recording) {
+  constexpr std::size_t kShown = 5;
+  std::string text = "poses jump " + std::to_string(jumps.size()) +
+                     (jumps.size() == 1 ? " time" : " times") + ", at scan ";
+  for (std::size_t i = 0; i < std::min(kShown, jumps.size()); ++i) {
+    text += (i > 0 ? ", " : "") + recording.name(jumps[i].scan) + " by " +
+            evaluation::format_number(jumps[i].translation, 2) + " m and " +
+            evaluation::format_number(jumps[i].rotation, 1) + " deg";
+  }
+  if (jumps.size() > kShown) text += " and " + std::to_string(jumps.size() - kShown) + " more";
+  return text + "; scans are not compared across a large jump";
 }
 
 std::string text_of(const SuspiciousScans& part, const Recording& recording) {
@@ -50,15 +74,12 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
 
 RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing) {
   RunDoubts doubts;
-  if (recording.frame() == PointFrame::kSensor && timing.rows.size() > 1) {
-    doubts.jumps = find_pose_jumps(recording, range.first, range.first + timing.rows.size() - 1);
-  }
   for (std::size_t k = 0; k < timing.rows.size(); ++k) {
     const TimingRow& row = timing.rows[k];
     const std::size_t scan = range.first + k;
     const bool is_misfit =
         row.began_epoch == EpochReason::kJump || row.began_epoch == EpochReason::kMisfit;
-    if (is_misfit && scan > range.first) add_misfit(recording, scan, doubts.jumps);
+    if (is_misfit && scan > range.first) doubts.jumps.push_back(jump_at(recording, scan));
     const Plausibility& window = row.plausibility;
     if (window.suspicion == Suspicion::kNone) continue;
     const auto same = [&](const SuspiciousScans& part) {
@@ -79,7 +100,7 @@ RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const 
 std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording) {
   std::vector<std::string> result;
   if (!doubts.jumps.empty()) {
-    result.push_back(sentence_on(recording, doubts.jumps));
+    result.push_back(text_of(doubts.jumps, recording));
   }
   for (const SuspiciousScans& part : doubts.parts) result.push_back(text_of(part, recording));
   return result;

@@ -3,13 +3,11 @@
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "dynains/plausibility.hpp"
-#include "dynains/poses/pose_jumps.hpp"
 #include "run_timing.hpp"
 #include "scan_range.hpp"
 
@@ -23,8 +21,15 @@ struct SuspiciousScans {
   Plausibility worst;  ///< of the window with the largest shares
 };
 
+/// A scan that begins an epoch because its surfaces do not fit, and how far its motion lies from
+/// those beside it.
+struct PoseJump {
+  std::size_t scan = 0;
+  double translation = 0.0;  ///< m
+  double rotation = 0.0;     ///< deg
+};
+
 struct RunDoubts {
-  /// Jumps of the poses, and scans that begin an epoch because their surfaces do not fit.
   std::vector<PoseJump> jumps;
   std::vector<SuspiciousScans> parts;  ///< at most one for each kind: the first one
 };

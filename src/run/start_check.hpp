@@ -12,16 +12,15 @@
 namespace dynains::program {
 
 struct StartCheck {
-  PoseAgreement agreement;
+  Agreement agreement;  ///< of a sample of scans; of no points if poses are not judged
   std::vector<std::string> warnings;
   std::string refusal;  ///< why the run must not begin; empty: it may
 };
 
-/// Judges the poses and clouds of `range` as `dynains check` does, unless a few registrations prove
-/// them. Fewer than eight scans are not refused; with `accepts_poses`, there is none.
-/// `recording_as_given` names the recording in proposed commands. Throws IoError.
+/// Judges the poses as `dynains check` does, and the clouds of `range`. Poses of an odometry of
+/// this program, and those of fewer than eight scans, are not judged. With `accepts_poses`,
+/// findings on poses are warnings. Throws IoError.
 StartCheck check_start(const Recording& recording, const ScanRange& range,
-                       const RemoverConfig& config, bool accepts_poses,
-                       const std::string& recording_as_given);
+                       const RemoverConfig& config, bool accepts_poses);
 
 }  // namespace dynains::program

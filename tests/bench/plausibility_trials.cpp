@@ -24,7 +24,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/poses/pose_jumps.hpp"
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
@@ -129,8 +128,7 @@ Pose noise(std::size_t i, double metres, double degrees) {
   return moved(t.x(), t.y(), t.z()) * turned(degrees * normal(random));
 }
 
-const std::vector<std::string> kMissing = {"seem to be missing", "may be missing",
-                                           "clouds were lost"};
+const std::vector<std::string> kMissing = {"may be missing", "clouds were lost", "poses jump"};
 
 std::vector<Kind> kinds() {
   const auto jump = [](double metres, double degrees) {
@@ -171,7 +169,7 @@ std::vector<Kind> kinds() {
   };
   const std::vector<std::string> body = {"--extrinsic"}, none;
   return {{"right", none, right},
-          {"clouds of a body", {"--sensor-origin", "rays do not begin"}, in_body(1.0F, 0.0F, 1.5F)},
+          {"clouds of a body", {"rays do not begin"}, in_body(1.0F, 0.0F, 1.5F)},
           {"jump of 3 m", {"poses jump"}, jump(3, 2)},
           {"points in mm", {"units", "metres"}, scaled_points(1000.0F)},
           {"points in cm", {"units", "metres"}, scaled_points(100.0F)},
@@ -207,7 +205,7 @@ std::vector<Kind> kinds() {
 /// Kinds of clouds that are recorded as measured.
 std::vector<Kind> kinds_of_times() {
   const Fault right = kinds().front().fault;
-  const std::vector<std::string> times = {"times of points", "times in s, ms, us or ns"};
+  const std::vector<std::string> times = {"--deskew", "times in s, ms, us or ns"};
   return {
       {"not de-skewed, no times", {}, right},
       {"right times", {}, right, [](double time, double) { return time; }},
@@ -279,10 +277,7 @@ Start start_of_run(const Recording& recording) {
     return {error.what(), true};
   }
   for (const std::string& warning : recording.warnings()) said.text += warning + ' ';
-  const std::vector<PoseJump> jumps = find_pose_jumps(recording, 0, range.last);
-  if (!jumps.empty()) said.text += sentence_on(recording, jumps) + ' ';
-  const program::StartCheck start =
-      program::check_start(recording, range, RemoverConfig(), false, recording.folder().string());
+  const program::StartCheck start = program::check_start(recording, range, RemoverConfig(), false);
   for (const std::string& warning : start.warnings) said.text += warning + ' ';
   said.text += start.refusal;
   said.is_refused = !start.refusal.empty();
@@ -294,7 +289,10 @@ struct Outcome {
   Plausibility worst;
   Suspicion first = Suspicion::kNone;
   std::uint64_t since = 0;
+  bool has_jump = false;  // scans that begin an epoch against their poses
   Start said;
+
+  bool is_told() const { return has_jump || first != Suspicion::kNone || !said.text.empty(); }
 };
 
 /// Removes from the recording as a run would if it began; times are those of the simulated scans.
@@ -320,6 +318,8 @@ Outcome judge(const Scans& scans, const WrittenScans& written) {
     const FrameResult frame =
         remover.push(points, written.recording.T_world_sensor(i), scans[i].time);
     outcome.worst.raise_shares(frame.plausibility);
+    outcome.has_jump = outcome.has_jump || frame.began_epoch == EpochReason::kJump ||
+                       frame.began_epoch == EpochReason::kMisfit;
     if (outcome.first == Suspicion::kNone && frame.plausibility.suspicion != Suspicion::kNone) {
       outcome.first = frame.plausibility.suspicion;
       outcome.since = frame.plausibility.since;
@@ -350,7 +350,10 @@ struct Counts {
 };
 
 bool has_right_cause(const Outcome& outcome, const std::vector<std::string>& causes) {
-  const std::string text = outcome.said.text + (outcome.first == Suspicion::kUnits ? " units" : "");
+  const std::string text = outcome.said.text +
+                           (outcome.first == Suspicion::kUnits ? " units" : "") +
+                           (outcome.first == Suspicion::kRays ? " rays do not begin" : "") +
+                           (outcome.has_jump ? " poses jump" : "");
   return causes.empty() || std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
            return text.find(cause) != std::string::npos;
          });
@@ -359,7 +362,7 @@ bool has_right_cause(const Outcome& outcome, const std::vector<std::string>& cau
 void take(const std::string& world, const Kind& kind, const Outcome& outcome, double usual,
           std::map<std::string, Counts>& counts) {
   constexpr double kHarm = 0.05;
-  const bool is_told = outcome.first != Suspicion::kNone || !outcome.said.text.empty();
+  const bool is_told = outcome.is_told();
   const bool is_harmful = outcome.lost > usual + kHarm || outcome.worst.not_judged > 0.98F;
   Counts& sum = counts[kind.name];
   ++sum.trials;
@@ -376,6 +379,7 @@ void take(const std::string& world, const Kind& kind, const Outcome& outcome, do
             << worst.ground_free << " instances " << worst.instance_free << " residual "
             << worst.residual << " misfits " << worst.misfits << " unjudged " << worst.not_judged
             << " told " << static_cast<int>(outcome.first) << " since " << outcome.since
+            << (outcome.has_jump ? " jumps" : "")
             << (outcome.said.is_refused ? " refused " : " said ") << outcome.said.text << std::endl;
 }
 

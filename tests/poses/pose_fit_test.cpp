@@ -90,25 +90,3 @@ TEST_CASE("Too few motions determine no extrinsic") {
   const std::vector<RegisteredMotion> few(drive.motions.begin(), drive.motions.begin() + 3);
   CHECK_FALSE(fit_extrinsic(few, drive.body()));
 }
-
-TEST_CASE("Poses fit mostly better if they do at more than 70 % of at least 12 motions") {
-  const Drive drive(Eigen::Isometry3d::Identity(), Vector6::Ones(), 8);
-  // The true motions but for a displacement of `metres` at motions from `first` on.
-  const auto displaced = [&](std::size_t first, double metres) {
-    return [&drive, first, metres](const RegisteredMotion& m) {
-      Eigen::Isometry3d T = drive.bodies[m.first];
-      if (m.first >= first) T.translation().x() += metres;
-      return std::optional(T);
-    };
-  };
-  const BodyMotion everywhere_by_3_cm = displaced(0, 0.03);
-  CHECK(is_mostly_better(drive.motions, displaced(17, 0.06), everywhere_by_3_cm));
-  CHECK_FALSE(is_mostly_better(drive.motions, displaced(16, 0.06), everywhere_by_3_cm));
-
-  const std::vector<RegisteredMotion> twelve(drive.motions.begin(), drive.motions.begin() + 12);
-  CHECK(is_mostly_better(twelve, drive.body(), everywhere_by_3_cm));
-  const std::vector<RegisteredMotion> eleven(drive.motions.begin(), drive.motions.begin() + 11);
-  CHECK_FALSE(is_mostly_better(eleven, drive.body(), everywhere_by_3_cm));
-  const BodyMotion in_no_trajectory = [](const RegisteredMotion&) { return std::optional<Pose>(); };
-  CHECK_FALSE(is_mostly_better(twelve, drive.body(), in_no_trajectory));
-}

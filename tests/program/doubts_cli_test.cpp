@@ -91,16 +91,13 @@ TEST_CASE("run stops before its first output if the poses are those of a turned 
   CHECK(drive.report()["doubts"]["suspicious"][0]["suspicion"] != "none");
 }
 
-TEST_CASE("check and run name the scan at which poses jump, and the size") {
+TEST_CASE("run names the scan at which poses jump, and the size") {
   const Drive drive;
   const Pose& T_world_c = drive.pose(15);
   Pose sideways = yawed(2.0);
   sideways.translation().y() = 3.0;
   const Pose change = T_world_c * sideways * T_world_c.inverse();
   drive.with_poses([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
-  CHECK_THAT(start({"check", drive.path()}).out,
-             ContainsSubstring("poses jump 1 time, at scan 000015 by ") &&
-                 ContainsSubstring(" m and 2.0 deg"));
   const Outcome outcome = drive.run();
   CHECK(outcome.code == 0);
   CHECK_THAT(outcome.err, ContainsSubstring("poses jump 1 time, at scan 000015 by 3.0"));
@@ -229,76 +226,48 @@ TEST_CASE("check proposes to de-skew points whose times explain what the poses d
   CHECK_THAT(deskewed.out, ContainsSubstring("agree as they are"));
 }
 
-TEST_CASE("check and run tell poses of other scans behind clouds that were lost") {
-  const simulation::Config config =
-      drive_of(simulation::Scene::kHill, simulation::Sensor::kOs1_64, 60, 7);
-  const Drive drive(config);
-  constexpr std::size_t kLost = 3, kFirst = 20;
-  for (std::size_t i = kFirst; i + kLost < drive.size(); ++i) {
-    fs::rename(drive.file_of(i + kLost), drive.file_of(i));
-  }
-  for (std::size_t i = drive.size() - kLost; i < drive.size(); ++i) fs::remove(drive.file_of(i));
-  // The rows of the poses are as many as the scans, or more.
-  for (const bool has_equal_rows : {true, false}) {
-    std::vector<Pose> rows = drive.poses();
-    if (has_equal_rows) rows.resize(rows.size() - kLost);
-    write_poses(drive.path() / "poses.txt", rows);
-    const Outcome outcome = start({"check", drive.path()});
-    CHECK(outcome.code == 1);
-    CHECK_THAT(outcome.out, ContainsSubstring("Clouds seem to be missing between the scans") &&
-                                ContainsSubstring("3 rows later"));
-    CHECK((outcome.out.find("if clouds were lost") == std::string::npos) == has_equal_rows);
+TEST_CASE("check and run refuse poses that stand, or that another sensor made") {
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 30, 41));
+  const auto is_refused = [&] {
     const Outcome run = drive.run();
-    CHECK(run.code == 2);
-    CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
-  }
-}
-
-TEST_CASE("check and run find clouds that were lost at constant speed, if poses are left over") {
-  simulation::Config config =
-      drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 11);
-  config.ego_speed = 12;
-  const Drive drive(config);
-  constexpr std::size_t kLost = 2, kFirst = 17;
-  for (std::size_t i = kFirst; i + kLost < drive.size(); ++i) {
-    fs::rename(drive.file_of(i + kLost), drive.file_of(i));
-  }
-  for (std::size_t i = drive.size() - kLost; i < drive.size(); ++i) fs::remove(drive.file_of(i));
-  const Outcome outcome = start({"check", drive.path()});
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.out, ContainsSubstring("Clouds seem to be missing between the scans") &&
-                              ContainsSubstring("2 rows later"));
-  const Outcome run = drive.run();
-  CHECK(run.code == 2);
-  CHECK_THAT(run.err, ContainsSubstring("Clouds seem to be missing"));
-  // No cloud is lost here: the drive has two poses more than clouds at its end.
-  const Drive whole(config);
-  fs::remove(whole.file_of(39));
-  fs::remove(whole.file_of(38));
-  CHECK(start({"check", whole.path()}).code == 0);
-  CHECK(whole.run().code == 0);
-}
-
-TEST_CASE("check and run tell times of points that run backwards") {
-  simulation::Config config = simulation::random_world(30005);
-  config.scans = 30;
-  config.rolling_shutter = true;
-  config.deskewed = 0.0;
-  const Drive drive(config);
-  const TemporaryFolder folder;
-  const fs::path seq = folder / "seq";
-  const auto run = [&] {
-    return start({"run", seq, "-o", folder / "out", "-q", "--force", "--deskew"});
+    CHECK_FALSE((run.code == 2 && fs::exists(drive.out())));
+    return start({"check", drive.path()}).code == 1 && run.code == 2;
   };
-  drive.write_with_times(seq);
-  CHECK(start({"check", seq, "--deskew"}).code == 0);
-  CHECK(run().code == 0);
-  const double period = drive.scan(1).time;
-  drive.write_with_times(seq, [&](double time) { return period - time; });
-  const Outcome backwards = start({"check", seq, "--deskew"});
-  CHECK(backwards.code == 1);
-  CHECK_THAT(backwards.out, ContainsSubstring("agree better if they run backwards in each scan"));
-  const Outcome warned = run();
-  CHECK(warned.code == 0);
-  CHECK_THAT(warned.err, ContainsSubstring("warning: The times of points do not fit the motion"));
+  drive.with_poses([&](std::size_t, const Pose&) { return drive.pose(0); });
+  CHECK(is_refused());
+  drive.with_poses(
+      [&](std::size_t i, const Pose&) { return drive.pose(std::min<std::size_t>(i, 15)); });
+  CHECK(is_refused());
+  const Drive other(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 30, 77));
+  drive.with_poses([&](std::size_t i, const Pose&) {
+    return other.pose(i) * yawed(20.0 * std::sin(0.3 * static_cast<double>(i)));
+  });
+  CHECK(is_refused());
+}
+
+TEST_CASE("check names poses without orientation, and coordinates in coarse steps") {
+  const Drive drive(drive_of(simulation::Scene::kHill, simulation::Sensor::kOs1_64, 60, 7));
+  drive.with_poses([](std::size_t, Pose T) {
+    T.linear().setIdentity();
+    return T;
+  });
+  CHECK_THAT(start({"check", drive.path()}).out,
+             ContainsSubstring("All orientations of the poses are equal") &&
+                 !ContainsSubstring("pass --"));
+  drive.with_poses([](std::size_t, Pose T) {
+    T.translation() = T.translation().array().round();
+    return T;
+  });
+  CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("in steps of 1.00 m"));
+}
+
+TEST_CASE("Options that do not fit a right recording are refused") {
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 11));
+  const std::vector<std::string> wrong =
+      GENERATE(std::vector<std::string>{"--frame", "world"},
+               std::vector<std::string>{"--sensor-origin", "0 0 3"});
+  const Outcome outcome = drive.run(wrong);
+  CAPTURE(wrong, outcome.err);
+  CHECK(outcome.code == 2);
+  CHECK_FALSE(fs::exists(drive.out()));
 }

@@ -143,7 +143,7 @@ def test_poses_that_do_not_fit(drive, tmp_path):
     poses = {"poses": drive / "poses_mm.txt"}
     with pytest.raises(dynains.ConfigError, match="pose-units"):
         dynains.run(drive, tmp_path / "out", **poses)
-    with pytest.warns(RuntimeWarning, match="agree under these poses"):
+    with pytest.warns(RuntimeWarning, match="pass --pose-units mm"):
         dynains.run(drive, tmp_path / "out", accept_poses=True, **poses)
 
 

@@ -1,0 +1,23 @@
+// Other options under which the points of a recording may be read.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+
+namespace dynains {
+
+/// Whether points in the files move with the sensor, as those in the frame of the world do. Empty
+/// if the sensor stays within `least_way` (m) of its first place. Throws IoError.
+std::optional<bool> follow_sensor(const Recording& recording, double least_way);
+
+/// Whether beams meet clearly better in the origin of the clouds than in the given position of the
+/// sensor. Throws IoError.
+bool has_wrong_origin(const Recording& recording);
+
+/// Other ways to read the points of a recording that does not agree: de-skewed or not, in the frame
+/// of the sensor or of the world, or with rays from the origin. Throws IoError.
+std::vector<RecordingOptions> other_options(const Recording& recording);
+
+}  // namespace dynains

@@ -1,0 +1,201 @@
+#include "readings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <initializer_list>
+#include <optional>
+#include <utility>
+
+#include "dynains/median.hpp"
+
+namespace dynains {
+namespace {
+
+using Motions = std::vector<RegisteredMotion>;
+
+/// The order of quaternions that the format does not define; kNone if it is given, or if there are
+/// none.
+QuaternionOrder other_order(const Recording& recording) {
+  if (!recording.has_quaternions() || recording.convention().quaternion != QuaternionOrder::kNone) {
+    return QuaternionOrder::kNone;
+  }
+  const bool is_xyzw = recording.quaternion_order() == QuaternionOrder::kXyzw;
+  return is_xyzw ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+}
+
+Reading given_reading(const Recording& recording) {
+  return {recording.convention(), recording.time_offset(), 0};
+}
+
+/// Factor of the ways under which most motions agree; empty without motion.
+std::optional<Reading> fit_scale(const Recording& recording, const Motions& motions) {
+  constexpr double kLeastWay = 0.2;    // m
+  constexpr double kMostFactor = 3.0;  // more is another unit, or no motion
+  const BodyMotion given = motion_under(recording, given_reading(recording));
+  std::vector<double> factors;
+  for (const RegisteredMotion& motion : motions) {
+    const auto T = given(motion);
+    if (!T || !(T->translation().norm() > kLeastWay)) continue;
+    const Eigen::Vector3d way = T->translation();
+    factors.push_back(way.dot(motion.T_first_second.translation()) / way.squaredNorm());
+  }
+  // Three digits: more are not known.
+  const double factor = std::round(1e3 * median(std::move(factors))) / 1e3;
+  if (!(1.0 / kMostFactor < factor && factor < kMostFactor)) return std::nullopt;
+  Reading result = given_reading(recording);
+  result.complexity = 2;
+  result.convention.scale =
+      std::clamp(result.convention.scale * factor, kLeastPoseScale, kLargestPoseScale);
+  return result;
+}
+
+/// The offset of the clocks with the least error; empty without times, or if it is 0 or at an end
+/// of the range.
+std::optional<Reading> fit_offset(const Recording& recording, const Motions& motions) {
+  constexpr double kFarthest = 0.6;  // s
+  constexpr double kCoarseOffset = 0.02;
+  constexpr double kFineOffset = 0.005;
+  Reading result = given_reading(recording);
+  double best = 0.0;
+  double least = error_at_points(motions, motion_under(recording, result));
+  const auto look = [&](double from, double to, double step) {
+    for (double offset = from; offset < to + 0.5 * step; offset += step) {
+      result.time_offset = recording.time_offset() + offset;
+      const MotionError error = motion_error(motions, motion_under(recording, result));
+      if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
+      least = error.at_points;
+      best = offset;
+    }
+  };
+  look(-kFarthest, kFarthest, kCoarseOffset);
+  look(best - kCoarseOffset, best + kCoarseOffset, kFineOffset);
+  if (best == 0.0 || !(std::abs(best) < kFarthest - kCoarseOffset)) return std::nullopt;
+  return Reading{recording.convention(), recording.time_offset() + best, 1};
+}
+
+/// Without parts that explain nothing: a rotation or translation near 0, or one that the motions do
+/// not determine.
+Pose simplified(const Motions& motions, const BodyMotion& body, const Pose& T_body_sensor) {
+  const double error = motion_error(motions, body, T_body_sensor).at_points;
+  const auto is_enough = [&](const Pose& simpler) {
+    return motion_error(motions, body, simpler).at_points < 1.1 * error + 0.002;
+  };
+  Pose unturned = T_body_sensor;
+  unturned.linear().setIdentity();
+  Pose result = is_enough(unturned) ? unturned : T_body_sensor;
+  Pose unmoved = result;
+  unmoved.translation().setZero();
+  if (is_enough(unmoved)) return unmoved;
+  Pose level = result;
+  level.translation().z() = 0.0;
+  return is_enough(level) ? level : result;
+}
+
+/// A body whose poses have the meaning `base`, and in which the sensor lies somewhere.
+std::optional<Reading> fit_body(const Recording& recording, const Motions& motions,
+                                const Reading& base) {
+  const BodyMotion body = motion_under(recording, base);
+  const auto fitted = fit_extrinsic(motions, body);
+  if (!fitted) return std::nullopt;
+  Reading result = base;
+  result.complexity += 3;
+  // The convention gives the pose of the frame of the clouds, in which the sensor has a position.
+  const Eigen::Translation3d origin(recording.sensor_origin());
+  result.convention.T_body_sensor = base.convention.T_body_sensor * origin *
+                                    simplified(motions, body, *fitted) * origin.inverse();
+  return result;
+}
+
+}  // namespace
+
+BodyMotion motion_under(const Recording& recording, const Reading& reading) {
+  const double offset = reading.time_offset - recording.time_offset();
+  return [&recording, convention = reading.convention,
+          offset](const RegisteredMotion& motion) -> std::optional<Pose> {
+    const auto pose_of = [&](std::size_t i) {
+      return offset == 0.0 ? recording.pose_under(convention, i) : recording.pose_after(i, offset);
+    };
+    const auto T_world_a = pose_of(motion.first), T_world_b = pose_of(motion.second);
+    if (!T_world_a || !T_world_b) return std::nullopt;
+    return T_world_a->inverse() * *T_world_b;
+  };
+}
+
+bool is_much_smaller(double error, double other) {
+  return error < 0.5 * other && other - error > 0.02;
+}
+
+std::vector<Reading> usual_readings(const Recording& recording) {
+  const PoseConvention& given = recording.convention();
+  std::vector<Reading> all = {given_reading(recording)};
+  using Change = std::function<void(PoseConvention&)>;
+  const auto combine = [&](std::initializer_list<Change> alternatives) {
+    const std::size_t count = all.size();
+    for (const Change& change : alternatives) {
+      for (std::size_t i = 0; i < count; ++i) {
+        all.push_back(all[i]);
+        change(all.back().convention);
+        ++all.back().complexity;
+      }
+    }
+  };
+  if (!given.invert) combine({[](PoseConvention& c) { c.invert = true; }});
+  const QuaternionOrder order = other_order(recording);
+  if (order != QuaternionOrder::kNone) {
+    combine({[order](PoseConvention& c) { c.quaternion = order; }});
+  }
+  if (!given.left_handed) combine({[](PoseConvention& c) { c.left_handed = true; }});
+  if (given.frame == PoseFrame::kAuto) {
+    const bool is_camera = recording.has_calibration() && !recording.has_quaternions();
+    combine({[is_camera](PoseConvention& c) {
+      c.frame = is_camera ? PoseFrame::kLidar : PoseFrame::kCamera;
+    }});
+  }
+  if (given.unit == 1.0) {
+    combine({[](PoseConvention& c) { c.unit = 0.001; }, [](PoseConvention& c) { c.unit = 0.01; }});
+  }
+  for (const int shift : {1, -1, 2, -2}) {
+    all.push_back({given, recording.time_offset(), 1});
+    all.back().convention.shift += shift;
+  }
+  all.erase(all.begin());  // the given one
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Reading& a, const Reading& b) { return a.complexity < b.complexity; });
+  return all;
+}
+
+std::vector<Reading> fitted_readings(const Recording& recording, const Motions& motions) {
+  using Fit = std::function<std::optional<Reading>(const Motions&)>;
+  std::vector<Fit> fits = {[&](const Motions& some) { return fit_scale(recording, some); },
+                           [&](const Motions& some) { return fit_offset(recording, some); }};
+  const Reading given = given_reading(recording);
+  std::vector<Reading> bases = {given};
+  if (!given.convention.invert) {
+    bases.push_back(given);
+    bases.back().convention.invert = true;
+    bases.back().complexity = 1;
+  }
+  const QuaternionOrder order = other_order(recording);
+  if (order != QuaternionOrder::kNone) {
+    bases.push_back(given);
+    bases.back().convention.quaternion = order;
+    bases.back().complexity = 1;
+  }
+  for (const Reading& base : bases) {
+    fits.emplace_back([&, base](const Motions& some) { return fit_body(recording, some, base); });
+  }
+  const Motions others = half_of(motions, 1);
+  const double before = error_at_points(others, motion_under(recording, given));
+  std::vector<Reading> readings;
+  for (const Fit& fit : fits) {
+    const auto of_half = fit(half_of(motions, 0));
+    if (!of_half) continue;
+    const double then = error_at_points(others, motion_under(recording, *of_half));
+    if (!is_much_smaller(then, before)) continue;
+    if (const auto reading = fit(motions)) readings.push_back(*reading);
+  }
+  return readings;
+}
+
+}  // namespace dynains

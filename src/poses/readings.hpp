@@ -1,0 +1,36 @@
+// Other meanings of the poses of a recording.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+#include "pose_fit.hpp"
+
+namespace dynains {
+
+/// A meaning of the poses.
+struct Reading {
+  PoseConvention convention;
+  double time_offset = 0.0;  ///< s, as RecordingOptions::time_offset
+  /// 0 for the given meaning; 1 for each usual mistake and for a fitted offset, of which a shift is
+  /// a coarse one; 2 for a fitted scale, 3 for a fitted body. A more complex reading must explain
+  /// clearly more.
+  std::size_t complexity = 0;
+};
+
+/// The motion of the sensor under a reading. `recording` must outlive the result.
+BodyMotion motion_under(const Recording& recording, const Reading& reading);
+
+/// Whether an error (m) of points 10 m from the sensor is clearly smaller than another one.
+bool is_much_smaller(double error, double other);
+
+/// All combinations of common mistakes, except options that were given; shifts alone.
+std::vector<Reading> usual_readings(const Recording& recording);
+
+/// A scale of the ways, an offset of the clocks, and bodies that carry the sensor, as far as the
+/// motions of one half of the chains give one that explains the other half much better.
+std::vector<Reading> fitted_readings(const Recording& recording,
+                                     const std::vector<RegisteredMotion>& motions);
+
+}  // namespace dynains
