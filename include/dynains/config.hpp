@@ -92,14 +92,12 @@ constexpr std::array<const char*, 2> value_names(Decision) { return {"window", "
 
 /// Observations of a cluster that update its belief sequentially (Eq. 15, 16).
 enum class BeliefObservations {
-  kNewest,    ///< only the newest observation, compared with the whole cluster
-  kSequence,  ///< observations 2 to K, each compared with the cluster up to that observation
-  kAll,       ///< all observations, each compared with the whole cluster
-  kOthers,    ///< all observations, each compared with all others
+  kNewest,  ///< only the newest observation, compared with the whole cluster
+  kOthers,  ///< all observations, each compared with all others
 };
 
-constexpr std::array<const char*, 4> value_names(BeliefObservations) {
-  return {"newest", "sequence", "all", "others"};
+constexpr std::array<const char*, 2> value_names(BeliefObservations) {
+  return {"newest", "others"};
 }
 
 /// Parameters of BasicDynaInsRemover itself. visit() gives their meaning and bounds.
@@ -156,9 +154,8 @@ struct RemoverConfig {
                       "variant of the paper"});
     visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
                       "observations that update the belief (Eq. 15, 16), and what each is compared "
-                      "with; newest: the newest, with the whole cluster; sequence: the second to "
-                      "the newest, with the cluster up to it; all: all, with the whole cluster; "
-                      "others: all, with all others"});
+                      "with; newest: the newest, with the whole cluster; others: all, with all "
+                      "others"});
     visitor(Parameter{"compared_clusters", self.compared_clusters, Bounds(), "",
                       "clusters of a window that can be dynamic: with points in both its ends, or "
                       "in the newest scan and any before it, where those without points in the "

@@ -174,9 +174,7 @@ TEST_CASE("scans of another epoch give no evidence about an instance and no pred
 }
 
 TEST_CASE("a standing object gives no evidence for a movement, however long it stands") {
-  FreeSpaceConfig config = every_scan_a_reference();
-  config.still_weight = 1.0;
-  Watch watch(config);
+  Watch watch(every_scan_a_reference());
   for (int i = 0; i < 12; ++i) watch.see(car());
   for (const std::size_t scan : {0U, 6U, 11U}) {
     CHECK(watch.causes(scan) == Causes{Cause::kOccupied});
@@ -209,7 +207,6 @@ TEST_CASE("an object that stood long before stays when an object that moved was 
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookahead_scans = 0;
   config.tau_track = 0.6;
-  config.still_weight = 0.0;
   const PointBuffer passing = panel(10.0F, 1.2F, 3.2F, -1.5F, 0.5F);
   Watch watch(config);
   for (int i = 0; i < 21; ++i) watch.see(car());
@@ -225,7 +222,6 @@ TEST_CASE("returns of a moved object do not contest a later object in its place"
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = 4;
   config.lookahead_scans = 0;
-  config.tau_whole = 0.9;
   config.use_tracks = false;
   config.dynamic_grid_ratio = 1.0;
   for (const bool ignore_dynamic_returns : {false, true}) {

@@ -72,11 +72,8 @@ struct Scan {
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
-  bool removes(std::size_t instance = 0) const {
-    return updater.removes_whole(samples, beliefs, instance, false);
-  }
-  bool removes_large(std::size_t instance = 0) const {
-    return updater.removes_whole(samples, beliefs, instance, true);
+  bool removes(bool is_large = false) const {
+    return updater.removes_whole(samples, beliefs, 0, is_large);
   }
 
   InstanceBeliefUpdater updater;
@@ -99,8 +96,7 @@ TEST_CASE("one reference changes the belief of a supervoxel by one of three step
            Case{20, {19, 1}, 2.0F * kFreeStep, kNone},
            Case{5, {3, 2}, kFreeStep, kNone},         // 0.6 raises the belief
            Case{9, {5, 4}, 0.0F, kNone},              // 0.56 does not change the belief
-           Case{8, {2, 0}, 2.0F * kFreeStep, kNone},  // two of eight are enough
-           Case{8, {1, 0}, 0.0F, kNone},              // one is not
+           Case{8, {2, 0}, 2.0F * kFreeStep, kNone},  // others are not seen
            Case{10, {3, 7}, 0.0F, kOccupied},         // one is not enough
            Case{9, {3, 6}, 0.0F, kNone},              // 0.33 is not
            Case{4, {0, 2}, 0.0F, kOccupied},          // two hits
@@ -238,12 +234,12 @@ TEST_CASE("an instance is removed if a fifth of its known samples moved") {
 TEST_CASE("an instance larger than one object is removed if half of its known samples moved") {
   Scan enough(Instances{{5, 5}});
   enough.see({{5, 0}, {0, 5}});
-  CHECK(enough.removes_large());
+  CHECK(enough.removes(true));
 
   Scan too_little(Instances{{4, 5}});
   too_little.see({{4, 0}, {0, 5}});
   CHECK(too_little.removes());
-  CHECK_FALSE(too_little.removes_large());
+  CHECK_FALSE(too_little.removes(true));
 }
 
 // A parked car: four layers of supervoxels of four samples each, `per_layer` in each.
@@ -299,30 +295,6 @@ TEST_CASE("free windows remove nothing: where beams hit again, the lower half mu
   CHECK(half.removes());
 }
 
-TEST_CASE(
-    "an instance seen through as a whole stays if it was hit again and its lower half stayed") {
-  // Two references cover only windows, all of them free: three of ten samples.
-  const auto see_windows = [](std::size_t windows_below) {
-    Scan scan = scan_of_layers(5);
-    const std::vector<Scan::Seen> standing(20, {0, 4});
-    std::vector<Scan::Seen> windows(20, {0, 0});
-    for (std::size_t s = 0; s < 6; ++s) windows[s < windows_below ? s : 14 + s] = {4, 0};
-    for (const auto& seen : {standing, windows, windows}) scan.see(seen);
-    return scan;
-  };
-  Scan parked = see_windows(0);
-  CHECK(parked.beliefs.instances[0].peak == Approx(4.0F * kFreeStep));
-  CHECK(parked.beliefs.instances[0].hit_again == 0);
-  CHECK(parked.removes());
-  parked.see(std::vector<Scan::Seen>(20, {0, 4}));
-  CHECK(parked.beliefs.instances[0].hit_again != 0);
-  CHECK_FALSE(parked.removes());
-
-  Scan moved = see_windows(2);
-  moved.see(std::vector<Scan::Seen>(20, {0, 4}));
-  CHECK(moved.removes());
-}
-
 TEST_CASE("an instance with few known samples in its lower half is removed by the general rule") {
   // Two supervoxels per layer: 16 samples in the lower half, some without results.
   const Scan small = scan_of_layers(2);
@@ -365,62 +337,18 @@ TEST_CASE("a hit before a place was seen free, or on the other side, is not a hi
   CHECK(scan.removes());
 }
 
-TEST_CASE("an instance that is free as a whole in one reference is removed") {
-  // One hit each contests all supervoxels. Five samples of a hundred are not enough for the whole.
-  const std::vector<std::uint32_t> supervoxels(5, 20);
-  const std::vector<Scan::Seen> contesting(5, {0, 1});
-  Scan scan(Instances{supervoxels});
-  scan.see(contesting);
-  scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});  // 25 of 40: 0.63
-  CHECK(scan.beliefs.instances[0].level == Approx(kFreeStep));
-  CHECK(scan.beliefs.counts[0].moved == 0);
-  CHECK(scan.removes());
-
-  Scan half(Instances{supervoxels});
-  half.see(contesting);
-  half.see({{5, 4}, {5, 4}, {5, 4}, {5, 4}, {5, 4}});  // 25 of 45: 0.56
-  CHECK(half.beliefs.instances[0].level == 0.0F);
-  CHECK_FALSE(half.removes());
-
-  // 24 of a hundred samples are not enough for the whole, 25 are.
-  Scan few(Instances{supervoxels});
-  few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {4, 0}});
-  CHECK(few.beliefs.instances[0].level == 0.0F);
-  few.see({{5, 0}, {5, 0}, {5, 0}, {5, 0}, {5, 0}});
-  CHECK(few.beliefs.instances[0].level == Approx(2.0F * kFreeStep));
-}
-
-TEST_CASE("an instance that was hit is removed only if nearly all of it is free in one reference") {
-  const std::vector<std::uint32_t> supervoxels(5, 20);
-  const std::vector<Scan::Seen> standing(5, {0, 6}), wholly(5, {6, 0});
-  Scan scan(Instances{supervoxels});
-  scan.see(standing);
-  scan.see({{5, 3}, {5, 3}, {5, 3}, {5, 3}, {5, 3}});
-  CHECK(scan.beliefs.instances[0].peak == Approx(kFreeStep));
-  CHECK_FALSE(scan.removes());  // below tau_whole: 1.66
-
-  Scan gone(Instances{supervoxels});
-  gone.see(standing);
-  gone.see(wholly);
-  CHECK(gone.beliefs.instances[0].peak == Approx(2.0F * kFreeStep));
-  CHECK(gone.beliefs.counts[0].moved == 0);
-  CHECK(gone.removes());  // 1.69 is above tau_whole, though below the 2.20 of tau_contested
-}
-
 // Cause of the last supervoxel of a scan whose only instance is tracked.
 Cause last_cause(const Scan& scan, const FreeSpaceConfig& config,
-                 const TrackedInstances::Instance& tracked, float length = 0.0F,
-                 bool may_presume = false) {
+                 const TrackedInstances::Instance& tracked) {
   InstanceEvidence evidence;
   evidence.samples = scan.samples;
   evidence.beliefs = scan.beliefs;
   evidence.tracked.instances = {tracked};
   evidence.tracked.shapes.resize(1);
   evidence.tracked.shapes[0].carried = true;
-  evidence.tracked.shapes[0].length = length;
   InstanceJudge judge(config);
   std::vector<InstanceJudge::Verdict> verdicts;
-  judge.judge(evidence, scan.updater, may_presume, verdicts, [](std::size_t) {});
+  judge.judge(evidence, scan.updater, false, verdicts, [](std::size_t) {});
   return verdicts.back().cause;
 }
 
@@ -442,29 +370,6 @@ TEST_CASE("few free samples remove an instance only if enough samples along its 
   CHECK(cause_with_track(4, 9.9F) == Cause::kOccupied);
   CHECK(cause_with_track(5, 0.0F) == Cause::kWithInstance);  // half of its own are free
   CHECK(cause_with_track(4, 0.0F, false) == Cause::kWithInstance);
-}
-
-// Twenty supervoxels of an instance whose track moves, of which some are seen free twice and others
-// are hit.
-Cause cause_of_long(float length, std::size_t free, std::size_t hit, bool may_presume = false) {
-  const FreeSpaceConfig config;
-  Scan scan(Instances{std::vector<std::uint32_t>(20, 8)});
-  std::vector<Scan::Seen> seen(20, {0, 0});
-  std::fill_n(seen.begin(), free, Scan::Seen{8, 0});
-  std::fill_n(seen.begin() + static_cast<std::ptrdiff_t>(free), hit, Scan::Seen{0, 8});
-  for (int i = 0; i < 2; ++i) scan.see(seen);
-  TrackedInstances::Instance tracked;
-  tracked.past.log_odds = 4.0F * kFreeStep;
-  return last_cause(scan, config, tracked, length, may_presume);
-}
-
-TEST_CASE("a track does not remove a long instance of which most stands and some moved") {
-  CHECK(cause_of_long(9.1F, 1, 19) == Cause::kOccupied);
-  CHECK(cause_of_long(8.9F, 1, 19) == Cause::kAlongTrack);        // a car
-  CHECK(cause_of_long(9.1F, 0, 20) == Cause::kAlongTrack);        // a lorry before it starts
-  CHECK(cause_of_long(9.1F, 1, 9) == Cause::kNoEvidence);         // half are decided
-  CHECK(cause_of_long(9.1F, 1, 8) == Cause::kAlongTrack);         // fewer
-  CHECK(cause_of_long(9.1F, 1, 19, true) == Cause::kAlongTrack);  // provisional
 }
 
 TEST_CASE("a place that is hit again twice after it was free is seen through by chance") {
@@ -521,24 +426,12 @@ TEST_CASE("references that see little of an instance do not tell that it stands"
 }
 
 TEST_CASE("the caller gets the instances whose beliefs changed") {
-  Scan scan(Instances{{4, 4}, {20, 20, 20, 20, 20}, {20, 20, 20, 20, 20}, {4}});
-  for (int round = 0; round < 2; ++round) {
+  Scan scan(Instances{{4, 4}, {20, 20}, {4}});
+  for (const std::uint8_t is_first : {std::uint8_t{1}, std::uint8_t{0}}) {
     std::fill(scan.beliefs.changed.begin(), scan.beliefs.changed.end(), std::uint8_t{0});
-    // First instance: only supervoxels change. Second: all beliefs change. Third: all change, and
-    // in the second round only the whole. Fourth: nothing changes.
-    scan.see({{4, 0},
-              {0, 4},
-              {5, 0},
-              {5, 0},
-              {5, 0},
-              {5, 0},
-              {5, 0},
-              {0, 5},
-              {0, 5},
-              {0, 5},
-              {0, 5},
-              {0, 5}});
-    CHECK(scan.beliefs.changed == std::vector<std::uint8_t>{1, 1, 1, 0});
+    // Hits of the second instance change nothing more after the first reference.
+    scan.see({{4, 0}, {0, 4}, {0, 5}, {0, 5}});
+    CHECK(scan.beliefs.changed == std::vector<std::uint8_t>{1, is_first, 0});
   }
 }
 
@@ -551,7 +444,7 @@ TEST_CASE("an instance is still there where nearly all of its seen samples are h
 
 // Slow reference sum: recounts each supervoxel and instance for every reference.
 void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& visibility,
-                std::vector<Belief>& supervoxels, std::vector<Belief>& wholes) {
+                std::vector<Belief>& supervoxels) {
   const FreeSpaceConfig config;
   const auto increment = static_cast<float>(log_odds(config.p_free));
   const auto decrement = static_cast<float>(log_odds(config.p_hit));
@@ -586,19 +479,10 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
     const float all_seen = all_free + count(first, last, BeamResult::kHit);
     const bool stands =
         all_seen < 0.25F * static_cast<float>(last - first) || all_free / all_seen <= 0.3F;
-    add(supervoxels[s], share, stands, free >= 0.15F * size && share >= 0.6F, share <= 0.3F);
+    add(supervoxels[s], share, stands, share >= 0.6F, share <= 0.3F);
     if (share <= 0.3F && hit >= std::min(2.0F, size) && 4.0F * hit >= size) {
       supervoxels[s].occupied = 1;
     }
-  }
-  for (std::size_t i = 0; i < wholes.size(); ++i) {
-    const std::size_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
-    const std::size_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
-    const float free = count(begin, end, BeamResult::kFree),
-                hit = count(begin, end, BeamResult::kHit);
-    if (free + hit < std::max(2.0F, 0.25F * static_cast<float>(end - begin))) continue;
-    const float share = free / (free + hit);
-    add(wholes[i], share, false, share >= 0.6F, share <= 0.3F);
   }
 }
 
@@ -613,7 +497,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       }
     }
     Scan scan(instances);
-    std::vector<Belief> supervoxels(scan.samples.supervoxel_count()), wholes(instances.size());
+    std::vector<Belief> supervoxels(scan.samples.supervoxel_count());
     for (int reference = 0; reference < 24; ++reference) {
       if (reference == 12) {
         scan.updater.begin_later_references(scan.samples, scan.beliefs);
@@ -622,7 +506,6 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
           belief.level = 0.0F;
           if (belief.turns % 2 == 1) --belief.turns;
         }
-        for (Belief& belief : wholes) belief.level = 0.0F;
       }
       // Whole supervoxels often have equal results.
       std::vector<BeamResult> visibility(scan.samples.size());
@@ -639,7 +522,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       }
       scan.updater.update(scan.samples, visibility_of(visibility), {}, scan.beliefs,
                           [](std::size_t) {});
-      add_slowly(scan.samples, visibility, supervoxels, wholes);
+      add_slowly(scan.samples, visibility, supervoxels);
     }
     for (std::size_t s = 0; s < supervoxels.size(); ++s) {
       REQUIRE(scan.belief(s).level == supervoxels[s].level);
@@ -649,10 +532,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       REQUIRE(scan.belief(s).hit_again == supervoxels[s].hit_again);
       REQUIRE(scan.belief(s).turns == supervoxels[s].turns);
     }
-    for (std::size_t i = 0; i < wholes.size(); ++i) {
-      REQUIRE(scan.beliefs.instances[i].peak == wholes[i].peak);
-      REQUIRE(scan.beliefs.instances[i].contested == wholes[i].contested);
-      REQUIRE(scan.beliefs.instances[i].hit_again == wholes[i].hit_again);
+    for (std::size_t i = 0; i < instances.size(); ++i) {
       std::uint32_t total = 0, moved = 0, decided = 0;
       for (std::uint32_t s = scan.samples.supervoxel_begin[i];
            s < scan.samples.supervoxel_begin[i + 1]; ++s) {

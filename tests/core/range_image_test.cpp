@@ -232,12 +232,12 @@ TEST_CASE("an image equals its definition, cell by cell") {
   }
 }
 
-// Objects nearer than reach / (k - 1/2) cells (in rad) protect k cells in every direction.
+// Objects nearer than reach / (k - 1/2) cells (in rad) protect k cells in every direction, k >= 2.
 int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
                         const std::vector<int>& objects, float reach, int row, int column) {
   int result = all.around(row, column);
   if (result == RangeImage::kBeyond) return result;
-  for (int k = 1; k <= 4; ++k) {
+  for (int k = 2; k <= 4; ++k) {
     const float limit = reach * grid.columns_per_radian / (static_cast<float>(k) - 0.5F);
     for (int r = std::max(0, row - k); r <= std::min(grid.rows - 1, row + k); ++r) {
       for (int c = column - k; c <= column + k; ++c) {

@@ -481,10 +481,6 @@ TEST_CASE("belief reverts a wall that comes into view, and no van") {
   config.use_belief = true;
   CHECK(removed(kWall) < wall_without_belief / 10);
   CHECK(removed(kVan) == van_without_belief);
-  config.belief_observations = BeliefObservations::kSequence;
-  CHECK(removed(kWall) < wall_without_belief / 10);
-  config.belief_observations = BeliefObservations::kAll;
-  CHECK(removed(kWall) == wall_without_belief);
   config.belief_observations = BeliefObservations::kOthers;
   CHECK(removed(kWall) == wall_without_belief);
 }

@@ -24,15 +24,12 @@ struct FreeSpaceConfig {
   double p_hit = 0.155;          ///< form of Eq. 18
   double tau_free = 0.65;        ///< form of Eq. 19
   double tau_contested = 0.9;    ///< form of Eq. 19
-  double tau_whole = 0.84;       ///< form of Eq. 19
   double removal_ratio = 0.2;
   double large_removal_ratio = 0.5;
-  double pass_ratio = 0.6;
   double footprint = 0.3;         ///< m
   double footprint_rise = 0.025;  ///< m
   bool use_tracks = true;
   double tau_track = 0.87;  ///< form of Eq. 19
-  double still_weight = 0.1;
   double track_ratio = 0.1;
   double track_cell = 1.2;  ///< m
   double track_overlap = 0.25;
@@ -110,16 +107,11 @@ struct FreeSpaceConfig {
                       "belief from which a supervoxel without hits was free (form of Eq. 19)"});
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
                       "belief from which a supervoxel with hits was free (form of Eq. 19)"});
-    visitor(Parameter{"tau_whole", self.tau_whole, open(0.5, 1), "",
-                      "belief from which a whole instance with hits was free (form of Eq. 19)"});
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
                       "ratio of free to decided samples from which the whole instance is removed"});
     visitor(Parameter{"large_removal_ratio", self.large_removal_ratio, half_open_below(0, 1), "",
                       "removal_ratio of instances that are longer than track_length or higher than "
                       "track_height"});
-    visitor(Parameter{"pass_ratio", self.pass_ratio, half_open_below(0, 1), "",
-                      "ratio of free to visible samples of an instance from which a reference is "
-                      "evidence that the whole instance is free"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground at a smaller distance from removed points is removed; 0: none"});
     visitor(Parameter{"footprint_rise", self.footprint_rise, closed(0, 1), "m",
@@ -129,9 +121,6 @@ struct FreeSpaceConfig {
                       "propagate beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
                       "belief along its track from which an instance is dynamic (form of Eq. 19)"});
-    visitor(Parameter{"still_weight", self.still_weight, closed(0, 10), "",
-                      "decrease of the belief along a track by a scan in which the instance stood "
-                      "still, in increments of p_free"});
     visitor(Parameter{"track_ratio", self.track_ratio, closed(0, 1), "",
                       "ratio of free to decided samples along its track from which an instance is "
                       "removed whole although less than half of its own are free"});

@@ -436,7 +436,7 @@ class FreeSpaceEvidence {
     if (!config_.use_tracks) return false;
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
     return evidence.tracked.shapes[instance].carried &&
-           evidence.tracked.instances[instance].own >= 0.0F;
+           !evidence.beliefs.counts[instance].stands_still();
   }
 
   // Writes by non-ground point of the newest scan whether `test(supervoxel)` holds.

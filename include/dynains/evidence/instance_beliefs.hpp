@@ -19,8 +19,8 @@ namespace dynains::detail {
 
 /// Beliefs on the samples of one scan.
 struct InstanceBeliefs {
-  /// Log-odds that a supervoxel or a whole instance was free, a FreeSpaceSum. Thin objects,
-  /// which some beams pass, have too many hits for the sum to grow.
+  /// Log-odds that a supervoxel was free, a FreeSpaceSum. Thin objects, which some beams pass, have
+  /// too many hits for the sum to grow.
   struct Belief {
     float level = 0.0F;  ///< log-odds by the references of one side of time, >= 0
     float peak = 0.0F;   ///< maximum of `level` that hits cannot take back, over both sides of time
@@ -36,11 +36,17 @@ struct InstanceBeliefs {
     std::uint32_t total = 0;
     std::uint32_t moved = 0;    ///< in free supervoxels
     std::uint32_t decided = 0;  ///< in free or occupied supervoxels
+
+    /// Whether enough samples are known, and none of them moved.
+    bool stands_still() const {
+      return moved == 0 && static_cast<float>(decided) >= kLeastKnown * static_cast<float>(total);
+    }
   };
+  /// Least ratio of known to all samples of an instance for evidence that it stands still.
+  static constexpr float kLeastKnown = 0.3F;
 
   std::vector<Belief> supervoxels;
-  std::vector<Belief> instances;  ///< by instance: belief on all its samples together
-  std::vector<Counts> counts;     ///< by instance
+  std::vector<Counts> counts;  ///< by instance
   InstanceViews views;
   std::vector<std::uint8_t> merged;   ///< by instance: 1 if larger than one object; the caller's
   std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
@@ -53,17 +59,12 @@ class InstanceBeliefUpdater {
   using Belief = InstanceBeliefs::Belief;
   using Counts = InstanceBeliefs::Counts;
 
-  /// Least ratio of decided to all samples of an instance for evidence that it stands still.
-  static constexpr float kLeastKnown = 0.3F;
-
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
-      : pass_ratio_(static_cast<float>(config.pass_ratio)),
-        removal_ratio_(static_cast<float>(config.removal_ratio)),
+      : removal_ratio_(static_cast<float>(config.removal_ratio)),
         large_removal_ratio_(static_cast<float>(config.large_removal_ratio)),
         sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
-        contested_level_(static_cast<float>(log_odds(config.tau_contested))),
-        whole_level_(static_cast<float>(log_odds(config.tau_whole))) {}
+        contested_level_(static_cast<float>(log_odds(config.tau_contested))) {}
 
   /// Log-odds increment of one reference with free samples, l(p_free).
   float increment() const { return sum_.increment(); }
@@ -74,7 +75,6 @@ class InstanceBeliefUpdater {
   void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
     const std::size_t instances = samples.instance_count();
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
-    out.instances.assign(instances, Belief());
     out.changed.assign(instances, 1);
     out.merged.assign(instances, 0);
     out.counts.resize(instances);
@@ -94,7 +94,6 @@ class InstanceBeliefUpdater {
       belief.level = 0.0F;
       belief.turns &= static_cast<std::uint8_t>(~1U);
     }
-    for (Belief& belief : beliefs.instances) belief.level = 0.0F;
   }
 
   /// Updates the beliefs by the visibility of `samples` from one reference. `reference`: its
@@ -118,24 +117,18 @@ class InstanceBeliefUpdater {
            belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether an instance is dynamic as a whole: its belief as a whole reaches the threshold, or
-  /// enough of its decided samples are free. An additional condition holds if fewer than half of
-  /// the decided samples are free and some were hit afterwards: enough samples of its lower half
-  /// must be free, unless too few of them are decided. This condition keeps parked cars, since
-  /// beams pass through their windows, but not through their bodies.
-  /// `is_large`: larger than one object; large_removal_ratio of its samples must be free.
+  /// Whether an instance is dynamic as a whole: enough of its decided samples are free. If fewer
+  /// than half of them are free and some were hit afterwards, enough samples of its lower half must
+  /// be free, too, unless few of them are decided: beams pass through the windows of a parked car,
+  /// but not through its body. `is_large`: larger than one object; large_removal_ratio of its
+  /// samples must be free.
   bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
                      std::size_t instance, bool is_large) const {
     const Counts& counts = beliefs.counts[instance];
-    const Belief& whole = beliefs.instances[instance];
-    const bool whole_is_free = whole.peak >= (whole.contested != 0 ? whole_level_ : free_level_);
-    if (!whole_is_free && !is_enough(counts, is_large ? large_removal_ratio_ : removal_ratio_)) {
-      return false;
+    if (!is_enough(counts, is_large ? large_removal_ratio_ : removal_ratio_)) return false;
+    if (2 * counts.moved >= counts.decided || !was_hit_again(samples, beliefs, instance)) {
+      return true;
     }
-    if (2 * counts.moved >= counts.decided) return true;
-    const bool hit_again =
-        whole_is_free ? whole.hit_again != 0 : was_hit_again(samples, beliefs, instance);
-    if (!hit_again) return true;
     const Counts lower_half = counts_of_lower_half(samples, beliefs, instance);
     return lower_half.decided < kLeastBody || is_enough(lower_half, removal_ratio_);
   }
@@ -144,7 +137,6 @@ class InstanceBeliefUpdater {
   static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
   static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
   static constexpr std::uint8_t kTurnsByChance = 4;   // hit, free, hit, free, hit
-  static constexpr float kLeastFree = 0.15F;          // ratio of free samples of a supervoxel
   static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
   static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
   // A supervoxel is occupied if at least two of its samples and one of kSamplesPerHit are hit.
@@ -265,7 +257,7 @@ class InstanceBeliefUpdater {
     }
   }
 
-  // Updates the beliefs on whole instances.
+  // Updates what is known of whole instances.
   template <class OnHit>
   void update_instances(const InstanceSamples& samples, const Visibility& visibility,
                         InstanceBeliefs& beliefs, OnHit&& on_hit) {
@@ -280,30 +272,21 @@ class InstanceBeliefUpdater {
       const float least = kLeastVisible * count;
       const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
       const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
-      const bool is_contradicted = beliefs.views.is_contradicted(instance);
-      weight_of_free_[instance] = is_contradicted                           ? 0.0F
+      weight_of_free_[instance] = beliefs.views.is_contradicted(instance)   ? 0.0F
                                   : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
                                                                             : 1.0F;
       if (visible < std::max(2.0F, least)) continue;
       beliefs.views.add(instance, free_ratio);
-      if (free_ratio >= pass_ratio_) {
-        if (is_contradicted) continue;
-        raise(beliefs.instances[instance], free_ratio);
-        beliefs.changed[instance] = 1;
-      } else if (is_hit) {
-        lower(beliefs.instances[instance]);
-        beliefs.changed[instance] = 1;
-        const auto hits = static_cast<float>(all.hit);
-        if (free_ratio <= 1.0F - kContradictingHits && hits >= kLeastKnown * count) {
-          on_hit(instance);
-        }
+      const auto hits = static_cast<float>(all.hit);
+      if (free_ratio <= 1.0F - kContradictingHits && hits >= InstanceBeliefs::kLeastKnown * count) {
+        on_hit(instance);
       }
     }
   }
 
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
-  // limits of FreeSpaceSum, or if few samples are free. `weight`: of free samples. Those of a
+  // limits of FreeSpaceSum. `weight`: of free samples. Those of a
   // reference that mostly hits an instance, or sees little of it, may lie at an edge of a standing
   // object, if the instance is not larger than one object: they count half, and later hits take
   // them back. A single hit sets `contested`, but not `occupied`. Returns whether a verdict may
@@ -312,8 +295,7 @@ class InstanceBeliefUpdater {
               float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
-    if (free >= kLeastFree * static_cast<float>(samples) &&
-        free_ratio >= FreeSpaceSum::kFreeRatio) {
+    if (free_ratio >= FreeSpaceSum::kFreeRatio) {
       if (weight <= 0.0F) return false;
       belief.turns |= 1U;
       sum_.raise(belief.level, free_ratio, weight);
@@ -331,23 +313,17 @@ class InstanceBeliefUpdater {
            belief.turns != before.turns;
   }
 
-  void raise(Belief& belief, float free_ratio) const {
-    sum_.raise(belief.level, free_ratio);
-    belief.peak = std::max(belief.peak, belief.level);
-  }
   void lower(Belief& belief) const {
     belief.contested = 1;
     if (belief.level > 0.0F) belief.hit_again = 1;
     sum_.lower(belief.level);
   }
 
-  float pass_ratio_;
   float removal_ratio_;
   float large_removal_ratio_;
   FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;
-  float whole_level_;
   std::vector<float> weight_of_free_;   // by instance: of free samples of the current reference
   std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
 };

@@ -93,7 +93,6 @@ class InstanceJudge {
   explicit InstanceJudge(const FreeSpaceConfig& config)
       : use_tracks_(config.use_tracks),
         presume_dynamic_(config.presume_dynamic),
-        still_weight_(static_cast<float>(config.still_weight)),
         track_ratio_(static_cast<float>(config.track_ratio)),
         track_level_(static_cast<float>(log_odds(config.tau_track))) {}
 
@@ -102,21 +101,16 @@ class InstanceJudge {
   float own_log_odds(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                      std::size_t instance) const {
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    const float unit = updater.increment();
+    constexpr float kStill = -0.1F;  // increments of p_free, chosen on random worlds
+    float increments = counts.stands_still() ? kStill : 0.0F;
     if (removes_whole(evidence, updater, instance)) {
-      return (2 * counts.moved >= counts.decided && counts.moved > 0 ? 2.0F : 1.0F) * unit;
+      increments = 2 * counts.moved >= counts.decided ? 2.0F : 1.0F;
     }
-    const auto moved = static_cast<float>(counts.moved);
-    const auto decided = static_cast<float>(counts.decided);
-    const bool is_known =
-        decided >= InstanceBeliefUpdater::kLeastKnown * static_cast<float>(counts.total) &&
-        decided > 0.0F;
-    return is_known && moved < kStillRatio * decided ? -still_weight_ * unit : 0.0F;
+    return increments * updater.increment();
   }
 
-  /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed,
-  /// and kAlongTrack for an instance that merges a mover with what stands beside it. Calls
-  /// `on_removed(instance)` for each instance that is removed as a whole.
+  /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed.
+  /// Calls `on_removed(instance)` for each instance that is removed as a whole.
   template <class OnRemoved>
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
              bool may_presume, std::vector<Verdict>& verdicts, OnRemoved&& on_removed) {
@@ -152,8 +146,6 @@ class InstanceJudge {
   }
 
  private:
-  // An instance stands still if its ratio of moved to decided samples is below this.
-  static constexpr float kStillRatio = 0.02F;
   static constexpr std::size_t kLeastGroup = 4;  // samples
 
   bool removes_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
@@ -192,20 +184,8 @@ class InstanceJudge {
     if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
     const float along_track = evidence.tracked.instances[instance].track_log_odds();
     level = std::max(level, along_track);
-    const bool is_of_track = may_presume || !is_mostly_standing(evidence, instance);
-    if (along_track >= track_level_ && is_of_track) return Cause::kAlongTrack;
+    if (along_track >= track_level_) return Cause::kAlongTrack;
     return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
-  }
-
-  // Whether an instance longer than a car merges a mover with what stands beside it: most of its
-  // samples are decided, some of these moved, and more stand. Its track is that of the mover.
-  static bool is_mostly_standing(const InstanceEvidence& evidence, std::size_t instance) {
-    constexpr float kLongestCar = 9.0F;  // m, also with a trailer
-    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    const auto moved = static_cast<float>(counts.moved);
-    return evidence.tracked.shapes[instance].length > kLongestCar &&
-           2 * counts.decided >= counts.total && 2 * counts.moved < counts.decided &&
-           moved >= kStillRatio * static_cast<float>(counts.decided);
   }
 
   // Whether half of the decided samples of an instance moved, or enough of those of its track: few
@@ -237,7 +217,6 @@ class InstanceJudge {
 
   bool use_tracks_;
   bool presume_dynamic_;
-  float still_weight_;
   float track_ratio_;
   float track_level_;
   SupervoxelGroups groups_;

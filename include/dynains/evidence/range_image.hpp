@@ -80,7 +80,7 @@ class RangeImage {
     keep_objects(grid, limits, scratch);
     collect(grid, ground, {}, scratch.nearest.data());
     close_holes(grid, scratch);
-    store_with_least_around(grid, limits, scratch);
+    store_with_least_around(grid, scratch);
     widen(grid, limits, scratch);
   }
 
@@ -228,8 +228,7 @@ class RangeImage {
   }
 
   // Writes the cells of the image from the nearest returns of their 3x3 cells.
-  void store_with_least_around(const RangeImageGrid& grid, const ProtectionLimits& limits,
-                               Scratch& scratch) {
+  void store_with_least_around(const RangeImageGrid& grid, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     make_cells(grid);
@@ -244,7 +243,7 @@ class RangeImage {
       using Short = typename decltype(packs)::Short;
       for (std::size_t row = 0; row < rows; ++row) {
         merge_three_rows<Short>(grid, row, scratch);
-        store_row<Short>(grid, limits, row, scratch);
+        store_row<Short>(grid, row, scratch);
       }
     });
   }
@@ -292,14 +291,12 @@ class RangeImage {
   }
 
   // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, or if
-  // no beam crosses it, unless near objects protect it. A cell lies beyond the outermost beam if
-  // only rows on one side have returns. In the row of the highest beam and above, its own row is
-  // not enough, because a slanted surface a little above that beam is much nearer than its return.
+  // no beam crosses it. It lies beyond the outermost beam if only rows on one side have returns. In
+  // the row of the highest beam and above, its own row is not enough, because a slanted surface a
+  // little above that beam is much nearer than its return.
   template <class Short>
-  void store_row(const RangeImageGrid& grid, const ProtectionLimits& limits, std::size_t row,
-                 const Scratch& scratch) {
-    const Short nothing(kNothing), unknown(kUnknown), beyond(kBeyond), near(limits.limit[0]);
-    const Short zero(0), one_return(-1);
+  void store_row(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
+    const Short nothing(kNothing), unknown(kUnknown), beyond(kBeyond), zero(0), one_return(-1);
     const std::size_t stride = grid.stride();
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
     const std::int16_t* const leasts = scratch.least.data();
@@ -313,9 +310,6 @@ class RangeImage {
     const auto least_of_three = [](const std::int16_t* at) {
       return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
     };
-    const auto least_object = [&](std::size_t object_row, std::size_t column) {
-      return least_of_three(row_of(scratch.objects, object_row, grid, scratch) + column);
-    };
     for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < stride;
          column += detail::kShortPackWidth) {
       const std::int16_t* const count = counts + column;
@@ -328,14 +322,7 @@ class RangeImage {
       const Short is_crossed = (here < nothing) | ((Short::load(middle + column - 1) < nothing) &
                                                    (Short::load(middle + column + 1) < nothing));
       const Short known = (returns < one_return) & is_between & is_crossed;
-      Short alone = unknown;
-      const Short guarded = select(is_between, ~known, is_moving(here));
-      if (guarded.any()) {
-        const Short object = min(min(least_object(row - 1, column), least_object(row, column)),
-                                 least_object(row + 1, column));
-        alone = select(guarded & (object < near), object, unknown);
-      }
-      const Short staying = select(known, least_of_three(leasts + column), alone);
+      const Short staying = select(known, least_of_three(leasts + column), unknown);
       // A moving point in the cell itself occludes the points behind it.
       const Short hiding = min(select(staying < zero, nothing, staying), here);
       const Short around = select(is_moving(here), hiding, select(is_between, staying, beyond));

@@ -166,18 +166,13 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     auto& descriptor = belief_descriptor_ ? *belief_descriptor_ : descriptor_;
     descriptor.describe_rest();
     belief_.reset();
-    const std::size_t last = clusters_.scan_count() - 1;
-    const bool is_sequence = observations_ == BeliefObservations::kSequence;
-    const std::size_t first = is_sequence                                    ? 1
-                              : observations_ == BeliefObservations::kNewest ? last
-                                                                             : 0;
-    for (std::size_t k = first; k <= last; ++k) {
-      if (observations_ != BeliefObservations::kOthers) {
-        belief_.update(descriptor.heights(k), descriptor.cluster_heights(is_sequence ? k : last));
-      } else if (!cluster.scan(k).empty()) {
-        belief_.update(descriptor.heights(k),
-                       heights_of_others(descriptor, cluster.scan_count(), k));
-      }
+    const std::size_t count = clusters_.scan_count();
+    if (observations_ == BeliefObservations::kNewest) {
+      belief_.update(descriptor.heights(count - 1), descriptor.cluster_heights(count - 1));
+    }
+    for (std::size_t k = 0; observations_ == BeliefObservations::kOthers && k < count; ++k) {
+      if (cluster.scan(k).empty()) continue;
+      belief_.update(descriptor.heights(k), heights_of_others(descriptor, count, k));
     }
     verdict.belief = static_cast<float>(belief_.posterior());
     verdict.is_dynamic = belief_.is_dynamic() ? 1 : 0;
