@@ -15,6 +15,7 @@ struct ClassName {
 /// SemanticKITTI.
 constexpr ClassName kClassNames[] = {{0, "unlabeled"},
                                      {1, "outlier"},
+                                     {9, "static"},
                                      {10, "car"},
                                      {11, "bicycle"},
                                      {13, "bus"},
@@ -39,6 +40,7 @@ constexpr ClassName kClassNames[] = {{0, "unlabeled"},
                                      {80, "pole"},
                                      {81, "traffic-sign"},
                                      {99, "other-object"},
+                                     {251, "moving"},
                                      {252, "moving-car"},
                                      {253, "moving-bicyclist"},
                                      {254, "moving-person"},
@@ -62,7 +64,7 @@ std::size_t take_id(std::string_view& text, std::string_view whole) {
 
 }  // namespace
 
-TruthClasses::TruthClasses(Unlabeled unlabeled) : TruthClasses("252-259", unlabeled) {}
+TruthClasses::TruthClasses(Unlabeled unlabeled) : TruthClasses("251-259", unlabeled) {}
 
 TruthClasses::TruthClasses(std::string_view dynamic_classes, Unlabeled unlabeled)
     : unlabeled_(unlabeled) {

@@ -409,6 +409,11 @@ OtherValues Recording::read_other_values(std::size_t i) const {
   return reader_->read_other_values(address(i));
 }
 
+bool Recording::has_labels(std::size_t i) const {
+  return labels_ == Labels::kFiles ? fs::exists(folder_ / "labels" / (name(i) + ".label"))
+                                   : has_labels();
+}
+
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
   if (labels_ == Labels::kIntensity) return labels_of_intensity(read_scan(i));
   if (labels_ != Labels::kFiles) return reader_->read_labels(address(i));

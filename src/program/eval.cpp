@@ -84,6 +84,11 @@ void eval(const EvalOptions& options) {
   TextFile json(options.json);
   TextFile csv(options.csv);
   LabelledSequence sequence(std::move(recording), options.window, runs);
+  if (sequence.missing_truths() > 0) {
+    std::cerr << "dynains: warning: " << sequence.missing_truths() << " of "
+              << sequence.missing_truths() + sequence.size()
+              << " scans have no ground truth and are not judged" << std::endl;
+  }
 
   std::vector<PointFile> map_files;
   std::vector<evaluation::MapEstimate> maps;

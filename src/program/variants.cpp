@@ -65,6 +65,11 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
     throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
                       " variants can be evaluated at once");
   }
+  if (sequence.missing_truths() > 0) {
+    throw IoError(sequence.sequence().folder().string() + ": " +
+                  std::to_string(sequence.missing_truths()) +
+                  " scans have no ground truth; an experiment needs that of all");
+  }
   VariantVerdicts verdicts;
   verdicts.in_map.resize(sequence.size());
   verdicts.instances.resize(sequence.size());

@@ -37,14 +37,18 @@ LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window
     if (chosen) return number >= window.start.value_or(0) && number <= window.end.value_or(number);
     return every_run_has(index);
   };
-  while (first_ < sequence_.size() && !inside(first_)) ++first_;
-  last_ = sequence_.size();
-  while (last_ > first_ && !inside(last_ - 1)) --last_;
-  if (first_ == last_) {
-    throw IoError(chosen ? folder.string() + ": no scan within the chosen window"
-                         : (runs_.front().folder / runs_.front().kind).string() +
-                               ": no labels for any scan of " + folder.string());
+  std::size_t first = 0, last = sequence_.size();
+  while (first < last && !inside(first)) ++first;
+  while (last > first && !inside(last - 1)) --last;
+  for (std::size_t i = first; i < last; ++i) {
+    if (sequence_.has_labels(i)) scans_.push_back(i);
   }
+  missing_truths_ = last - first - scans_.size();
+  if (!scans_.empty()) return;
+  if (first < last) throw IoError((folder / "labels").string() + ": no label of any chosen scan");
+  throw IoError(chosen ? folder.string() + ": no scan within the chosen window"
+                       : (runs_.front().folder / runs_.front().kind).string() +
+                             ": no labels for any scan of " + folder.string());
 }
 
 bool LabelledSequence::every_run_has(std::size_t index) const {
@@ -62,7 +66,7 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   next_index_ = i + 1 < size() ? i + 1 : 0;  // the evaluation reads all scans twice
   reading_.begin([this] { load(next_index_, next_); });
 
-  const std::size_t index = first_ + i;
+  const std::size_t index = scans_[i];
   scan.xyz = scan_.points.xyzi.data();
   scan.stride = 4;
   scan.T_world_sensor = sequence_.T_world_sensor(index);
@@ -75,7 +79,7 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
 }
 
 void LabelledSequence::load(std::size_t i, Scan& scan) const {
-  const std::size_t index = first_ + i;
+  const std::size_t index = scans_[i];
   sequence_.read_scan(index, scan.points);
   scan.truth = sequence_.read_labels(index);
   scan.in_map.assign(runs_.empty() ? 0 : scan.truth.size(), 0);

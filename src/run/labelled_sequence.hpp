@@ -42,20 +42,22 @@ struct RunLabels {
 /// Reads scan by scan, the next one in another thread; holds two scans at a time.
 class LabelledSequence {
  public:
-  /// Takes a recording and chooses its scans: those within `window`; without a window, from the
-  /// first to the last scan that every run has labels for. Throws IoError if the sequence has no
-  /// ground truth, or no scan is left.
+  /// Takes a recording and chooses its scans with ground truth: those within `window`; without a
+  /// window, from the first to the last scan that every run has labels for. Throws IoError if no
+  /// scan is left.
   LabelledSequence(Recording recording, const ScanWindow& window, std::vector<RunLabels> runs = {});
   LabelledSequence(const LabelledSequence&) = delete;
   LabelledSequence& operator=(const LabelledSequence&) = delete;
 
   const Recording& sequence() const { return sequence_; }
-  std::size_t size() const { return last_ - first_; }
-  /// Index within sequence() of scan i of the window.
-  std::size_t index(std::size_t i) const { return first_ + i; }
+  std::size_t size() const { return scans_.size(); }
+  /// Index within sequence() of chosen scan i.
+  std::size_t index(std::size_t i) const { return scans_[i]; }
+  /// Scans of the window without ground truth.
+  std::size_t missing_truths() const { return missing_truths_; }
 
-  /// evaluation::ScanSource over the window. Throws IoError for files that are missing, that do not
-  /// match the scan, or that hold labels no run writes.
+  /// evaluation::ScanSource over the chosen scans. Throws IoError for files that are missing, that
+  /// do not match the scan, or that hold labels no run writes.
   bool read(std::size_t i, evaluation::LabelledScan& scan);
 
  private:
@@ -73,8 +75,8 @@ class LabelledSequence {
 
   Recording sequence_;
   std::vector<RunLabels> runs_;
-  std::size_t first_ = 0;  // half-open range within sequence_
-  std::size_t last_ = 0;
+  std::vector<std::size_t> scans_;  // indices within sequence_
+  std::size_t missing_truths_ = 0;
   Scan scan_;
   Scan next_;  // belongs to the reading thread until reading_.wait()
   std::size_t next_index_ = 0;

@@ -140,6 +140,38 @@ TEST_CASE("eval scores a run beside identity and oracle") {
   CHECK(has(window, "2 scans, "));
 }
 
+TEST_CASE("eval judges the scans that have ground truth, and tells how many have none") {
+  const JudgedStreet street;
+  fs::remove(street.sequence / "labels" / "000001.label");
+  std::ostringstream told;
+  std::streambuf* const before = std::cerr.rdbuf(told.rdbuf());
+  const std::string text = call(street.eval());
+  std::cerr.rdbuf(before);
+  CHECK(has(text, "2 scans, "));
+  CHECK(has(told.str(), "1 of 3 scans have no ground truth"));
+  CHECK(nlohmann::json::parse(read_text(street.json))["rows"][1]["points"]["ha"] == 100.0);
+  CHECK(has(message_of({"experiment", "sweep", street.sequence.string(), "--values", "0.6"}),
+            "1 scans have no ground truth; an experiment needs that of all"));
+  fs::remove(street.sequence / "labels" / "000000.label");
+  fs::remove(street.sequence / "labels" / "000002.label");
+  CHECK(has(message_of(street.eval()), "no label of any chosen scan"));
+}
+
+TEST_CASE("Ground truth of moving object segmentation is judged as it is") {
+  const JudgedStreet street;
+  for (std::size_t i = 0; i < street.scans.size(); ++i) {
+    std::vector<std::uint32_t> labels;
+    for (const std::uint32_t truth : street.scans[i].truth) {
+      labels.push_back(evaluation::semantic_class(truth) >= 252 ? 251 : 9);
+    }
+    write_labels(street.sequence / "labels" / (scan_name(i) + ".label"), labels);
+  }
+  call(street.eval());
+  const auto json = nlohmann::json::parse(read_text(street.json));
+  CHECK(json["rows"][1]["points"]["da"] == 100.0);
+  CHECK(json["rows"][1]["points"]["sa"] == 100.0);
+}
+
 TEST_CASE("eval --online scores the verdicts without latency, and only these") {
   const JudgedStreet street;
   const auto accuracy = [&](const std::vector<std::string>& more) {

@@ -201,12 +201,13 @@ TEST_CASE("Class lists are ids and ranges") {
   CHECK(moving(252) == Truth::kDynamic);
   CHECK(moving(258) == Truth::kDynamic);
   CHECK(moving(259 | 5U << 16U) == Truth::kDynamic);
-  CHECK(moving(251) == Truth::kStatic);
+  CHECK(moving(251) == Truth::kDynamic);
+  CHECK(moving(250) == Truth::kStatic);
   CHECK(moving(260) == Truth::kStatic);
   CHECK(moving(0) == Truth::kIgnored);
   CHECK(moving(1) == Truth::kIgnored);
   CHECK(TruthClasses(Unlabeled::kStatic)(1) == Truth::kStatic);
-  CHECK(moving.dynamic_classes() == "252-259");
+  CHECK(moving.dynamic_classes() == "251-259");
 
   const TruthClasses own("9,3-5", Unlabeled::kIgnore);
   CHECK(own(4) == Truth::kDynamic);
@@ -218,7 +219,7 @@ TEST_CASE("Class lists are ids and ranges") {
 }
 
 TEST_CASE("A list of dynamic classes has a short text form that can be read back") {
-  for (const char* list : {"252-259", "3-5,9", "0", "65535", "1,3,5-6"}) {
+  for (const char* list : {"251-259", "3-5,9", "0", "65535", "1,3,5-6"}) {
     CHECK(TruthClasses(list, Unlabeled::kIgnore).dynamic_classes() == list);
   }
   CHECK(TruthClasses("9,3,4,5,5", Unlabeled::kIgnore).dynamic_classes() == "3-5,9");

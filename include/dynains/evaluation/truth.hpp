@@ -32,7 +32,8 @@ constexpr std::uint16_t semantic_instance(std::uint32_t label) {
 /// Mapping from SemanticKITTI classes to Truth. Classes are static by default.
 class TruthClasses {
  public:
-  /// Dynamic: SemanticKITTI's moving classes, 252 to 259.
+  /// Dynamic: SemanticKITTI's moving classes, 252 to 259, and 251 of its benchmark of
+  /// moving object segmentation.
   TruthClasses() : TruthClasses(Unlabeled::kIgnore) {}
   explicit TruthClasses(Unlabeled unlabeled);
 

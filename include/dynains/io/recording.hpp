@@ -174,6 +174,8 @@ class Recording {
   /// Whether the poses are those of VIEWPOINT.
   bool has_viewpoints() const { return has_viewpoints_; }
   bool has_labels() const { return labels_ != Labels::kNone; }
+  /// Whether scan i has labels: files of some scans may be missing.
+  bool has_labels(std::size_t i) const;
   /// Whether read_scan() moves points to the sensor frame at the time of the scan.
   bool is_deskewed() const { return options_.deskew; }
   /// Position of the sensor in the frame of the clouds, m.
