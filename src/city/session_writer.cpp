@@ -137,7 +137,7 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session,
       session_(std::move(session)),
       mode_(mode),
       points_(city.grid(), points),
-      references_(references) {
+      references_(references, FreeSpaceConfig().lateral_margin) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +
                       "\" must consist of letters, digits, '.', '_' and '-', and begin with a "

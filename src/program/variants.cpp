@@ -13,20 +13,25 @@ namespace {
 /// Both passes over the window for one variant.
 class RevisedVerdicts {
  public:
-  explicit RevisedVerdicts(std::size_t scans) : verdicts_(scans) {}
+  RevisedVerdicts(std::size_t scans, const FreeSpaceConfig& evidence)
+      : evidence_(evidence), verdicts_(scans) {}
 
+  void compare(const FrameResult& frame) { compared_.add(frame); }
   void take(const ScanVerdict& verdict) { verdicts_[verdict.scan].take(verdict, false); }
 
   /// Calls `visit(verdict)` with the verdicts of the second pass.
   template <class Visitor>
   void revise(LabelledSequence& sequence, Visitor&& visit) {
     MemoryStore store;
-    SecondPass pass(store);
-    for_each_scan(sequence, [&](const ScanVerdict& verdict) { pass.add(points_, verdict); });
+    SecondPassConfig config;
+    config.evidence = evidence_;
+    SecondPass pass(store, config);
+    for_each_scan(sequence, [&](const ScanVerdict& verdict) {
+      pass.add(points_, verdict, compared_[verdict.scan]);
+    });
     pass.test();
     for_each_scan(sequence, [&](const ScanVerdict& verdict) {
-      pass.revise(points_, static_cast<std::uint32_t>(verdict.scan), verdict.T_world_sensor,
-                  verdicts_[verdict.scan]);
+      pass.revise(points_, static_cast<std::uint32_t>(verdict.scan), verdicts_[verdict.scan]);
       visit(verdict);
     });
   }
@@ -53,7 +58,9 @@ class RevisedVerdicts {
     }
   }
 
+  FreeSpaceConfig evidence_;
   std::vector<VerdictArrays> verdicts_;
+  ComparedPoses compared_;
   PointBuffer points_;
 };
 
@@ -97,7 +104,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
-    if (variant.passes > 1) revised[removers.size()].emplace(sequence.size());
+    if (variant.passes > 1) revised[removers.size()].emplace(sequence.size(), config.evidence);
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;
@@ -108,6 +115,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
         return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
                                 scan.T_world_sensor, scan.time);
       });
+      if (revised[v]) revised[v]->compare(frame);
       if (answer == Answer::kNewest) {
         take(v, frame.newest);
       } else if (frame.finished) {

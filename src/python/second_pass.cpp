@@ -60,13 +60,17 @@ class SecondPassInMemory {
  public:
   explicit SecondPassInMemory(const SecondPassConfig& config) : pass_(store_, config) {}
 
-  void add(const py::object& points, const Verdict& verdict) {
+  void add(const py::object& points, const Verdict& verdict, const py::object& T_world_compared,
+           bool begins_epoch) {
+    const ComparedPose compared = {
+        to_pose(T_world_compared.is_none() ? py::object(verdict.T_world_sensor) : T_world_compared),
+        begins_epoch};
     const PointBuffer buffer = copied_points(points);
     const VerdictArrays arrays = arrays_of(verdict);
     const ScanVerdict first = over(arrays, verdict);
     const py::gil_scoped_release release;
     const std::lock_guard<std::mutex> lock(mutex_);
-    pass_.add(buffer, first);
+    pass_.add(buffer, first, compared);
   }
   void test() {
     const py::gil_scoped_release release;
@@ -76,11 +80,10 @@ class SecondPassInMemory {
   Verdict revise(const py::object& points, const Verdict& verdict) {
     const PointBuffer buffer = copied_points(points);
     VerdictArrays arrays = arrays_of(verdict);
-    const Pose T_world_sensor = to_pose(verdict.T_world_sensor);
     {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
-      pass_.revise(buffer, static_cast<std::uint32_t>(verdict.scan), T_world_sensor, arrays);
+      pass_.revise(buffer, static_cast<std::uint32_t>(verdict.scan), arrays);
     }
     return Verdict(OwnedVerdict(over(arrays, verdict)));
   }
@@ -116,8 +119,12 @@ void bind_second_pass(py::module_& module) {
            "static: 'always' (nothing that came or went) or 'last' (what stands at last). threads: "
            "1 or 2. Raises ConfigError.")
       .def("add", &SecondPassInMemory::add, py::arg("points"), py::arg("verdict"),
+           py::arg("T_world_compared") = py::none(), py::arg("begins_epoch") = false,
            "Takes a scan, (N, 3 to 64) metres, sensor frame, and the final ScanVerdict on it, in "
-           "the order of the scans. Raises UsageError for another order or size.")
+           "the order of the scans. T_world_compared: (4, 4), the pose with the corrections of "
+           "FrameResult.pose_residual; default: as pushed. begins_epoch: whether "
+           "FrameResult.began_epoch tells so; no scan before it is compared with it. Raises "
+           "UsageError for another order or size.")
       .def("test", &SecondPassInMemory::test, "Tests all places, after the last scan.")
       .def("revise", &SecondPassInMemory::revise, py::arg("points"), py::arg("verdict"),
            "The revised ScanVerdict on a scan.")

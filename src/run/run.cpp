@@ -266,6 +266,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   if (plan.passes > 1) {
     SecondPassConfig config;
     config.static_policy = plan.static_policy;
+    config.evidence = plan.config.evidence;
     config.threads = outputs.thread == std::launch::async ? 2 : 1;
     results.wait_for(second_pass.emplace(store.emplace(outputs.folder), config));
   }

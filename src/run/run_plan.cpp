@@ -78,7 +78,7 @@ void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Confi
 
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
-  const int passes = passes_of(settings);
+  const int passes = settings.passes;
   if (passes < 1 || passes > 2) {
     throw ConfigError("--passes " + std::to_string(passes) + ": expected 1 or 2");
   }
@@ -105,7 +105,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   add_map_attributes(settings, config, outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
-  if (passes_of(settings) > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
+  if (settings.passes > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
   return outputs;
 }
 
@@ -232,7 +232,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["session"] = session.info.name;
     if (session.T_city_start) request["align_start"] = extrinsic_text(*session.T_city_start);
   }
-  request["passes"] = passes_of(settings);
+  request["passes"] = settings.passes;
   if (!outputs.log.empty()) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
@@ -240,17 +240,10 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range);
   InputFiles inputs = inputs_of(settings, sequence);
-  return {config,
-          std::move(sequence),
-          range,
-          outputs,
-          std::move(listing),
-          std::move(inputs),
-          configuration,
-          std::move(request),
-          std::move(session),
-          passes_of(settings),
-          settings.static_policy};
+  return {config,          std::move(sequence),   range,
+          outputs,         std::move(listing),    std::move(inputs),
+          configuration,   std::move(request),    std::move(session),
+          settings.passes, settings.static_policy};
 }
 
 void check_is_no_scan(const fs::path& output, const Recording& recording) {

@@ -134,7 +134,9 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   }
 }
 
-void RunResults::take_newest(const NewestVerdict& verdict) {
+void RunResults::take_newest(const FrameResult& frame) {
+  const NewestVerdict& verdict = frame.newest;
+  if (second_pass_ != nullptr) compared_.add(frame);
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
@@ -154,6 +156,7 @@ void JudgedScan::refer_to_arrays() {
 void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(verdict, needs_beliefs_);
+  if (second_pass_ != nullptr) judged_.compared = compared_[verdict.scan];
   if (scan != nullptr) std::swap(judged_.scan, *scan);
   writing_.begin([this, reads = scan == nullptr] {
     if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
@@ -169,7 +172,7 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   final_labels_.write(recording_.name(range_.first + verdict.scan));
   if (second_pass_ != nullptr) {
     copy_points(scan, judged_.points);
-    second_pass_->add(judged_.points, verdict);
+    second_pass_->add(judged_.points, verdict, judged_.compared);
   } else {
     complete_scan(scan, verdict);
   }
@@ -201,8 +204,8 @@ void RunResults::revise_scans(const AddToMap& add_to_map,
     judged.scan = reader.next(std::move(judged.scan));
     copy_points(judged.scan, judged.points);
     final_labels_.read(recording_.name(index), judged.scan, judged.arrays);
-    const bool is_revised = second_pass_->revise(judged.points, static_cast<std::uint32_t>(i),
-                                                 T_world_sensor, judged.arrays);
+    const bool is_revised =
+        second_pass_->revise(judged.points, static_cast<std::uint32_t>(i), judged.arrays);
     finish();
     std::swap(judged_, judged);
     judged_.verdict = ScanVerdict();

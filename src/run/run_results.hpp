@@ -16,6 +16,7 @@
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
@@ -82,6 +83,7 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range);
 struct JudgedScan {
   RecordedScan scan;
   PointBuffer points;  ///< of the scan, for a second pass
+  ComparedPose compared;
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 
@@ -98,8 +100,8 @@ class RunResults {
   /// IoError.
   RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs);
 
-  /// The verdict on the scan just pushed.
-  void take_newest(const NewestVerdict& verdict);
+  /// The result of the push just made.
+  void take_newest(const FrameResult& frame);
   /// The final verdict on a scan, in the order of the scans. Keeps the content of `scan` and gives
   /// the content of an earlier scan back, whose memory the caller can use again. If `scan` is null,
   /// the scan is read from its file. Throws IoError, for the scan before as well.
@@ -148,6 +150,7 @@ class RunResults {
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
   SecondPass* second_pass_ = nullptr;
+  ComparedPoses compared_;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;

@@ -45,7 +45,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     const FrameResult frame = push_scan(remover, recording, i, scan);
     timing.rows.push_back(timing_row(recording.name(i), scan.size(), ms_since(begin), frame));
     timing.rows.back().time = recording.time(i);
-    results.take_newest(frame.newest);
+    results.take_newest(frame);
     if (frame.finished) results.take_final(scans.next_judged(), *frame.finished);
     if (!keep_going(timing.rows.size())) break;
   }

@@ -39,8 +39,7 @@ struct RunSettings {
   bool map_attributes = false;
   std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
-  /// 2: scans of the whole recording revise the first verdicts. None: see passes_of().
-  std::optional<int> passes;
+  int passes = 1;  ///< 2: scans of the whole recording revise the first verdicts
   StaticPolicy static_policy = StaticPolicy::kAlways;  ///< of two passes
   bool one_thread = false;                             ///< works, reads and writes in one thread
   bool write_online = false;
@@ -93,10 +92,9 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
   visitor(
       TextParameter{"map", self.map, &read_text<std::string>, "FILE",
                     "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"});
-  visitor(TextParameter{"passes", self.passes, &read_number<int>, "1|2",
-                        "2: after the last scan, scans of the whole recording remove what came or "
-                        "went at any time, and bring back what stands; 1: the verdicts of the "
-                        "stream [2; 1 with decision window]"});
+  visitor(Parameter{"passes", self.passes, closed(1, 2), "",
+                    "2: after the last scan, scans of the whole recording remove what came or went "
+                    "at any time, and bring back what stands; 1: the verdicts of the stream"});
   visitor(Parameter{"static", self.static_policy, Bounds(), "",
                     "with two passes: what never came or went, or what stands at last, as a car "
                     "that has parked"});
@@ -153,12 +151,6 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
   visitor(Parameter{"one_thread", self.one_thread, Bounds(), "",
                     "after the check of poses, the run works, reads and writes in one thread, for "
                     "machines on which many runs use all cores"});
-}
-
-/// Passes over the recording: as set, else two. One if the run decides by the window, which is what
-/// the paper does.
-inline int passes_of(const RunSettings& settings) {
-  return settings.passes.value_or(settings.config.decision == Decision::kWindow ? 1 : 2);
 }
 
 }  // namespace dynains::program

@@ -550,7 +550,7 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
 }
 
 TEST_CASE("references of a session: coded images are the images") {
-  RecordingReferences recorder{RecordingReferencesConfig()};
+  RecordingReferences recorder(RecordingReferencesConfig(), FreeSpaceConfig().lateral_margin);
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
   const RecordingReference* const reference =
       recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 0);

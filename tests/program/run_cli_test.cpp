@@ -169,7 +169,7 @@ TEST_CASE("The same input gives the same bytes") {
 
 TEST_CASE("Progress is plain lines in a pipe, and nothing with --quiet") {
   const Fixture fixture;
-  const Outcome loud = fixture.run();
+  const Outcome loud = fixture.run({"--passes", "2"});
   CHECK_THAT(loud.err, ContainsSubstring("\n12 of 12 scans (") &&
                            Catch::Matchers::EndsWith(" revised scans/s)\n"));
   CHECK(loud.err.find('\r') == std::string::npos);

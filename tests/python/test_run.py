@@ -36,7 +36,7 @@ def test_a_run_writes_its_results(drive, finished, street):
     assert repr(finished) == f"<dynains.RunResult: {len(street)} scans in {finished.folder}>"
 
 
-def test_labels_of_a_run_are_those_of_both_passes(drive, finished):
+def test_labels_of_a_run_are_those_of_the_remover(drive, finished):
     # A run finds the range of the own body.
     remover = dynains.DynaInsRemover(min_range=finished.report["configuration"]["min_range"])
     scans = list(dynains.Recording(drive))
@@ -45,11 +45,6 @@ def test_labels_of_a_run_are_those_of_both_passes(drive, finished):
         frame = remover.push(scan.points, scan.T_world_sensor, scan.time)
         verdicts += [frame.finished] if frame.finished else []
     verdicts += remover.flush()
-    second_pass = dynains.SecondPass()
-    for scan, verdict in zip(scans, verdicts):
-        second_pass.add(scan.points, verdict)
-    second_pass.test()
-    verdicts = [second_pass.revise(s.points, verdict) for s, verdict in zip(scans, verdicts)]
     for name, verdict in zip(sorted(read_labels(finished.folder)), verdicts):
         written = np.fromfile(finished.labels / name, np.uint32) & 0xFFFF
         np.testing.assert_array_equal(written == 251, verdict.labels == dynains.Label.DYNAMIC)

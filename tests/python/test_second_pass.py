@@ -7,14 +7,19 @@ SENSOR_HEIGHT = 1.8  # m
 
 
 def measure(y, has_van):
-    """Scan from (0, y) of a street between walls, and which points are on the van at x = 3."""
+    """Scan from (0, y) of a street between walls with a pier of 2 m every 10 m, and which points
+    are on the van at x = 3."""
     elevation, azimuth = np.meshgrid(np.arange(-0.4, 0.2, 0.02), np.arange(-3.14, 3.14, 0.01))
     dx = np.cos(elevation) * np.cos(azimuth)
     dy = np.cos(elevation) * np.sin(azimuth)
     dz = np.sin(elevation)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.where(np.abs(dx) > 0.1, 8.0 / np.abs(dx), np.inf)
         distance = np.where(dz < 0, np.minimum(distance, -SENSOR_HEIGHT / dz), distance)
+        for pier in np.arange(-100, 181, 10):
+            at_pier = (pier - y) / dy
+            is_hit = (at_pier > 0) & (at_pier < distance) & (np.abs(at_pier * dx) > 6)
+            distance = np.where(is_hit, at_pier, distance)
         at_van = np.where(dx > 0.05, 3.0 / dx, np.inf)
     with np.errstate(invalid="ignore"):
         is_van = (at_van < distance) & (np.abs(y + at_van * dy) < 2.5)
@@ -30,7 +35,7 @@ def measure(y, has_van):
 @pytest.fixture(scope="module")
 def drive():
     """Past the van, 80 m on, and back: then it is gone."""
-    scans = [measure(min(i, 200 - i) - 20, i < 100) for i in range(201)]
+    scans = [measure(30 - 50 * np.cos(np.pi * i / 100), i < 100) for i in range(201)]
     remover = dynains.DynaInsRemover(build_map=False)
     verdicts = []
     for i, (points, _, T_world_sensor) in enumerate(scans):

@@ -28,7 +28,7 @@ RecordingPlace judged(const std::string& epochs) {
 bool stands(const std::string& epochs, std::uint8_t hits = 2, std::uint8_t free_in_row = 0) {
   RecordingPlace place = judged(epochs);
   place.hits = hits;
-  place.longest.back() = free_in_row;
+  place.longest = free_in_row;
   return place.stands();
 }
 
@@ -64,72 +64,44 @@ TEST_CASE("two looks hit a place that stands, and twice as many as passed it in 
   CHECK(stands("krk", 4, 2));
 }
 
-TEST_CASE("what is always there was measured long enough, and few looks in a row passed it") {
-  const auto is_always_there = [](const std::string& epochs, std::uint32_t scans, int passed) {
-    RecordingPlace place = judged(epochs);
-    place.first.last_scan = place.first.first_scan + scans - 1;
-    place.longest.back() = static_cast<std::uint8_t>(passed);
-    return place.is_always_there();
-  };
-  CHECK(is_always_there("rrrr", 30, 1));
-  CHECK_FALSE(is_always_there("rrr", 30, 0));
-  CHECK_FALSE(is_always_there("rrrr", 29, 1));
-  CHECK_FALSE(is_always_there("rrrr", 30, 2));
-  CHECK(is_always_there("rrrrrrrr", 30, 2));
-}
-
-TEST_CASE("two epochs that removed all points at one end tell of motion") {
-  for (const char* const epochs : {"rrk", "krr", "rrbk", "kbrr", "krkrr"}) {
-    CAPTURE(epochs);
-    CHECK(judged(epochs).first.moved());
-  }
-  for (const char* const epochs : {"rk", "kr", "rbrk", "krrk", "rrr", "k", "rkrkr"}) {
-    CAPTURE(epochs);
-    CHECK_FALSE(judged(epochs).first.moved());
-  }
-}
-
 TEST_CASE("a place was entered or left if it was empty at the end where points were removed") {
-  constexpr std::uint8_t kFree = 0b1111;
   struct Case {
     std::string epochs;
     bool came, left;
   };
   for (const Case& one : {Case{"rk", true, false}, {"kr", false, true}, {"rr", false, false}}) {
     CAPTURE(one.epochs);
-    for (const std::uint8_t before : {std::uint8_t{0}, kFree}) {
-      for (const std::uint8_t after : {std::uint8_t{0}, kFree}) {
+    for (const bool before : {false, true}) {
+      for (const bool after : {false, true}) {
         RecordingPlace place = judged(one.epochs);
         place.free_before = before;
         place.free_after = after;
-        CHECK(place.came(0) == (one.came && before == kFree));
-        CHECK(place.left(0) == (one.left && after == kFree));
+        CHECK(place.came() == (one.came && before));
+        CHECK(place.left() == (one.left && after));
       }
     }
   }
 }
 
-TEST_CASE("looks from other ranges do not tell that a place was entered or left") {
+TEST_CASE("what came was absent before, what left after, and what a gap separates at any time") {
   RecordingPlace came = judged("rk");
-  came.free_before = 0b0100;
+  came.free_before = true;
+  CHECK(came.absence().first == 0);
+  CHECK(came.absence().last == 0);
   RecordingPlace left = judged("kr");
-  left.free_after = 0b0100;
-  for (std::size_t range = 0; range < 4; ++range) {
-    CAPTURE(range);
-    CHECK(came.came(range) == (range == 2));
-    CHECK(left.left(range) == (range == 2));
-  }
+  left.free_after = true;
+  CHECK(left.absence().first == 3);
+  CHECK(left.absence().last == UINT32_MAX);
+  CHECK(judged("k").absence().first == 0);
+  CHECK(judged("k").absence().last == UINT32_MAX);
 }
 
 TEST_CASE("what a scan measured stands since the last look that passed its place") {
   RecordingPlace place = judged("rrkk");
   place.last_free = 5;
-  CHECK_FALSE(place.stands_since(6));
-  place.is_hit_at_last = true;
   CHECK(place.stands_since(6));
   CHECK_FALSE(place.stands_since(5));
   RecordingPlace left = judged("kkr");
-  left.is_hit_at_last = true;
   CHECK_FALSE(left.stands_since(6));
 }
 

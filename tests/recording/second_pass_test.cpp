@@ -17,10 +17,15 @@ namespace {
 
 constexpr std::uint32_t kHouse = 50, kTree = 70, kCar = 10, kFlat = 1, kHigh = 2;
 
-StreetBox car_at(double x) { return {{x, 4.0, 0.0}, {x + 4.0, 5.8, 1.5}, kCar}; }
+StreetBox car_at(double x, double y = 4.0) { return {{x, y, 0.0}, {x + 4.0, y + 1.8, 1.5}, kCar}; }
 
+/// Houses on both sides tell where along the street a scan is.
 std::vector<StreetBox> street() {
   return {{{-12, 8, 0}, {-6, 11, 4}, kHouse},
+          {{-32, 8, 0}, {-26, 11, 5}, kHouse},
+          {{28, 8, 0}, {34, 11, 5}, kHouse},
+          {{-24, -11, 0}, {-18, -8, 5}, kHouse},
+          {{22, -11, 0}, {28, -8, 5}, kHouse},
           {{20, 7, 0}, {20.5, 7.5, 3}, kTree},
           {{8, -7, 0}, {12, -5, 1.6}, kHouse}};
 }
@@ -57,8 +62,16 @@ VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Remov
   return verdict;
 }
 
-SecondPassConfig last_policy() {
+/// The first pass compares fewer scans than one drive has.
+SecondPassConfig short_first_pass() {
   SecondPassConfig config;
+  config.evidence.lookback_scans = 10;
+  config.evidence.lookahead_scans = 10;
+  return config;
+}
+
+SecondPassConfig last_policy() {
+  SecondPassConfig config = short_first_pass();
   config.static_policy = StaticPolicy::kLast;
   return config;
 }
@@ -70,7 +83,9 @@ struct Counts {
 /// Points of each scan with a label, after both passes.
 std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
                           const Removes& removes = removes_nothing,
-                          const SecondPassConfig& config = {}) {
+                          const SecondPassConfig& config = short_first_pass(),
+                          const Pose& T_turned_world = Pose::Identity(),
+                          std::size_t second_epoch = 0, double jump = 0.0) {
   MemoryStore store;
   SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
@@ -78,11 +93,13 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     ScanVerdict verdict;
     verdict.scan = i;
     verdict.time = 0.5 * static_cast<double>(i);
-    verdict.T_world_sensor = recording.scans[i].T_world_sensor;
+    verdict.T_world_sensor = T_turned_world * recording.scans[i].T_world_sensor;
+    if (second_epoch > 0 && i >= second_epoch) verdict.T_world_sensor.translation().x() += jump;
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
     verdict.instances = arrays.instances;
-    pass.add(recording.scans[i].points, verdict);
+    pass.add(recording.scans[i].points, verdict,
+             {verdict.T_world_sensor, i == 0 || i == second_epoch});
   }
   pass.test([tests] { return tests; });
   CHECK(pass.is_decided() == tests);
@@ -92,7 +109,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
   for (const BoxScan& scan : recording.scans) {
     VerdictArrays arrays = first_verdict(scan, number, removes);
     const VerdictArrays before = arrays;
-    const bool has_changed = pass.revise(scan.points, number++, scan.T_world_sensor, arrays);
+    const bool has_changed = pass.revise(scan.points, number++, arrays);
     CHECK(has_changed == (arrays.labels != before.labels));
     counts.emplace_back();
     for (std::size_t i = 0; i < arrays.labels.size(); ++i) {
@@ -123,10 +140,10 @@ Counts sum(const std::vector<Counts>& counts) {
 }
 
 /// A car that is parked during the first drive, and gone in the second one.
-Recorded with_parked_car() {
+Recorded with_parked_car(double y = 4.0) {
   Recorded recording;
   std::vector<StreetBox> boxes = street();
-  boxes.push_back(car_at(4.0));
+  boxes.push_back(car_at(4.0, y));
   recording.drive(boxes, -15.0, 15.0);
   boxes.pop_back();
   recording.drive(boxes, 15.0, -15.0);
@@ -202,6 +219,37 @@ TEST_CASE("a car that parks and stays is static if what stands at last is, and s
   CHECK(sum(count(recording, kHouse, true, removes_nothing, last_policy())).removed == 0);
 }
 
+TEST_CASE("an epoch judges another one if it fits there, and no scan that was compared before") {
+  const Recorded recording = with_parked_car();
+  const std::size_t turn = recording.scans.size() / 2;
+  const auto removed_after = [&](double jump) {
+    return sum(count(recording, kCar, true, removes_nothing, short_first_pass(), Pose::Identity(),
+                     turn, jump))
+        .removed;
+  };
+  CHECK(removed_after(0.0) > 0);
+  for (const double jump : {0.3, 1.0, 3.0}) CHECK(removed_after(jump) == 0);
+  CHECK(sum(count(recording, kCar, true, removes_nothing, {})).removed == 0);
+}
+
+TEST_CASE("the ground tells which way is up") {
+  const Recorded recording = with_parked_car();
+  const Counts upright = sum(count(recording, kCar));
+  Pose T_turned_world(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.6, 0.0, 0.8)));
+  T_turned_world.translation() = Eigen::Vector3d(100.0, -50.0, 20.0);
+  const Counts turned =
+      sum(count(recording, kCar, true, removes_nothing, short_first_pass(), T_turned_world));
+  CHECK(turned.removed == Approx(upright.removed).epsilon(0.01));
+}
+
+TEST_CASE("the margins are those of the first pass") {
+  SecondPassConfig config = short_first_pass();
+  config.evidence.margin = 2.0;
+  const Recorded recording = with_parked_car(9.8);  // the wall is at 12 m
+  CHECK(sum(count(recording, kCar, true, removes_nothing, config)).removed <
+        sum(count(recording, kCar)).removed);
+}
+
 TEST_CASE("a second pass that was interrupted changes nothing") {
   CHECK(sum(count(with_parked_car(), kCar, false)).removed == 0);
 }
@@ -262,7 +310,7 @@ TEST_CASE("neither memory nor threads change the second pass") {
   CHECK(counts.removed > 0);
   for (const double memory : {0.0, 160.0}) {
     for (const int threads : {1, 2}) {
-      SecondPassConfig config;
+      SecondPassConfig config = short_first_pass();
       config.memory = memory;
       config.threads = threads;
       const Counts others = sum(count(recording, kCar, true, removes_nothing, config));
@@ -282,19 +330,19 @@ TEST_CASE("the second pass refuses scans out of order and verdicts of another si
   MemoryStore store;
   SecondPass pass(store);
   verdict.scan = 1;
-  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
   verdict.scan = 0;
-  CHECK_THROWS_AS(pass.add(PointBuffer(), verdict), UsageError);
-  pass.add(scan.points, verdict);
-  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  CHECK_THROWS_AS(pass.add(PointBuffer(), verdict, {}), UsageError);
+  pass.add(scan.points, verdict, {});
+  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
   pass.test();
   verdict.scan = 1;
-  CHECK_THROWS_AS(pass.add(scan.points, verdict), UsageError);
+  CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);
   VerdictArrays short_one = arrays;
   short_one.causes.pop_back();
-  CHECK_THROWS_AS(pass.revise(scan.points, 0, scan.T_world_sensor, short_one), UsageError);
+  CHECK_THROWS_AS(pass.revise(scan.points, 0, short_one), UsageError);
   VerdictArrays whole = arrays;
-  CHECK_FALSE(pass.revise(scan.points, 0, scan.T_world_sensor, whole));
+  CHECK_FALSE(pass.revise(scan.points, 0, whole));
   SecondPassConfig config;
   config.threads = 3;
   CHECK_THROWS_AS(SecondPass(store, config), ConfigError);

@@ -65,35 +65,33 @@ class RecordingGround {
     tiles_.free_far(sensor, kNear);
   }
 
-  /// Height of a point, m; minus infinity where no ground is known.
-  struct Rise {
-    double of_cell;  ///< above the ground of its cell, if the recording has 20 points of it or more
-    double around;   ///< above the lowest such ground within 0.8 m
-    bool is_level;   ///< whether the ground of the cell is at most 0.2 m above that: no vehicle
-  };
+  /// Puts all cells into the store.
+  void rest() { tiles_.rest(); }
 
-  /// Calls `visit(k, cell, rise)` for the located points in cells with ground. After complete().
-  template <class Visitor>
-  void for_each_rise(const LocatedPoints& located, Visitor&& visit) {
-    constexpr double kUnknown = -std::numeric_limits<double>::infinity();
-    const Span<const LocatedPoints::Run> runs = located.runs();
-    std::array<const Tile*, LocatedPoints::kMost> tiles;
-    std::array<const Cell*, LocatedPoints::kMost> cells;
-    for (std::size_t r = 0; r < runs.size(); ++r) {
-      tiles[r] = tiles_.find(tile_of(runs[r].cell));
-      cells[r] = tiles[r] == nullptr ? nullptr : &tiles[r]->cells[number_of(runs[r].cell)];
-      __builtin_prefetch(cells[r]);
-    }
-    for (std::size_t r = 0; r < runs.size(); ++r) {
-      if (cells[r] == nullptr || cells[r]->count == 0) continue;
-      const Cell& cell = *cells[r];
-      for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
-        const double z = located.at(k).z() - tiles[r]->origin;
-        visit(k, runs[r].cell,
-              Rise{cell.has_ground() ? z - static_cast<double>(cell.mean) : kUnknown,
-                   z - static_cast<double>(cell.lowest), cell.is_level()});
+  /// Calls `visit(i, cell, rise, is_level)` for the points (m, sensor frame) of which `is_taken(i)`
+  /// in cells with ground. `rise`: m, above the ground of the cell. `is_level`: whether no ground
+  /// within 0.8 m is 0.2 m lower. After complete().
+  template <class IsTaken, class Visitor>
+  void for_each_rise(PointsView points, const Pose& T_world_sensor, IsTaken&& is_taken,
+                     Visitor&& visit) {
+    for_each_located(points, T_world_sensor, is_taken, [&](const LocatedPoints& located) {
+      const Span<const LocatedPoints::Run> runs = located.runs();
+      std::array<const Tile*, LocatedPoints::kMost> tiles;
+      std::array<const Cell*, LocatedPoints::kMost> cells;
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        tiles[r] = tiles_.find(tile_of(runs[r].cell));
+        cells[r] = tiles[r] == nullptr ? nullptr : &tiles[r]->cells[number_of(runs[r].cell)];
+        __builtin_prefetch(cells[r]);
       }
-    }
+      for (std::size_t r = 0; r < runs.size(); ++r) {
+        if (cells[r] == nullptr || !cells[r]->has_ground()) continue;
+        for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
+          const double z = located.at(k).z() - tiles[r]->origin;
+          visit(located.point(k), runs[r].cell, z - static_cast<double>(cells[r]->mean),
+                cells[r]->is_level());
+        }
+      }
+    });
   }
 
  private:

@@ -139,6 +139,13 @@ class PagedTiles {
     }
   }
 
+  /// Puts all tiles into the store. Throws what it throws.
+  void rest() {
+    for (auto& entry : entries_) {
+      if (entry.second.tile) store(entry.second);
+    }
+  }
+
  private:
   struct Entry {
     std::optional<Tile> tile;  // in memory

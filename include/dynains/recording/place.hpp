@@ -64,9 +64,8 @@ class Presence {
 struct FirstVerdicts {
   std::uint16_t epoch = 0;                      ///< the open one
   std::uint16_t kept = 0, removed = 0;          ///< points in the open epoch
-  std::uint8_t removed_first = 0;               ///< epochs that only removed, before all others
-  std::uint8_t removed_last = 0;                ///< the same, after all others
-  std::uint8_t epochs = 0;                      ///< closed ones
+  bool removed_first = false;                   ///< the first epoch removed all points
+  bool removed_last = false;                    ///< the last one did
   bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept most points
   bool all_first = false, all_last = false;     ///< the first, the last epoch kept all points
   std::uint32_t sum_kept = 0, sum_removed = 0;  ///< points in the closed epochs
@@ -85,19 +84,13 @@ struct FirstVerdicts {
 
   void end_epoch() {
     if (kept + removed == 0) return;
-    const bool only_removed = kept == 0;
-    if (epochs < UINT8_MAX) ++epochs;
     kept_last = is_mostly_kept(kept, removed);
     all_last = removed == 0;
+    removed_last = kept == 0;
     if (!any_kept() && !any_removed()) {
       kept_first = kept_last;
       all_first = all_last;
-    }
-    if (only_removed && !any_kept() && removed_first < UINT8_MAX) ++removed_first;
-    if (!only_removed) {
-      removed_last = 0;
-    } else if (removed_last < UINT8_MAX) {
-      ++removed_last;
+      removed_first = removed_last;
     }
     sum_kept += kept;
     sum_removed += removed;
@@ -116,8 +109,6 @@ struct FirstVerdicts {
     return kept_first && kept_last &&
            ((all_first && all_last) || is_mostly_kept(sum_kept, sum_removed));
   }
-  /// Whether the first or the last two epochs removed all points, and others did not.
-  bool moved() const { return any_kept() && (removed_first >= 2 || removed_last >= 2); }
 };
 
 /// A cube of 0.4 m. What a scan of the first pass changes lies in one line of the cache.
@@ -127,48 +118,36 @@ struct alignas(64) RecordingPlace {
   Presence present;
   std::array<std::array<std::uint8_t, 3>, 8> samples;  ///< by octant, in 1/256 of a place
   std::uint8_t filled = 0;                             ///< octants with a sample
-  std::uint8_t farthest = 0;  ///< m, range of its points, as far as looks go; 0: none
 
   PlaceState state = PlaceState::kUnknown;
-  std::uint8_t look_free = 0, look_hit = 0, look_range = 0;  ///< of the open look
-  std::uint8_t hits = 0;                                     ///< looks
-  bool stands_with_others = false;                           ///< part of an object that stands
-  bool is_hit_at_last = false;                   ///< by the last look that passed or hit it
-  std::uint8_t free_before = 0, free_after = 0;  ///< before, after any scan measured it; by range
-  std::array<std::uint8_t, 4> run = {}, longest = {};  ///< free looks in a row, by range
-  std::array<std::uint16_t, 4> run_begin = {}, begin = {}, end = {};  ///< looks
-  std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
-  std::uint32_t object = 0;     ///< number, from 1 on, if the place has changed
+  std::uint8_t look_free = 0, look_hit = 0;         ///< of the open look
+  std::uint8_t hits = 0;                            ///< looks
+  bool free_before = false, free_after = false;     ///< before, after any scan measured it
+  std::uint8_t run = 0, longest = 0;                ///< free looks in a row
+  std::uint16_t run_begin = 0, begin = 0, end = 0;  ///< looks
+  std::uint32_t last_free = 0;                      ///< last scan of the last look that passed it
+  std::uint32_t object = 0;                         ///< number, from 1 on, if the place has changed
 
-  bool was_passed() const { return longest.back() > 0; }
-  /// Whether looks of a class of ranges passed it before the first pass saw something move into it.
-  bool came(std::size_t range) const {
-    return first.any_kept() && first.removed_first > 0 && (free_before >> range & 1U) != 0;
+  bool was_passed() const { return longest > 0; }
+  /// Whether looks passed it before the first pass saw something move into it.
+  bool came() const { return first.any_kept() && first.removed_first && free_before; }
+  /// Whether looks passed it after the first pass saw something move out of it.
+  bool left() const { return first.any_kept() && first.removed_last && free_after; }
+  /// Scans before it was filled for the first time if something came, after the last time if
+  /// something left, or all scans if it was empty in between.
+  ScanSpan absence() const {
+    if (came()) return {0, first.first_scan - 1};
+    if (left()) return {first.last_scan + 1, UINT32_MAX};
+    return {};
   }
-  /// Whether looks of a class of ranges passed it after the first pass saw something move out of
+  /// Whether what a scan measured in it is there in the end of the recording: no later look passed
   /// it.
-  bool left(std::size_t range) const {
-    return first.any_kept() && first.removed_last > 0 && (free_after >> range & 1U) != 0;
-  }
-  /// Whether what a scan measured in it is there in the end of the recording.
-  bool stands_since(std::uint32_t scan) const {
-    return is_hit_at_last && first.removed_last == 0 && scan > last_free;
-  }
-  /// Whether scans of several epochs, independent ones among them, measured it, and few looks in a
-  /// row passed it.
-  bool is_always_there() const {
-    constexpr int kFewestEpochs = 4;
-    return first.epochs >= kFewestEpochs && 4 * longest.back() <= first.epochs &&
-           first.last_scan - first.first_scan + 1 >= kIndependentScans;
-  }
-  /// Whether the first pass removed points of something that stands: of an object that is always
-  /// there, or it kept most of them or all at both ends, and at least twice as many looks
-  /// hit the place as passed it in a row.
+  bool stands_since(std::uint32_t scan) const { return !first.removed_last && scan > last_free; }
+  /// Whether the first pass removed points of something that stands: it kept most of them or all at
+  /// both ends, and at least twice as many looks hit the place as passed it in a row.
   bool stands() const {
     constexpr int kFewestHits = 2;
-    if (stands_with_others) return true;
-    return first.any_removed() && first.are_kept() && hits >= kFewestHits &&
-           hits >= 2 * longest.back();
+    return first.any_removed() && first.are_kept() && hits >= kFewestHits && hits >= 2 * longest;
   }
 };
 

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "dynains/belief/log_odds.hpp"
-#include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/marked_columns.hpp"
@@ -26,63 +25,32 @@
 
 namespace dynains {
 
-/// Parameters of the second pass over a recording.
-struct RecordingPlacesConfig {
-  double place_range = 60;  ///< m
-  double look_way = 3;      ///< m
-  double look_time = 1;     ///< s
-  int free_looks = 4;
-  int object_places = 6;
-  double most_contact = 1.5;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"place_range", self.place_range, closed(5, 300), "m",
-                      "a scan does not look at places at a larger horizontal range"});
-    visitor(Parameter{"look_way", self.look_way, closed(0, 100), "m",
-                      "way of the sensor between two independent looks at a place"});
-    visitor(Parameter{"look_time", self.look_time, closed(0.01, 1000), "s",
-                      "time between two independent looks at a place"});
-    visitor(Parameter{"free_looks", self.free_looks, closed(1, 100), "",
-                      "independent looks in a row that must pass a place, and none hit it"});
-    visitor(Parameter{"object_places", self.object_places, closed(1, 1000), "",
-                      "places of an object that came or went, at least"});
-    visitor(Parameter{"most_contact", self.most_contact, closed(0, 26), "",
-                      "most places that stay and touch an object, ratio to its own places"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("RecordingPlaces", *this); }
-};
-
 /// Places are cells of 0.4 m with points above the ground. The verdicts of the first pass on them
 /// are kept by epochs. Then reference scans test the points of each place, in the order of their
 /// times. References near each other in time and in the place of the sensor repeat the same error,
 /// and are one look; an epoch is the same for scans. A look is free if beams passed the place and
 /// none hit it. A place has changed by its state over time, not by the sum of its looks, in one of
 /// these ways:
-/// - `free_looks` looks in a row are free, no hit lies between, and the first pass kept no points
-///   of that time: beams that pass what others hit tell of something porous. Looks from farther
-///   away than the points of a place within `place_range` do not count, for beams that are far
-///   apart miss what is thin.
+/// - kFreeLooks looks in a row are free, no hit lies between, and the first pass kept no points of
+///   that time: beams that pass what others hit tell of something porous.
 /// - An object came: looks passed the place before any scan measured it, and the first epoch
 ///   removed its points.
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
-/// - It touches such places, and its first or last two epochs removed its points, or looks from
-///   farther away tell one of the above.
 ///
-/// A place takes about 170 bytes.
+/// A place takes about 130 bytes.
 class RecordingPlaces {
  public:
   using Place = RecordingPlace;
 
+  static constexpr double kPlaceRange = 60.0;  ///< m, horizontal, of a look at a place
+  static constexpr double kLookWay = 3.0;      ///< m, of the sensor between independent looks
+  static constexpr double kLookTime = 1.0;     ///< s, between independent looks
+  static constexpr int kFreeLooks = 4;
+
   /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
   /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
-  /// result. Throws ConfigError.
-  RecordingPlaces(const RecordingPlacesConfig& config, ByteStore& store, std::size_t budget)
-      : config_((config.validate(), config)), tiles_(store, budget) {}
-
-  const RecordingPlacesConfig& config() const { return config_; }
+  /// result.
+  RecordingPlaces(ByteStore& store, std::size_t budget) : tiles_(store, budget) {}
 
   /// Adds the places of the points above the ground of a scan (m, sensor frame). `time`: s. `scan`:
   /// its number; ascending.
@@ -109,7 +77,10 @@ class RecordingPlaces {
         Place& place = tiles[r]->values[numbers[r]];
         for (std::size_t k = runs[r].begin; k < runs[r].end; ++k) {
           const std::size_t i = located.point(k);
-          add_point(place, range_of(points, i), verdicts[i] == PointLabel::kDynamic, scan);
+          const bool is_removed = verdicts[i] == PointLabel::kDynamic;
+          if (!is_removed) place.present.add(scan);
+          // The first verdicts on points that are too far for looks say little of their place.
+          if (range_of(points, i) <= kPlaceRange) place.first.add(is_removed, epoch_, scan);
           add_sample(place, located, k);
         }
       }
@@ -126,7 +97,7 @@ class RecordingPlaces {
     around_.clear();
     next_around_ = 0;
     tiles_.for_each_index([&](const GroundTile& index) {
-      if (tiles_.distance(index, sensor) > config_.place_range) return;
+      if (tiles_.distance(index, sensor) > kPlaceRange) return;
       around_.emplace_back(index, &tiles_.at(index));
     });
   }
@@ -151,7 +122,6 @@ class RecordingPlaces {
         if (verdict < 0) place.present.add(look_scans_.back().second);
         std::uint8_t& number = verdict > 0 ? place.look_free : place.look_hit;
         if (number < 255) ++number;
-        place.look_range = std::max(place.look_range, tested.ranges[i]);
       }
     }
   }
@@ -164,7 +134,6 @@ class RecordingPlaces {
       tiles_.free_far(tiles_.middle(index), 0.0);
     });
     find_objects();
-    find_standing();
   }
 
   /// Begins a scan: sets `is_near` to 0 for its points (m, sensor frame) whose places, and all that
@@ -218,27 +187,17 @@ class RecordingPlaces {
   }
 
   std::size_t size() const { return tiles_.size(); }
+  /// Puts all places into the store.
+  void rest() { tiles_.rest(); }
 
   /// Whether points with a verdict are in places.
   static bool is_above_ground(PointLabel verdict) {
     return verdict == PointLabel::kStatic || verdict == PointLabel::kDynamic;
   }
 
-  /// First and last scan of the longest row of looks that passed a place; was_passed() must be
-  /// true.
+  /// Scans of the longest row of looks that passed a place; was_passed() must be true.
   ScanSpan free_scans(const Place& place) const {
-    const std::size_t k = class_of(place);
-    return span_of(place, place.longest[k] > 0 ? k : kAnyRange);
-  }
-  /// Scans before a place that has changed was filled for the first time, or after the last time.
-  /// All scans if it was empty in between.
-  ScanSpan absence(const Place& place) const {
-    const ScanSpan before = {0, place.first.first_scan - 1};
-    const ScanSpan after = {place.first.last_scan + 1, UINT32_MAX};
-    if (place.came(kAnyRange)) return before;
-    if (place.left(kAnyRange)) return after;
-    if (!place.first.moved()) return {};
-    return place.first.removed_first >= 2 ? before : after;
+    return {look_scans_[place.begin].first, look_scans_[place.end].second};
   }
   std::uint32_t object_count() const { return objects_; }
 
@@ -262,22 +221,15 @@ class RecordingPlaces {
 
  private:
   static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
-  static constexpr std::array<std::uint8_t, 4> kNear = {12, 20, 35, 60};  // m
-  static constexpr std::size_t kAnyRange = kNear.size() - 1;
 
   using Tile = VoxelTile<Place>;
   /// Places of one tile that a thread tests, and those that it saw in the open look.
   struct Tested {
     std::vector<Place*> touched;       // by the open look
     std::vector<Place*> places;        // of a tile
-    std::vector<std::uint8_t> ranges;  // m, by place
     std::vector<std::uint32_t> begin;  // by place: first sample, and the end
     PointBuffer samples;
   };
-
-  static std::uint8_t whole_metres(float metres) {
-    return static_cast<std::uint8_t>(std::min(metres, 255.0F));
-  }
 
   // The cell with this key in a tile.
   static WorldCell cell_of(const GroundTile& tile, VoxelKey key) {
@@ -288,16 +240,6 @@ class RecordingPlaces {
   // Horizontal, m.
   static float range_of(PointsView points, std::size_t i) {
     return std::sqrt(points.x[i] * points.x[i] + points.y[i] * points.y[i]);
-  }
-
-  // Adds a point of a scan. `range`: m. The first verdicts on points that are too far for looks say
-  // little of their place.
-  void add_point(Place& place, float range, bool is_removed, std::uint32_t scan) const {
-    if (!is_removed) place.present.add(scan);
-    if (range <= config_.place_range) {
-      place.first.add(is_removed, epoch_, scan);
-      place.farthest = std::max(place.farthest, std::max(whole_metres(range), std::uint8_t{1}));
-    }
   }
 
   // The first point of an octant is its sample.
@@ -315,13 +257,11 @@ class RecordingPlaces {
   }
 
   // Places of the open look stay in memory.
-  void free_far(const Eigen::Vector3d& sensor) {
-    tiles_.free_far(sensor, config_.place_range + config_.look_way);
-  }
+  void free_far(const Eigen::Vector3d& sensor) { tiles_.free_far(sensor, kPlaceRange + kLookWay); }
 
   void begin_reference(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {
-    const bool is_near = has_look_ && (sensor - look_at_).norm() < config_.look_way &&
-                         time - look_time_ < config_.look_time;
+    const bool is_near =
+        has_look_ && (sensor - look_at_).norm() < kLookWay && time - look_time_ < kLookTime;
     if (is_near) {
       look_scans_.back().second = scan;
       return;
@@ -346,78 +286,51 @@ class RecordingPlaces {
       if (place->look_hit > 0) {
         const bool is_hit = place->look_hit >= place->look_free;
         if (is_hit && place->hits < 255) ++place->hits;
-        place->free_after = 0;
-        place->is_hit_at_last = true;
-        place->run = {};
+        place->free_after = false;
+        place->run = 0;
       } else {
-        place->is_hit_at_last = false;
         place->last_free = look_scans_.back().second;
         const auto [first, last] = look_scans_.back();
-        const bool is_before = place->hits == 0 && last < place->first.first_scan;
-        const bool is_after = first > place->first.last_scan;
-        for (std::size_t k = 0; k < kNear.size(); ++k) {
-          if (place->look_range > kNear[k]) continue;
-          const auto bit = static_cast<std::uint8_t>(1U << k);
-          if (is_before) place->free_before |= bit;
-          if (is_after) place->free_after |= bit;
-          add_free(*place, k, look);
-        }
+        if (place->hits == 0 && last < place->first.first_scan) place->free_before = true;
+        if (first > place->first.last_scan) place->free_after = true;
+        add_free(*place, look);
       }
-      place->look_free = place->look_hit = place->look_range = 0;
+      place->look_free = place->look_hit = 0;
     }
     tested.touched.clear();
   }
 
   // Begins an epoch unless the sensor is near that of the open one.
   void begin_epoch(const Eigen::Vector3d& sensor, double time) {
-    const bool is_near = epoch_ > 0 && (sensor - epoch_at_).norm() < config_.look_way &&
-                         time - epoch_time_ < config_.look_time;
+    const bool is_near =
+        epoch_ > 0 && (sensor - epoch_at_).norm() < kLookWay && time - epoch_time_ < kLookTime;
     if (is_near) return;
     if (epoch_ < UINT16_MAX) ++epoch_;
     epoch_at_ = sensor;
     epoch_time_ = time;
   }
 
-  static void add_free(Place& place, std::size_t k, std::uint16_t look) {
-    if (place.run[k] == 0) place.run_begin[k] = look;
-    if (place.run[k] < 255) ++place.run[k];
-    if (place.run[k] < place.longest[k]) return;
-    place.longest[k] = place.run[k];
-    place.begin[k] = place.run_begin[k];
-    place.end[k] = look;
+  static void add_free(Place& place, std::uint16_t look) {
+    if (place.run == 0) place.run_begin = look;
+    if (place.run < 255) ++place.run;
+    if (place.run < place.longest) return;
+    place.longest = place.run;
+    place.begin = place.run_begin;
+    place.end = look;
   }
 
-  // The class of ranges from which looks at a place count: ranges at which it was measured, or all
-  // if that was from too far only.
-  static std::size_t class_of(const Place& place) {
-    std::size_t k = kAnyRange;
-    while (k > 0 && place.farthest > 0 && kNear[k] > place.farthest) --k;
-    return k;
-  }
-
-  // Scans of the longest row of looks of a class of ranges that passed a place.
-  ScanSpan span_of(const Place& place, std::size_t k) const {
-    return {look_scans_[place.begin[k]].first, look_scans_[place.end[k]].second};
-  }
-
-  // Whether looks of a class of ranges tell that what was measured in a place came or went. Beams
-  // that pass what others hit tell of something porous.
-  bool has_changed(const Place& place, std::size_t k) const {
-    const bool is_free = place.longest[k] >= config_.free_looks;
-    return place.came(k) || place.left(k) ||
-           (is_free && !place.present.any_within(span_of(place, k)));
-  }
-
-  // Whether a place has changed, by its own class of ranges or by all ranges.
-  bool has_changed_by_any(const Place& place) const {
-    return place.state == PlaceState::kChanged || has_changed(place, kAnyRange);
+  // Whether looks tell that what was measured in a place came or went. Beams that pass what others
+  // hit tell of something porous.
+  bool has_changed(const Place& place) const {
+    const bool is_free = place.longest >= kFreeLooks;
+    return place.came() || place.left() ||
+           (is_free && !place.present.any_within(free_scans(place)));
   }
 
   PlaceState state_of(Place& place) const {
     place.first.end_epoch();
-    const std::size_t k = class_of(place);
-    if (has_changed(place, k)) return PlaceState::kChanged;
-    return place.hits > 0 || place.longest[k] > 0 ? PlaceState::kStays : PlaceState::kUnknown;
+    if (has_changed(place)) return PlaceState::kChanged;
+    return place.hits > 0 || place.was_passed() ? PlaceState::kStays : PlaceState::kUnknown;
   }
 
   // A place of a tile.
@@ -428,72 +341,48 @@ class RecordingPlaces {
   const Place& at(const Member& member) { return tiles_.find(member.first)->values[member.second]; }
   Place& change(const Member& member) { return tiles_.at(member.first).values[member.second]; }
 
-  // Touching places, and the places beside them that limit them.
-  struct Component {
-    std::vector<Member> members, contacts;
-  };
-
-  // Grows a component from a place over those of which `joins(place)` and no other component has.
-  // `is_contact(place)` chooses the others that touch it.
-  template <class Joins, class IsContact>
-  void grow(const Member& begin, Component& component, Joins&& joins, IsContact&& is_contact) {
-    component.members.assign(1, begin);
-    component.contacts.clear();
+  // Grows touching places that have changed from one of them. Returns the number of places that
+  // stay and touch them.
+  std::size_t grow(const Member& begin, std::vector<Member>& members) {
+    members.assign(1, begin);
+    std::vector<Member> contacts;
     change(begin).object = kNone;
-    for (std::size_t i = 0; i < component.members.size(); ++i) {
-      for_each_touching(cell_of(component.members[i]),
-                        [&](const Member& beside, const Place& place) {
-                          if (!joins(place)) {
-                            if (is_contact(place)) component.contacts.push_back(beside);
-                          } else if (place.object == 0) {
-                            change(beside).object = kNone;
-                            component.members.push_back(beside);
-                          }
-                        });
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      for_each_touching(cell_of(members[i]), [&](const Member& beside, const Place& place) {
+        if (place.state == PlaceState::kStays && place.hits > 0) contacts.push_back(beside);
+        if (place.state != PlaceState::kChanged || place.object != 0) return;
+        change(beside).object = kNone;
+        members.push_back(beside);
+      });
     }
-    std::vector<Member>& contacts = component.contacts;
     std::sort(contacts.begin(), contacts.end());
-    contacts.erase(std::unique(contacts.begin(), contacts.end()), contacts.end());
+    const auto end = std::unique(contacts.begin(), contacts.end());
+    return static_cast<std::size_t>(end - contacts.begin());
   }
 
-  // Calls `visit(member)` for the places of which `is_taken(place)` at that time.
-  template <class IsTaken, class Visitor>
-  void for_each_member(IsTaken&& is_taken, Visitor&& visit) {
-    tiles_.for_each_index([&](const GroundTile& index) {
-      for (std::uint32_t number = 0; number < tiles_.find(index)->values.size(); ++number) {
-        const Member member = {index, number};
-        if (is_taken(at(member))) visit(member);
-      }
-      tiles_.free_far(tiles_.middle(index), 0.0);
-    });
-  }
-
-  // Numbers the components of touching changed places, and of those beside them that the first pass
-  // removed early or late.
+  // Numbers the objects: components of touching changed places that are large enough, and no part
+  // of something that stays.
   void find_objects() {
-    std::vector<Member> rejected;
-    Component component;
-    const std::vector<Member>& members = component.members;
-    const auto is_new = [](const Place& place) {
-      return place.state == PlaceState::kChanged && place.object == 0;
-    };
-    const auto joins = [&](const Place& place) {
-      return place.first.moved() || has_changed_by_any(place);
-    };
-    const auto stays = [](const Place& place) {
-      return place.state == PlaceState::kStays && place.hits > 0;
-    };
-    for_each_member(is_new, [&](const Member& begin) {
-      grow(begin, component, joins, stays);
-      const bool is_object = is_whole(members, component.contacts.size());
+    constexpr std::size_t kFewest = 6;    // places
+    constexpr double kMostContact = 1.5;  // places that stay and touch it, ratio to its own places
+    std::vector<Member> members, rejected;
+    const auto find_from = [&](const Member& begin) {
+      const auto contacts = static_cast<double>(grow(begin, members));
+      const bool is_object = members.size() >= kFewest &&
+                             contacts <= kMostContact * static_cast<double>(members.size());
       const std::uint32_t number = is_object ? ++objects_ : kNone;
       for (const Member& member : members) {
-        Place& place = change(member);
-        place.object = number;
-        place.state = PlaceState::kChanged;
+        change(member).object = number;
         if (is_object) changed_.mark(cell_of(member));
       }
       if (!is_object) rejected.insert(rejected.end(), members.begin(), members.end());
+    };
+    tiles_.for_each_index([&](const GroundTile& index) {
+      for (std::uint32_t number = 0; number < tiles_.find(index)->values.size(); ++number) {
+        const Place& place = at({index, number});
+        if (place.state == PlaceState::kChanged && place.object == 0) find_from({index, number});
+      }
+      tiles_.free_far(tiles_.middle(index), 0.0);
     });
     for (std::size_t i = 0; i < rejected.size(); ++i) {
       Place& place = change(rejected[i]);
@@ -502,67 +391,6 @@ class RecordingPlaces {
       const GroundTile& tile = rejected[i].first;
       if (i > 0 && tile != rejected[i - 1].first) tiles_.free_far(tiles_.middle(tile), 0.0);
     }
-  }
-
-  // Finds objects that are always there, of which the first pass removed points.
-  void find_standing() {
-    Component component;
-    const auto joins = [](const Place& place) {
-      return place.state != PlaceState::kChanged && place.first.any_removed() &&
-             place.is_always_there();
-    };
-    const auto is_new = [&](const Place& place) { return place.object == 0 && joins(place); };
-    const auto is_contact = [](const Place& place) {
-      return place.was_passed() && !place.is_always_there();
-    };
-    for_each_member(is_new, [&](const Member& begin) {
-      grow(begin, component, joins, is_contact);
-      if (!is_standing(component)) return;
-      for (const Member& member : component.members) change(member).stands_with_others = true;
-    });
-  }
-
-  // Whether places that are always occupied are something that stands. Looks pass many places
-  // beside what waits or sways, the first pass removes all of what creeps, and what comes or leaves
-  // was removed first or last.
-  bool is_standing(const Component& component) {
-    constexpr std::size_t kFewestPlaces = 20;
-    constexpr double kMostContact = 0.3;  // passed places beside it, ratio to its own places
-    constexpr double kLeastKept = 0.1;    // of its points
-    const std::size_t places = component.members.size();
-    if (places < kFewestPlaces) return false;
-    const auto contacts = static_cast<double>(component.contacts.size());
-    if (contacts > kMostContact * static_cast<double>(places)) return false;
-    std::uint64_t kept = 0, removed = 0;
-    std::size_t moved = 0;
-    for (const Member& member : component.members) {
-      const FirstVerdicts& first = at(member).first;
-      kept += first.sum_kept;
-      removed += first.sum_removed;
-      moved += first.moved() ? 1 : 0;
-    }
-    const bool is_kept =
-        static_cast<double>(kept) >= kLeastKept * static_cast<double>(kept + removed);
-    return is_kept && 2 * moved <= places;
-  }
-
-  // An object is large enough, no part of something that stays, and looks passed a third of it. The
-  // places of which the first pass kept points are no part of it if looks passed less than a tenth
-  // of them: a mover may have passed beside something that stands.
-  bool is_whole(const std::vector<Member>& members, std::size_t contacts) {
-    const auto fewest = static_cast<std::size_t>(config_.object_places);
-    std::size_t changed = 0, kept = 0, passed = 0, passed_kept = 0;
-    for (const Member& member : members) {
-      const Place& place = at(member);
-      const bool is_passed = has_changed_by_any(place);
-      changed += place.state == PlaceState::kChanged ? 1 : 0;
-      kept += place.first.any_kept() ? 1 : 0;
-      passed += is_passed ? 1 : 0;
-      passed_kept += is_passed && place.first.any_kept() ? 1 : 0;
-    }
-    const bool is_kept_part_passed = kept < fewest || 10 * passed_kept >= kept;
-    return changed >= fewest && 3 * passed >= members.size() && is_kept_part_passed &&
-           static_cast<double>(contacts) <= config_.most_contact * static_cast<double>(passed);
   }
 
   // Calls `visit(member, place)` for the places in a cell and in those that touch it.
@@ -579,9 +407,8 @@ class RecordingPlaces {
   // Collects the samples of the places of a tile that are near the sensor.
   void gather(const GroundTile& index, Tile& tile, Tested& tested) const {
     tested.places.clear();
-    tested.ranges.clear();
     tested.begin.assign(1, 0);
-    const auto range = static_cast<float>(config_.place_range);
+    const auto range = static_cast<float>(kPlaceRange);
     constexpr auto kStep = static_cast<float>(kWorldCell / 256.0);
     const Eigen::Vector3f corner =
         (kTileEdge *
@@ -596,8 +423,7 @@ class RecordingPlaces {
                static_cast<float>(kWorldCell) * static_cast<float>(voxel_index(key, axis));
       };
       const float x = at(0), y = at(1), z = at(2);
-      const float metres = std::sqrt(x * x + y * y);
-      if (metres > range) continue;
+      if (x * x + y * y > range * range) continue;
       Place& place = tile.values[i];
       std::uint32_t count = tested.begin.back();
       samples.grow(count + 8 + detail::kPackWidth);
@@ -609,12 +435,10 @@ class RecordingPlaces {
         ++count;
       });
       tested.places.push_back(&place);
-      tested.ranges.push_back(whole_metres(metres));
       tested.begin.push_back(count);
     }
   }
 
-  RecordingPlacesConfig config_;
   PagedTiles<Tile> tiles_;
   MarkedColumns changed_;
   std::uint32_t objects_ = 0;

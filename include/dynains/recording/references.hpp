@@ -141,8 +141,9 @@ struct RecordingReferencesConfig {
 /// scan.
 class RecordingReferences {
  public:
-  explicit RecordingReferences(const RecordingReferencesConfig& config)
-      : config_((config.validate(), config)) {}
+  /// `lateral_margin`: m, of FreeSpaceConfig. Throws ConfigError.
+  RecordingReferences(const RecordingReferencesConfig& config, double lateral_margin)
+      : config_((config.validate(), config)), lateral_margin_(lateral_margin) {}
 
   /// The grid of the images; without rows until the first scan with a known sensor.
   const RangeImageGrid& grid() const { return grid_; }
@@ -159,7 +160,7 @@ class RecordingReferences {
     reference_.scan = scan;
     reference_.T_world_beams = T_world_sensor;
     reference_.image.build(grid_, ground(), objects(), {moving_.data(), object_count_},
-                           static_cast<float>(FreeSpaceConfig().lateral_margin), scratch_);
+                           static_cast<float>(lateral_margin_), scratch_);
     forget_moving(reference_.image);
     return &reference_;
   }
@@ -216,6 +217,7 @@ class RecordingReferences {
   }
 
   RecordingReferencesConfig config_;
+  double lateral_margin_;  // m
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame
   PointBuffer ground_, objects_;           // with room for more

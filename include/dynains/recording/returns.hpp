@@ -1,0 +1,82 @@
+// Visits of a recording: parts whose scans are known to fit to each other.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "dynains/ground/ground_split.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/recording/byte_store.hpp"
+#include "dynains/recording/compared_poses.hpp"
+#include "dynains/registration/alignment_points.hpp"
+#include "dynains/registration/plane_aligner.hpp"
+#include "dynains/registration/voxel_planes.hpp"
+
+namespace dynains {
+
+/// A scan near earlier ones of a visit, and what an alignment with their planes tells.
+struct ReturnToPlace {
+  std::uint32_t earlier, later;  ///< numbers of scans, the nearest earlier one
+  double distance = 0.0;         ///< m, between the two sensors
+  double inliers = 1.0;          ///< share of the points in voxels with a plane
+  double movement = 0.0;         ///< m, of points 10 m away to where they fit best
+  /// m, of that movement along its least certain direction; infinity: no surface is in both
+  double deviation = std::numeric_limits<double>::infinity();
+
+  /// Whether the scans are known to fit: better than the margins of the evidence ask for.
+  bool fits() const;
+  /// Whether they seem not to fit. If neither, the surfaces do not tell.
+  bool is_wrong() const;
+};
+
+/// Divides a recording into visits. Key scans, one each 2 m of way, are aligned with those of each
+/// visit that are within 60 m and too old for the first pass to have compared them. A key scan
+/// joins a visit that it is known to fit, before all its own one. Else it begins a visit if it
+/// begins an epoch, seems not to fit its own visit, or is not known to fit it within 8 m.
+class Returns {
+ public:
+  /// Points of the scans wait in `store`, which outlives this. `compared`: scans; younger ones were
+  /// compared before.
+  Returns(ByteStore& store, std::uint32_t compared) : store_(store), compared_(compared) {}
+
+  /// Takes the next scan: points (m, sensor frame) with their verdicts. Returns its visit, numbered
+  /// from 0; a new one has the next number. Throws what the store throws.
+  std::uint32_t add(PointsView points, Span<const PointLabel> verdicts, const ComparedPose& pose);
+
+  /// All alignments.
+  const std::vector<ReturnToPlace>& found() const { return found_; }
+
+ private:
+  struct KeyScan {
+    std::uint32_t scan, visit;
+    Pose T_world_sensor;
+    std::uint64_t offset;  // in the store
+    std::size_t size;      // bytes
+  };
+
+  bool is_key(const ComparedPose& pose);
+  void keep(PointsView points, Span<const PointLabel> verdicts);
+  void choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor);
+  void choose_visit(const Pose& T_world_sensor);
+  void add_planes(const KeyScan& key, const Pose& T_origin_world);
+  ReturnToPlace aligned(const Pose& T_world_sensor);
+
+  ByteStore& store_;
+  std::uint32_t compared_;
+  std::uint32_t scans_ = 0, visits_ = 0;
+  std::uint32_t visit_ = 0;                           // of the newest scan
+  double way_ = 0.0;                                  // m, since the latest key scan
+  Eigen::Vector3d latest_ = Eigen::Vector3d::Zero();  // m, sensor of the latest scan
+  std::vector<KeyScan> keys_;
+  std::vector<const KeyScan*> near_;  // of one visit, the nearest one first
+  std::vector<ReturnToPlace> found_;
+  GroundSplit kept_;  // points of the newest key scan that stand
+  std::vector<std::uint8_t> bytes_;
+  detail::VoxelPlanes planes_;  // in the frame of the nearest scan
+};
+
+}  // namespace dynains

@@ -1,0 +1,165 @@
+// A part of a recording whose scans test each other.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "dynains/evidence/free_space_config.hpp"
+#include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/recording/byte_store.hpp"
+#include "dynains/recording/ground.hpp"
+#include "dynains/recording/instance_numbers.hpp"
+#include "dynains/recording/places.hpp"
+#include "dynains/recording/references.hpp"
+#include "dynains/recording/static_policy.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains {
+
+struct SecondPassConfig {
+  StaticPolicy static_policy = StaticPolicy::kAlways;
+  double memory = 160;  ///< MB
+  int threads = 1;
+  /// Of the first pass: the margins hold for the second one, too, and so does what the first one
+  /// has compared.
+  FreeSpaceConfig evidence;
+
+  template <class Self, class Visitor>
+  static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"memory", self.memory, closed(0, 1e6), "MB",
+                      "places and ground in memory, if those around the sensor take less"});
+    visitor(Parameter{"threads", self.threads, closed(1, 2), "",
+                      "2: a second thread tests places, too"});
+  }
+
+  /// Throws ConfigError.
+  void validate() const {
+    validate_parameters("SecondPass", *this);
+    evidence.validate();
+  }
+};
+
+/// Scans whose poses fit to each other. All of them test the places of their points above the
+/// ground. What came or went is removed, and what stands comes back (see
+/// RecordingPlaces), as does the ground. An instance of the first pass leaves as a whole if enough
+/// of its places have changed. Scans of the visit are numbered from 0. Functions throw what the
+/// store throws.
+class Visit {
+ public:
+  /// Touching places that came or went, and the scans of the recording that tell of it.
+  struct Object {
+    Eigen::Vector3d lowest = Eigen::Vector3d::Constant(1e9);    // m, world frame
+    Eigen::Vector3d highest = Eigen::Vector3d::Constant(-1e9);  // m
+    std::uint64_t points = 0;                                   // removed in its places
+    std::uint32_t first_measured = 0, last_measured = 0;
+    std::uint32_t first_passed = UINT32_MAX, last_passed = 0;
+  };
+
+  /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
+  /// this.
+  Visit(ByteStore& store, const SecondPassConfig& config);
+
+  /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.
+  void add(PointsView points, const ScanVerdict& verdict, const Pose& T_world_sensor);
+  /// Puts all that waits into the store.
+  void rest();
+  /// Tests all places. Returns false, without a result, if `keep_going()` does.
+  bool test(const std::function<bool()>& keep_going);
+  /// Revises the first verdict on a scan, after test(). Returns whether anything changed.
+  bool revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
+
+  std::uint32_t scans() const { return static_cast<std::uint32_t>(numbers_of_scans_.size()); }
+  /// Scans of the recording from the first one of the visit to the last one.
+  std::uint32_t length() const { return numbers_of_scans_.back() - numbers_of_scans_.front() + 1; }
+  std::size_t place_count() const { return places_.size(); }
+  /// Complete when all scans are revised, in their order.
+  const std::vector<Object>& objects() const { return objects_; }
+  /// Number of points that left by revise(), and of those that came back.
+  std::uint64_t removed() const { return removed_; }
+  std::uint64_t restored() const { return restored_; }
+
+ private:
+  struct Reference {
+    std::uint32_t scan;
+    double time;           // s
+    std::uint64_t offset;  // in the store
+    std::size_t size;      // bytes
+  };
+  using Place = RecordingPlaces::Place;
+  /// An instance of the first pass in one scan. Its faces near the sensor have most of the points:
+  /// it is counted in places.
+  struct Instance {
+    std::uint32_t known = 0;                       // with a state
+    std::uint32_t changed = 0;                     // came or went
+    std::uint32_t stays = 0;                       // were there when the instance was not
+    std::uint32_t low_changed = 0, low_stays = 0;  // in the lower half of the instance
+    Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
+    Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, z up
+    bool is_leaving = false;  // leaves(), when all of its places are counted
+
+    bool leaves() const;
+  };
+  /// An instance in one place.
+  struct Seen {
+    std::uint32_t instance;  // number
+    const Place* place;
+    bool is_low;  // any of its points
+
+    bool is_same(const Seen& other) const {
+      return instance == other.instance && place == other.place;
+    }
+  };
+
+  void find_up(PointsView points, const Pose& T_world_sensor);
+  void read(const Reference& kept, RecordingReference& reference);
+  void list_objects();
+  const Place* changed_at_ground(const WorldCell& cell);
+  bool has_changed(const Place& place, std::uint32_t number) const;
+  bool stands(const Place& place, std::uint32_t number) const;
+  void restore(std::size_t point, VerdictArrays& verdict);
+  void restore_ground(const Pose& T_level_sensor, VerdictArrays& verdict);
+  void remove(std::size_t point, VerdictArrays& verdict);
+  void put(std::size_t point, const Place& place) {
+    place_of_[point] = &place;
+    placed_.push_back(point);
+  }
+  void find_places(std::uint32_t number, const Pose& T_level_sensor, VerdictArrays& verdict);
+  void find_other_places(const Pose& T_level_sensor, const VerdictArrays& verdict);
+  void remove_objects(std::uint32_t number, const Pose& T_level_sensor, VerdictArrays& verdict);
+  void choose_instances(std::uint32_t number, const VerdictArrays& verdict);
+  void find_instances(std::uint32_t number, const Pose& T_level_sensor,
+                      const VerdictArrays& verdict);
+  void list_seen(const VerdictArrays& verdict);
+  ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end) const;
+  void judge(std::uint32_t number, const Seen* begin, const Seen* end);
+
+  SecondPassConfig config_;
+  ByteStore& store_;
+  RecordingPlaces places_;
+  RecordingGround ground_;
+  RecordingReferences references_;
+  Pose T_level_world_ = Pose::Identity();        // z up, origin and heading of the first sensor
+  std::vector<Pose> T_level_sensor_;             // by scan, as it was compared
+  std::vector<std::uint32_t> numbers_of_scans_;  // in the recording
+  std::vector<Reference> kept_;
+  std::vector<std::uint8_t> packed_;
+  PointsView points_;                      // of the scan that is revised
+  std::vector<const Place*> place_of_;     // by point; null: none, or it does not matter
+  std::vector<std::size_t> placed_;        // points with a place
+  std::vector<std::uint8_t> is_near_;      // what has changed; by point
+  std::vector<std::uint8_t> is_restored_;  // by point
+  InstanceNumbers numbers_;                // of instances in the scan that may leave
+  std::vector<Instance> instances_;        // by number
+  std::vector<Seen> seen_;                 // sorted by instance
+  std::vector<Eigen::Vector3f> level_;     // m, from the sensor, z up; by point
+  std::vector<Object> objects_;
+  std::uint64_t removed_ = 0, restored_ = 0;
+};
+
+}  // namespace dynains
