@@ -157,11 +157,11 @@ TEST_CASE("The completion has every command and option") {
   const std::string script = folder / "complete.sh";
   write_text(script, completion + R"(
 reply() { COMP_WORDS=(dynains "$@"); COMP_CWORD=$#; _dynains; echo "${COMPREPLY[*]}"; }
-reply ru; reply run seq --tau-wh; reply experiment tab; reply view --max
+reply ru; reply run seq --tau-tr; reply experiment tab; reply view --max
 )");
   FILE* const bash = ::popen(("bash '" + script + "'").c_str(), "r");
   std::string shown;
   for (int c = std::fgetc(bash); c != EOF; c = std::fgetc(bash)) shown += static_cast<char>(c);
   CHECK(::pclose(bash) == 0);
-  CHECK(shown == "run\n--tau-whole\ntable1\n--max-points\n");
+  CHECK(shown == "run\n--tau-track\ntable1\n--max-points\n");
 }
