@@ -18,7 +18,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kVoxel = 0.25;      // m
   VoxelHashTable<> occupied;
-  std::vector<Eigen::Vector3d> kept;
+  std::vector<std::pair<VoxelKey, Eigen::Vector3d>> kept;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
@@ -27,9 +27,15 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
     const auto cell = [&](Eigen::Index axis) {
       return static_cast<std::int64_t>(std::floor(p[axis] / kVoxel));
     };
-    if (occupied.insert(voxel_key(cell(0), cell(1), cell(2))) == kept.size()) kept.push_back(p);
+    const VoxelKey key = voxel_key(cell(0), cell(1), cell(2));
+    if (occupied.insert(key) == kept.size()) kept.emplace_back(key, p);
   }
-  return kept;
+  // Every n-th of them is spread over the scan.
+  std::sort(kept.begin(), kept.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Eigen::Vector3d> sorted;
+  for (const auto& [key, p] : kept) sorted.push_back(p);
+  return sorted;
 }
 
 // Result of a search for the nearest point, as nanoflann fills it in.

@@ -15,7 +15,7 @@
 namespace dynains {
 
 /// Points of one scan: above the ground, 2 m to `farthest` from the sensor, one per voxel of 0.25
-/// m, in the order of the scan.
+/// m, sorted by voxel.
 class Landmarks {
  public:
   /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
