@@ -103,8 +103,10 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   const FolderLock lock = session_files::lock_city(folder);
   const fs::path file = folder / session_files::kCityFile;
   if (!fs::exists(file)) {
-    remove_leftovers(folder,
-                     [](const std::string& name) { return name == session_files::kCityFile; });
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      const std::string name = entry.path().filename().string();
+      if (target_of_temporary(name) == session_files::kCityFile) fs::remove(entry, error);
+    }
     if (!fs::is_empty(folder, error) || error) {
       fail(folder, "holds files but no city.json; expected a map of many sessions or nothing");
     }

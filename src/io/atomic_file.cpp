@@ -1,9 +1,7 @@
 #include "dynains/io/atomic_file.hpp"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/random.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -13,7 +11,6 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "failure.hpp"
 #include "file_buffer.hpp"
@@ -35,19 +32,6 @@ constexpr std::string_view kHexDigits = "0123456789abcdef";
 constexpr std::string_view kTemporaryEnd = ".tmp";
 constexpr std::size_t kRandomDigits = 16;
 
-enum class LockState { kOurs, kOfAnother, kUnknown };
-
-/// Takes the lock of a file unless another open file has it. kUnknown: the file system has no
-/// locks.
-LockState lock_file(int descriptor) {
-  int result = 0;
-  do {
-    result = ::flock(descriptor, LOCK_EX | LOCK_NB);
-  } while (result != 0 && errno == EINTR);
-  if (result == 0) return LockState::kOurs;
-  return errno == EWOULDBLOCK ? LockState::kOfAnother : LockState::kUnknown;
-}
-
 std::string random_digits() {
   std::array<std::uint8_t, kRandomDigits> random{};
   if (::getrandom(random.data(), random.size(), 0) != static_cast<ssize_t>(random.size())) {
@@ -60,28 +44,23 @@ std::string random_digits() {
 
 struct OpenTemporary {
   fs::path path;
-  int descriptor;
+  int descriptor = -1;
 };
 
-/// A new file, locked before anybody can take it for a leftover. Throws IoError.
+/// A new file. Throws IoError.
 OpenTemporary open_temporary(const fs::path& target) {
   const std::string name = target.filename().string();
   constexpr int kAttempts = 100;
+  OpenTemporary file;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    OpenTemporary file{target, -1};
+    file.path = target;
     file.path.replace_filename('.' + name + '.' + random_digits() + std::string(kTemporaryEnd));
     file.descriptor =
         ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-    if (file.descriptor < 0 && errno == EEXIST) continue;
-    if (file.descriptor < 0) fail_by_system(target, "cannot be written", errno);
-    struct stat status {};
-    if (lock_file(file.descriptor) != LockState::kOfAnother &&
-        ::fstat(file.descriptor, &status) == 0 && status.st_nlink > 0) {
-      return file;
-    }
-    ::close(file.descriptor);
+    if (file.descriptor >= 0) return file;
+    if (errno != EEXIST) break;
   }
-  fail(target, "cannot be written: another process removes its temporary files");
+  fail_by_system(target, "cannot be written", errno);
 }
 
 /// A rename is on the disk when its folder is. Some file systems cannot sync folders (EINVAL), and
@@ -93,32 +72,6 @@ void sync_folder(const fs::path& folder) {
   const int error = ::fsync(descriptor) == 0 ? 0 : errno;
   ::close(descriptor);
   if (error != 0 && error != EINVAL) fail_by_system(folder, "cannot be written to the disk", error);
-}
-
-/// Throws IoError.
-std::vector<fs::path> temporaries_in(const fs::path& folder,
-                                     const std::function<bool(const std::string&)>& is_wanted) {
-  std::error_code error;
-  if (fs::is_symlink(folder, error)) fail(folder, "is a link: expected a folder");
-  std::vector<fs::path> temporaries;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string target = target_of_temporary(entry->path().filename().string());
-    if (!target.empty() && is_wanted(target)) temporaries.push_back(entry->path());
-  }
-  if (error) fail_by_system(folder, "cannot be listed", error.value());
-  return temporaries;
-}
-
-/// kUnknown unless the path is a file.
-LockState lock_state_of(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0) return LockState::kUnknown;
-  struct stat status {};
-  const bool is_file = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
-  const LockState state = is_file ? lock_file(descriptor) : LockState::kUnknown;
-  ::close(descriptor);
-  return state;
 }
 
 }  // namespace
@@ -142,16 +95,12 @@ AtomicFile::~AtomicFile() {
   fs::remove(temporary_, ignored);
 }
 
-void AtomicFile::prepare(Sync sync) {
+void AtomicFile::commit(Sync sync) {
   buffer_->pubsync();
   if (sync == Sync::kNow) buffer_->sync_disk();
   buffer_->check_close();
   if (buffer_->error() != 0)
     fail_by_system(target_, "cannot be written to the end", buffer_->error());
-}
-
-void AtomicFile::commit(Sync sync) {
-  prepare(sync);
   std::error_code error;
   fs::rename(temporary_, target_, error);
   if (error) fail_by_system(target_, "cannot be put in place", error.value());
@@ -170,24 +119,6 @@ std::string target_of_temporary(const std::string& name) {
       name.compare(point + 1 + kRandomDigits, name.npos, kTemporaryEnd) == 0 &&
       digits.find_first_not_of(kHexDigits) == digits.npos;
   return is_temporary ? name.substr(1, point - 1) : std::string();
-}
-
-void remove_leftovers(const fs::path& folder,
-                      const std::function<bool(const std::string&)>& is_ours) {
-  for (const fs::path& path : temporaries_in(folder, is_ours)) {
-    if (lock_state_of(path) == LockState::kOurs && ::unlink(path.c_str()) != 0 && errno != ENOENT) {
-      fail_by_system(path, "cannot be removed", errno);
-    }
-  }
-}
-
-std::size_t count_writers(const fs::path& target) {
-  const auto is_of_target = [&](const std::string& name) { return name == target.filename(); };
-  std::size_t writers = 0;
-  for (const fs::path& path : temporaries_in(target.parent_path(), is_of_target)) {
-    if (lock_state_of(path) == LockState::kOfAnother) ++writers;
-  }
-  return writers;
 }
 
 void sync_files(const fs::path& folder) {

@@ -138,15 +138,9 @@ void LasWriter::add(const LasPoint& point) {
   ++size_;
 }
 
-void LasWriter::prepare(AtomicFile::Sync sync) {
+void LasWriter::commit(AtomicFile::Sync sync) {
   file_.stream().seekp(0);
   file_.stream() << header();
-  file_.prepare(sync);
-  is_prepared_ = true;
-}
-
-void LasWriter::commit(AtomicFile::Sync sync) {
-  if (!is_prepared_) prepare(sync);
   file_.commit(sync);
 }
 

@@ -162,16 +162,10 @@ void PointFileWriter::write_buffer() {
   buffer_.clear();
 }
 
-void PointFileWriter::prepare(AtomicFile::Sync sync) {
+void PointFileWriter::commit(AtomicFile::Sync sync) {
   write_buffer();
   file_.stream().seekp(0);
   file_.stream() << header();
-  file_.prepare(sync);
-  is_prepared_ = true;
-}
-
-void PointFileWriter::commit(AtomicFile::Sync sync) {
-  if (!is_prepared_) prepare(sync);
   file_.commit(sync);
 }
 

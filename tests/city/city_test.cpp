@@ -536,6 +536,11 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
   CHECK(files_below(city.folder()) == before);
 
   // As left by a killed process.
+  const fs::path begun = city.folder().string() + "_begun";
+  fs::create_directories(begun);
+  std::ofstream(begun / ".city.json.0123456789abcdef.tmp") << "half";
+  City::open_or_make(begun, city.grid());
+  CHECK(files_below(begun).size() == 1);
   const fs::path stale = city.folder() / ".tuesday.0123456789abcdef.staging";
   fs::create_directories(stale / "tiles");
   std::ofstream(stale / "tiles" / "0_0.tile") << "half";

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "io/files.hpp"
 #include "io/folder_exchange.hpp"
 #include "support/catch.hpp"
@@ -139,34 +138,6 @@ TEST_CASE("Names of temporary files give the name of the file, and other names d
     CAPTURE(other);
     CHECK(target_of_temporary(other).empty());
   }
-}
-
-TEST_CASE("Only temporary files of the named files without a writer are removed") {
-  TemporaryFolder folder;
-  const fs::path leftover = folder / ".a.txt.0123456789abcdef.tmp";
-  const fs::path foreign = folder / ".b.txt.0123456789abcdef.tmp";
-  const fs::path link = folder / ".a.txt.00000000000000ff.tmp";
-  write_text(leftover, "half");
-  write_text(foreign, "half");
-  fs::create_symlink(foreign, link);
-  const auto is_a = [](const std::string& name) { return name == "a.txt"; };
-  {
-    AtomicFile file(folder / "a.txt");
-    remove_leftovers(folder.path(), is_a);
-    CHECK(count_writers(folder / "a.txt") == 1);
-    CHECK(count_writers(folder / "b.txt") == 0);
-    file.stream() << "whole";
-    file.commit();
-  }
-  CHECK(read_text(folder / "a.txt") == "whole");
-  CHECK_FALSE(fs::exists(leftover));
-  CHECK(fs::exists(foreign));
-  CHECK(fs::is_symlink(link));
-  CHECK(count_writers(folder / "a.txt") == 0);
-
-  fs::create_directory_symlink(folder.path(), folder / "elsewhere");
-  CHECK_THAT(message_of<IoError>([&] { remove_leftovers(folder / "elsewhere", is_a); }),
-             ContainsSubstring("elsewhere: is a link"));
 }
 
 TEST_CASE("A folder is put in place in one step, or not at all") {

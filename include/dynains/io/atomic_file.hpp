@@ -1,9 +1,7 @@
 // Atomic replacement of files.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <ostream>
 #include <string>
@@ -14,9 +12,8 @@ class FileBuffer;
 
 /// Writes a temporary file beside the target, `.NAME.0123456789abcdef.tmp` with random digits.
 /// `commit()` renames it to the target; until then, the target is unchanged. Without a commit, the
-/// destructor removes the temporary file. The temporary file is always created, never opened
-/// through an existing file or link, and locked (flock) until it is renamed: see
-/// `remove_leftovers()`.
+/// destructor removes the temporary file, which is always created, never opened through an existing
+/// file or link.
 class AtomicFile {
  public:
   /// Creates the temporary file. If `target` is a symbolic link, the file that it refers to is
@@ -30,19 +27,13 @@ class AtomicFile {
   /// failures of the stream.
   std::ostream& stream() { return stream_; }
 
-  /// For libraries that write files by name.
-  const std::filesystem::path& temporary_path() const { return temporary_; }
-
   enum class Sync {
     kNow,   ///< the file is on the disk when commit() returns
     kLater  ///< the file is on the disk after `sync_files()`; faster for many files
   };
 
-  /// Writes the temporary file to its end, so that nothing but renaming is left. Throws IoError.
-  void prepare(Sync sync = Sync::kNow);
-
-  /// prepare(), and renames the temporary file to the target. Throws IoError with the reason of the
-  /// first failure if a write failed; the target is then unchanged. Throws IoError also if the
+  /// Renames the temporary file to the target. Throws IoError with the reason of the first failure
+  /// if a write failed; the target is then unchanged. Throws IoError also if the
   /// rename succeeded, but the synchronization of the folder failed.
   void commit(Sync sync = Sync::kNow);
 
@@ -56,16 +47,6 @@ class AtomicFile {
 
 /// Name of the target if `name` has the form of a temporary file, else empty.
 std::string target_of_temporary(const std::string& name);
-
-/// Removes the temporary files of killed processes from `folder`, which must not be a link.
-/// `is_ours(NAME)`: whether temporary files of target NAME are to be removed. Locked temporary
-/// files stay; on a file system without locks, all stay. Throws IoError.
-void remove_leftovers(const std::filesystem::path& folder,
-                      const std::function<bool(const std::string&)>& is_ours);
-
-/// Number of open AtomicFiles of `target` in all processes of this machine; 0 on a file system
-/// without locks. Throws IoError.
-std::size_t count_writers(const std::filesystem::path& target);
 
 /// Synchronizes the file system of `folder` with its disk. Throws IoError.
 void sync_files(const std::filesystem::path& folder);

@@ -42,8 +42,7 @@ class LasWriter {
   /// Throws IoError for a position that is not finite or out of range.
   void add(const LasPoint& point);
   std::size_t size() const { return size_; }
-  /// Writes all but the name of the file. No point can be added then.
-  void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
+  /// Puts the file in place, unless it was not written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -53,7 +52,6 @@ class LasWriter {
   LasOptions options_;
   std::size_t size_ = 0;
   std::array<std::int32_t, 3> least_{}, most_{};  ///< of the integer coordinates
-  bool is_prepared_ = false;
   AtomicFile file_;
 };
 

@@ -34,9 +34,7 @@ class PointFileWriter {
   /// `others`: the bytes of the point in the other columns.
   void add(const FilePoint& point, Span<const char> others = {});
   std::size_t size() const { return size_; }
-  /// Writes all but the name of the file. No point can be added then. Throws IoError.
-  void prepare(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
-  /// prepare(), and puts the file in place. Throws IoError unless it was written completely.
+  /// Puts the file in place. Throws IoError unless it was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
 
  private:
@@ -49,7 +47,6 @@ class PointFileWriter {
   bool pcd_;
   std::size_t size_ = 0;
   PointRecords buffer_;
-  bool is_prepared_ = false;
   AtomicFile file_;
 };
 
