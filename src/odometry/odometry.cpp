@@ -151,7 +151,10 @@ class Odometry::Loop {
     if (config_.remove) {
       if (scan_count_ < 2) remover_.emplace(DynaInsRemover::Config::odometry());
       if (first_) remover_->push(first_->cloud(), Pose::Identity(), mean_time_);
-      result.labels = remover_->push(scan_.cloud(), T_world_last_, mean_time).newest.labels;
+      const FrameResult& frame = remover_->push(scan_.cloud(), T_world_last_, mean_time);
+      result.labels = frame.newest.labels;
+      result.began_epoch = frame.began_epoch;
+      result.plausibility = frame.plausibility;
     }
     scan_.adapt();
     if (scan_count_ == 0) {

@@ -5,11 +5,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "evaluation_options.hpp"
 #include "progress.hpp"
 #include "run/output_folder.hpp"
+#include "run/run_doubts.hpp"
+#include "run/start_check.hpp"
 
 namespace dynains::program {
 namespace {
@@ -26,6 +30,19 @@ struct OdometryFlags {
   bool quiet = false;
 };
 
+/// Says what a run with these poses would say.
+void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
+  const ScanRange range{0, recording.size() - 1};
+  std::vector<std::string> warnings =
+      check_start(recording, range, DynaInsRemover::Config(), true).warnings;
+  const std::vector<std::string> doubts =
+      sentences(find_doubts(recording, range, estimate.timing), recording);
+  warnings.insert(warnings.end(), doubts.begin(), doubts.end());
+  for (const std::string& text : warnings) {
+    std::cerr << "dynains: warning: " << text << std::endl;
+  }
+}
+
 void write_poses(const OdometryFlags& flags) {
   Recording recording = flags.recording.open_without_poses(flags.is_compensated);
   InputFiles inputs;
@@ -38,6 +55,7 @@ void write_poses(const OdometryFlags& flags) {
   if (!flags.quiet) {
     std::cout << recording.size() << " poses: " << flags.out << std::endl;
   }
+  warn_as_run(recording, estimate);
   if (estimate.loss) throw LostTrack(*estimate.loss);
 }
 

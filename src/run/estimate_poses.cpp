@@ -49,6 +49,9 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
       break;
     }
     if (result.free_directions > 0) ++estimate.uncertain_scans;
+    TimingRow& row = estimate.timing.rows.emplace_back();
+    row.began_epoch = result.began_epoch;
+    row.plausibility = result.plausibility;
     poses.push_back(result.T_world_sensor);
     progress(poses.size(), range.size());
   }

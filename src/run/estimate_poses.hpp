@@ -9,6 +9,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "labelled_sequence.hpp"
+#include "run_timing.hpp"
 
 namespace dynains::program {
 
@@ -23,6 +24,7 @@ struct PoseEstimate {
   std::optional<std::string> loss;
   /// Scans whose surfaces do not determine all directions of motion.
   std::size_t uncertain_scans = 0;
+  RunTiming timing;  ///< began_epoch and plausibility of the scans
 };
 
 /// Gives poses to the scans in `window`, up to the first one that the odometry loses, and leaves

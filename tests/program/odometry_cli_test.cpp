@@ -1,10 +1,12 @@
 // Recordings without poses: dynains odometry, dynains run --odometry and what they say.
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"
@@ -106,6 +108,23 @@ TEST_CASE("After a loss of track, the scans before it have results") {
   CHECK(outcome.code == 3);
   CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000008"));
   CHECK(count_files(out / "labels") == 8);
+}
+
+TEST_CASE("The odometry says about the clouds what a run says") {
+  const Unposed recording;
+  const fs::path scan = recording.sequence() / "velodyne" / "000000.bin";
+  std::vector<float> xyzi;
+  read_scan(scan, xyzi);
+  for (float& value : xyzi) value = 0.05F * std::round(value / 0.05F);
+  write_scan(scan, xyzi);
+  const std::string expected = "warning: points lie on a grid of 0.05 m";
+  const Outcome poses =
+      start({"odometry", recording.sequence(), "--out", recording / "poses.txt", "-q"});
+  CHECK(poses.code == 0);
+  CHECK_THAT(poses.err, ContainsSubstring(expected));
+  const Outcome run =
+      start({"run", recording.sequence(), "--odometry", "--out", recording / "out", "-q"});
+  CHECK_THAT(run.err, ContainsSubstring(expected));
 }
 
 TEST_CASE("A gap of more than a second ends the track") {

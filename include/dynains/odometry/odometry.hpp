@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 
 #include "dynains/parameters.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -58,6 +59,8 @@ struct OdometryResult {
   /// Verdict of the remover without latency, one label per point, valid until the next push; empty
   /// without `OdometryConfig::remove`, and after a loss.
   Span<const PointLabel> labels;
+  std::optional<EpochReason> began_epoch;  ///< that of the remover, as in FrameResult
+  Plausibility plausibility;               ///< likewise
 };
 
 /// Scans in, poses out. Each scan is predicted at constant velocity, de-skewed to the mean time of
