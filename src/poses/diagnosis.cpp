@@ -185,6 +185,7 @@ BodyMotion given_motion(const Recording& recording) {
 struct SampledPairs {
   Pairs pairs;  // (i, i + stride)
   std::size_t stride = 0;
+  Agreement neighbours;  // without motion
 };
 
 /// Pairs of neighbours if these do not agree without motion, or if the sensor moves or turns so
@@ -199,14 +200,14 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double
   constexpr double kFastAgreement = 0.35;  // of neighbours
   const std::size_t scans = recording.size();
   if (scans < 2) return {};
-  const SampledPairs neighbours{sample.pairs(0, scans - 1, 1, kPairs), 1};
+  SampledPairs result{sample.pairs(0, scans - 1, 1, kPairs), 1, {}};
+  result.neighbours = agreement_under(no_motion, result.pairs);
   if (step > kFast || turn > kTurning || scans < 2 * kStride ||
-      agreement_under(no_motion, neighbours.pairs).share < kFastAgreement) {
-    return neighbours;
+      result.neighbours.share < kFastAgreement) {
+    return result;
   }
-  SampledPairs result;
   for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
-    result = {sample.pairs(0, scans - 1, stride, kPairs), stride};
+    result = {sample.pairs(0, scans - 1, stride, kPairs), stride, result.neighbours};
     if (agreement_under(no_motion, result.pairs).share < kLeastAgreement) break;
   }
   return result;
@@ -398,7 +399,8 @@ PoseVerdict verdict_of_agreement(const Evidence& evidence) {
   return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
 }
 
-void judge_by_landmarks(const Evidence& evidence, Diagnosis& d) {
+/// `neighbours` is their agreement without motion.
+void judge_by_landmarks(const Evidence& evidence, const Agreement& neighbours, Diagnosis& d) {
   const auto reading = best_reading(
       usual_readings(evidence.recording), evidence.as_given.gap,
       [&](const Reading& r) { return evidence.misfit_of_landmarks(r); },
@@ -407,11 +409,12 @@ void judge_by_landmarks(const Evidence& evidence, Diagnosis& d) {
       });
   if (reading) return propose(*reading, d);
   d.verdict = verdict_of_agreement(evidence);
-  // Few objects in sight, as on a motorway, or few points: nothing explains scans clearly better.
+  // Few objects in sight, as on a motorway, or few points: nothing explains scans clearly better,
+  // and poses that stand are those of a sensor whose scans far apart agree as neighbours do.
   constexpr double kPassable = 0.4;  // share
   const Agreement &given = evidence.as_given, &standing = evidence.standing;
-  const bool is_as_good =
-      d.stride == 1 ? !is_clearly_better(standing, given) : given.gap < standing.gap;
+  const bool is_as_good = given.gap < standing.gap || !(is_clearly_better(standing, given) ||
+                                                        is_clearly_better(neighbours, standing));
   if (d.verdict == PoseVerdict::kDisagree && given.share >= kPassable && is_as_good) {
     d.verdict = PoseVerdict::kNoMotion;
   }
@@ -482,7 +485,7 @@ Diagnosis diagnose_as_opened(const Recording& recording) {
   if (evidence.has_motions()) {
     judge_by_motions(evidence, d);
   } else {
-    judge_by_landmarks(evidence, d);
+    judge_by_landmarks(evidence, sampled.neighbours, d);
   }
   return d;
 }

@@ -93,6 +93,21 @@ TEST_CASE("Right poses of a sparse sensor that comes to rest are no other record
   CHECK(diagnosis_with(drive, 0.2).verdict != PoseVerdict::kAgree);
 }
 
+TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it moves") {
+  simulation::Config config;
+  config.scene = simulation::Scene::kHighway;
+  config.sensor = simulation::Sensor::kMid360;
+  config.scans = 30;
+  config.seed = 603;
+  const auto standing = [&](double metres_per_second) {
+    config.ego_speed = metres_per_second;
+    return diagnose(
+        Drive(config).with_poses([](std::size_t, const Pose&) { return Pose::Identity(); }));
+  };
+  CHECK(standing(0.0).verdict == PoseVerdict::kNoMotion);
+  CHECK(standing(10.0).verdict == PoseVerdict::kDisagree);
+}
+
 TEST_CASE("A plane that contains the beam through it is no surface") {
   const auto has_surface = [](double range, double sine_to_beam) {
     const Eigen::Vector3d middle(range, 0.5, 0.5);
