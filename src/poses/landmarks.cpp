@@ -34,6 +34,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
   std::sort(kept.begin(), kept.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Eigen::Vector3d> sorted;
+  sorted.reserve(kept.size());
   for (const auto& [key, p] : kept) sorted.push_back(p);
   return sorted;
 }
