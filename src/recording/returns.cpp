@@ -92,13 +92,11 @@ ReturnToPlace Returns::aligned(const Pose& T_world_sensor) {
   return result;
 }
 
-// Whether the newest scan is a key scan: by its way, by its time, or as the first of an epoch.
-bool Returns::is_key(const ComparedPose& pose) {
-  const Eigen::Vector3d sensor = pose.T_world_sensor.translation();
+// Whether the newest scan is a key scan: as the first of an epoch, by its way, or by its time.
+bool Returns::is_key(const Eigen::Vector3d& sensor, bool begins) {
   if (!keys_.empty()) way_ += (sensor - latest_).norm();
   latest_ = sensor;
-  const bool is_first = keys_.empty() || pose.begins_epoch;
-  if (!is_first && way_ < kKeyWay && scans_ - keys_.back().scan <= compared_) return false;
+  if (!begins && way_ < kKeyWay && scans_ - keys_.back().scan <= compared_) return false;
   way_ = 0.0;
   return true;
 }
@@ -138,9 +136,10 @@ void Returns::choose_visit(const Pose& T_world_sensor) {
 std::uint32_t Returns::add(PointsView points, Span<const PointLabel> verdicts,
                            const ComparedPose& pose) {
   ++scans_;
-  if (!is_key(pose)) return visit_;
+  const bool begins = keys_.empty() || pose.begins_epoch;
+  if (!is_key(pose.T_world_sensor.translation(), begins)) return visit_;
   keep(points, verdicts);
-  if (keys_.empty() || pose.begins_epoch) visit_ = visits_;
+  if (begins) visit_ = visits_;
   choose_visit(pose.T_world_sensor);
   visits_ = std::max(visits_, visit_ + 1);
   keys_.push_back({scans_ - 1, visit_, pose.T_world_sensor, store_.append(bytes_), bytes_.size()});

@@ -58,7 +58,7 @@ class Returns {
     std::size_t size;      // bytes
   };
 
-  bool is_key(const ComparedPose& pose);
+  bool is_key(const Eigen::Vector3d& sensor, bool begins);
   void keep(PointsView points, Span<const PointLabel> verdicts);
   void choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor);
   void choose_visit(const Pose& T_world_sensor);
