@@ -55,6 +55,10 @@ void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& sc
   }
 }
 
+fs::path label_file(const fs::path& folder, const std::string& scan) {
+  return folder / "labels" / (scan + ".label");
+}
+
 /// Classes of SemanticKITTI for intensities 0 and 1.
 std::vector<std::uint32_t> labels_of_intensity(const RecordedScan& scan) {
   constexpr std::uint32_t kOtherObject = 99, kMovingOtherVehicle = 259;
@@ -308,7 +312,7 @@ void Recording::check_names() const {
 std::vector<fs::path> Recording::files() const {
   std::vector<fs::path> files = files_;
   if (labels_ != Labels::kFiles) return files;
-  for (const Scan& scan : scans_) files.push_back(folder_ / "labels" / (scan.name + ".label"));
+  for (const Scan& scan : scans_) files.push_back(label_file(folder_, scan.name));
   return files;
 }
 
@@ -410,14 +414,13 @@ OtherValues Recording::read_other_values(std::size_t i) const {
 }
 
 bool Recording::has_labels(std::size_t i) const {
-  return labels_ == Labels::kFiles ? fs::exists(folder_ / "labels" / (name(i) + ".label"))
-                                   : has_labels();
+  return labels_ == Labels::kFiles ? fs::exists(label_file(folder_, name(i))) : has_labels();
 }
 
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
   if (labels_ == Labels::kIntensity) return labels_of_intensity(read_scan(i));
   if (labels_ != Labels::kFiles) return reader_->read_labels(address(i));
-  return dynains::read_labels(folder_ / "labels" / (name(i) + ".label"), point_count(i));
+  return dynains::read_labels(label_file(folder_, name(i)), point_count(i));
 }
 
 }  // namespace dynains
