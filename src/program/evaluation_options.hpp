@@ -24,7 +24,7 @@ class EvaluationOptions {
   evaluation::EvaluationConfig config_;
   double max_range_ = 0;
   CLI::Option* max_range_option_;
-  std::string classes_ = "251-259";
+  std::string classes_ = evaluation::TruthClasses().dynamic_classes();
   std::string unlabeled_;
 };
 

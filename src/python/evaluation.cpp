@@ -162,7 +162,8 @@ void bind_evaluation(py::module_& module) {
     doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
   });
   module.def("evaluate", &evaluate_arrays, py::arg("points"), py::arg("poses"), py::arg("truth"),
-             py::arg("kept"), py::arg("dynamic_classes") = "251-259",
+             py::arg("kept"),
+             py::arg("dynamic_classes") = evaluation::TruthClasses().dynamic_classes(),
              py::arg("unlabeled") = "ignore", doc.c_str());
 }
 
