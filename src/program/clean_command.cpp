@@ -145,10 +145,9 @@ void clean(CleanOptions& options) {
   cleaned.put_in_place();
 
   if (2 * verdicts.unseen > positions.size()) {
-    std::cerr << "dynains: warning: " << verdicts.unseen << " of " << positions.size()
-              << " points of the map lie near no point of the scans and stay: the map is that of "
-                 "another recording, or its poses are not those of the run"
-              << std::endl;
+    print_warning(std::to_string(verdicts.unseen) + " of " + std::to_string(positions.size()) +
+                  " points of the map lie near no point of the scans and stay: the map is that of "
+                  "another recording, or its poses are not those of the run");
   }
   if (options.quiet) return;
   std::cout << positions.size() << " points, " << verdicts.moving << " left as moving, "

@@ -11,6 +11,7 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
+#include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/finished_run.hpp"
 #include "run/input_files.hpp"
@@ -85,9 +86,9 @@ void eval(const EvalOptions& options) {
   TextFile csv(options.csv);
   LabelledSequence sequence(std::move(recording), options.window, runs);
   if (sequence.missing_truths() > 0) {
-    std::cerr << "dynains: warning: " << sequence.missing_truths() << " of "
-              << sequence.missing_truths() + sequence.size()
-              << " scans have no ground truth and are not judged" << std::endl;
+    print_warning(std::to_string(sequence.missing_truths()) + " of " +
+                  std::to_string(sequence.missing_truths() + sequence.size()) +
+                  " scans have no ground truth and are not judged");
   }
 
   std::vector<PointFile> map_files;

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
@@ -33,14 +32,10 @@ struct OdometryFlags {
 /// Says what a run with these poses would say.
 void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
   const ScanRange range{0, recording.size() - 1};
-  std::vector<std::string> warnings =
-      check_start(recording, range, DynaInsRemover::Config(), true).warnings;
-  const std::vector<std::string> doubts =
-      sentences(find_doubts(recording, range, estimate.timing), recording);
-  warnings.insert(warnings.end(), doubts.begin(), doubts.end());
-  for (const std::string& text : warnings) {
-    std::cerr << "dynains: warning: " << text << std::endl;
-  }
+  const StartCheck start = check_start(recording, range, DynaInsRemover::Config(), true);
+  for (const std::string& text : start.warnings) print_warning(text);
+  const RunDoubts doubts = find_doubts(recording, range, estimate.timing);
+  for (const std::string& text : sentences(doubts, recording)) print_warning(text);
 }
 
 void write_poses(const OdometryFlags& flags) {
@@ -77,11 +72,10 @@ PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& wind
       });
   progress.reset();
   if (estimate.uncertain_scans > 0) {
-    std::cerr << "dynains: warning: the surfaces of " << estimate.uncertain_scans << " of "
-              << recording.size()
-              << " scans do not determine the whole motion, as along a corridor: there it is "
-                 "that of the scans before"
-              << std::endl;
+    print_warning("the surfaces of " + std::to_string(estimate.uncertain_scans) + " of " +
+                  std::to_string(recording.size()) +
+                  " scans do not determine the whole motion, as along a corridor: there it is "
+                  "that of the scans before");
   }
   return estimate;
 }

@@ -11,6 +11,10 @@
 
 namespace dynains::program {
 
+void print_warning(const std::string& text) {
+  std::cerr << "dynains: warning: " << text << std::endl;
+}
+
 std::string describe_rate(std::size_t done, std::size_t total, double seconds,
                           const std::string& unit) {
   if (done == 0 || !(seconds > 0.0)) return {};

@@ -7,6 +7,9 @@
 
 namespace dynains::program {
 
+/// On standard error, as a line "dynains: warning: TEXT".
+void print_warning(const std::string& text);
+
 /// " (24.5 scans/s, 1:02 left)": the rate of `done` items in `seconds`, and the time for the rest
 /// of `total`. Empty if nothing is known yet.
 std::string describe_rate(std::size_t done, std::size_t total, double seconds,

@@ -1,10 +1,10 @@
 #include "recording_options.hpp"
 
-#include <iostream>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
+#include "progress.hpp"
 #include "run/json_file.hpp"
 
 namespace dynains::program {
@@ -94,12 +94,10 @@ namespace {
 
 void print_warnings(const Recording& recording) {
   if (recording.early_end()) {
-    std::cerr << "dynains: warning: " << *recording.early_end() << "; "
-              << recording.scan_file_count() << " scans before it are read" << std::endl;
+    print_warning(*recording.early_end() + "; " + std::to_string(recording.scan_file_count()) +
+                  " scans before it are read");
   }
-  for (const std::string& warning : recording.warnings()) {
-    std::cerr << "dynains: warning: " << warning << std::endl;
-  }
+  for (const std::string& warning : recording.warnings()) print_warning(warning);
 }
 
 }  // namespace
@@ -107,9 +105,9 @@ void print_warnings(const Recording& recording) {
 Recording RecordingFlags::open(const std::filesystem::path& folder) const {
   Recording recording(folder, settings_.checked());
   if (recording.missing_pose_count() > 0) {
-    std::cerr << "dynains: warning: " << recording.missing_pose_count() << " of "
-              << recording.scan_file_count() << " scans have no pose and are left out; see: dynains"
-              << " check " << as_given() << std::endl;
+    print_warning(std::to_string(recording.missing_pose_count()) + " of " +
+                  std::to_string(recording.scan_file_count()) +
+                  " scans have no pose and are left out; see: dynains check " + as_given());
   }
   print_warnings(recording);
   return recording;

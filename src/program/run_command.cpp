@@ -109,9 +109,7 @@ void run_as_asked(RunFlags& flags) {
   check_settings(settings);
   std::optional<Progress> progress;
   RunListener listener;
-  listener.warn = [](const std::string& text) {
-    std::cerr << "dynains: warning: " << text << std::endl;
-  };
+  listener.warn = print_warning;
   const auto tell = [&](const char* unit) {
     return [&, unit](std::size_t done, std::size_t total) {
       if (done == 0) progress.emplace(total, unit, flags.quiet);
