@@ -294,8 +294,8 @@ struct Evidence {
     const auto steps = std::count_if(motions.begin(), motions.end(), is_step);
     return motions.size() >= kFewestMotions && steps >= std::ptrdiff_t{kFewestPairs};
   }
-  /// What can be compared under a motion that lacks poses for some scans, as those of shifted
-  /// poses at the ends of a recording.
+  /// The pairs and motions for which `motion` has poses. Shifted poses are missing for scans at one
+  /// end of the recording.
   Evidence where_known(const BodyMotion& motion) const {
     Evidence known{recording, {}, {}, as_given, standing};
     for (const Pair& pair : pairs) {

@@ -34,7 +34,7 @@ struct OutputKind {
   std::string marker;   ///< "report.json"
 };
 
-/// What each marker begins with; `"complete"` is false.
+/// The first fields of a marker: program, version, command and `"complete"`, which is false.
 nlohmann::ordered_json begin_marker(const OutputKind& kind);
 
 /// A folder of results, locked until destruction. All members throw IoError.
@@ -144,10 +144,9 @@ class OutputFolder {
   bool owns(const char* field, const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// The results are at the target, with this marker, which says complete, and on the disk, and the
-  /// earlier ones are gone. Calls `put_others()` before, when all bytes are on the disk: the
-  /// results come last, for they say that all is in place. They stay in path() if it fails. Throws
-  /// IoError.
+  /// Sets "complete" in `marker` and writes it, syncs the results, calls `put_others()`, and
+  /// replaces the target by the results. The target changes last, because its marker says that
+  /// everything is in place. If `put_others()` fails, the results stay in path(). Throws IoError.
   void finish(
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 

@@ -335,7 +335,7 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
     CHECK_THAT(message_of<IoError>([&] { output.put_in_place(); }),
                ContainsSubstring("map.ply: cannot be put in place: File exists"));
     CHECK(read_text(file) == "mine");
-    // What was made is not lost.
+    // The new results are kept.
     CHECK(read_text(output.path()) == "new");
   }
   SECTION("what a killed command left") {

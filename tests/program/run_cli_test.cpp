@@ -435,7 +435,7 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
   const std::string partial = fixture.out + ".partial";
   const auto end_by = [&](int signal) {
     Process process({"run", fixture.seq, "--out", fixture.out, "--map", map, "--force"});
-    // What an earlier one has left is gone before the map is begun.
+    // The run removes files of a killed run before it begins the map.
     const auto is_writing = [&] {
       return fs::exists(map + ".partial") && fs::exists(partial + "/labels/000000.label");
     };

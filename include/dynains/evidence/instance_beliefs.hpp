@@ -286,11 +286,10 @@ class InstanceBeliefUpdater {
 
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
-  // limits of FreeSpaceSum. `weight`: of free samples. Those of a
-  // reference that mostly hits an instance, or sees little of it, may lie at an edge of a standing
-  // object, if the instance is not larger than one object: they count half, and later hits take
-  // them back. A single hit sets `contested`, but not `occupied`. Returns whether a verdict may
-  // change.
+  // limits of FreeSpaceSum. `weight`: of free samples. Those of a reference that mostly hits an
+  // instance, or sees little of it, may lie at an edge of a standing object, if the instance is not
+  // larger than one object: they count half, and later hits take them back. A single hit sets
+  // `contested`, but not `occupied`. Returns whether a verdict may change.
   bool update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);

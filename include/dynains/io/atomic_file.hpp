@@ -33,8 +33,8 @@ class AtomicFile {
   };
 
   /// Renames the temporary file to the target. Throws IoError with the reason of the first failure
-  /// if a write failed; the target is then unchanged. Throws IoError also if the
-  /// rename succeeded, but the synchronization of the folder failed.
+  /// if a write failed; the target is then unchanged. Throws IoError also if the rename succeeded,
+  /// but the synchronization of the folder failed.
   void commit(Sync sync = Sync::kNow);
 
  private:
