@@ -7,7 +7,6 @@ namespace dynains::python {
 
 void bind_config(pybind11::module_& module);
 void bind_remover(pybind11::module_& module);
-void bind_second_pass(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
 void bind_simulation(pybind11::module_& module);
 void bind_recording(pybind11::module_& module);

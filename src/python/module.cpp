@@ -33,7 +33,6 @@ PYBIND11_MODULE(_dynains, module) {
 
   dynains::python::bind_config(module);
   dynains::python::bind_remover(module);
-  dynains::python::bind_second_pass(module);
   dynains::python::bind_evaluation(module);
   dynains::python::bind_simulation(module);
   dynains::python::bind_recording(module);
