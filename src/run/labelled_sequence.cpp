@@ -73,7 +73,6 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   scan.time = sequence_.time(index);
   scan.truth = scan_.truth;
   scan.in_map = scan_.in_map;
-  scan.instances = scan_.instances;
   scan.causes = scan_.causes;
   return true;
 }
@@ -95,11 +94,9 @@ void LabelledSequence::load(std::size_t i, Scan& scan) const {
 void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& scan) const {
   const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
   const std::vector<std::uint32_t> labels = read_run_labels(file, scan.truth.size());
-  if (run == 0) scan.instances.resize(labels.size());
   for (std::size_t p = 0; p < labels.size(); ++p) {
     const unsigned kept = class_of(labels[p]) == kRunStatic ? 1U : 0U;
     scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | kept << run);
-    if (run == 0) scan.instances[p] = labels[p] >> 16U;
   }
 }
 

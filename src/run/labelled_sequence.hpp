@@ -65,8 +65,7 @@ class LabelledSequence {
     RecordedScan points;
     std::vector<std::uint32_t> truth;
     std::vector<std::uint8_t> in_map;
-    std::vector<std::uint32_t> instances;  // of run 0
-    std::vector<std::uint8_t> causes;      // of run 0
+    std::vector<std::uint8_t> causes;  // of run 0
   };
 
   bool every_run_has(std::size_t index) const;

@@ -97,7 +97,6 @@ RunOutputs outputs_of(const RunSettings& settings) {
   outputs.write_clean = settings.write_clean;
   outputs.drop_not_judged = settings.drop_not_judged;
   outputs.write_poses = settings.poses_are_estimated;
-  outputs.write_mcap = settings.write_mcap;
   outputs.log = choose_log(settings);
   outputs.mark_log = settings.mark_log;
   outputs.write_page = settings.view;

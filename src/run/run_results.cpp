@@ -25,7 +25,6 @@ bool is_far(const Recording& recording, const ScanRange& range) {
 }
 
 constexpr const char* kDynamicLas = "dynamic_points.las";
-constexpr const char* kVerdictLog = "verdicts.mcap";
 
 PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
   PointColumns columns;
@@ -80,7 +79,6 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(listed_name(map_name()));
   if (has_las_map()) listing.files.insert(kDynamicLas);
-  if (write_mcap) listing.files.insert(kVerdictLog);
   if (write_poses) listing.files.insert(kEstimatedPoses);
   if (write_page) listing.files.insert(kViewPage);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
@@ -122,10 +120,6 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
   if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
-  if (outputs.write_mcap) {
-    log_ = std::make_unique<VerdictLog>(outputs.folder / kVerdictLog, recording, range.first,
-                                        is_far(recording, range));
-  }
   if (outputs.has_las_map()) {
     dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
   }
@@ -252,7 +246,6 @@ void RunResults::complete_scan(const RecordedScan& scan, const ScanVerdict& verd
 void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
   const std::size_t index = range_.first + verdict.scan;
   if (clean_scans_) clean_scans_->write(index, scan, verdict.labels);
-  if (log_) log_->add(scan, verdict);
   const bool has_labels = (map_attributes_ || session_ != nullptr) && recording_.has_labels();
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
@@ -265,7 +258,6 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
-  if (log_) log_->add_map_point(point);
   map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
 }
 
@@ -274,7 +266,6 @@ void RunResults::commit() {
   if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
   if (dynamic_las_) dynamic_las_->commit();
-  if (log_) log_->commit();
   overview_.picture().write_png(overview_file_);
   if (map_) map_->commit();
 }

@@ -27,7 +27,6 @@
 #include "overview.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
-#include "verdict_log.hpp"
 
 namespace dynains {
 class SecondPass;
@@ -47,9 +46,8 @@ struct RunOutputs {
   bool write_online = false;
   bool write_clean = false;
   bool drop_not_judged = false;  ///< from clean/
-  bool write_mcap = false;
-  std::filesystem::path log;  ///< by whole_path(); empty: none
-  bool mark_log = false;      ///< adds labels to its clouds, which keep all points
+  std::filesystem::path log;     ///< by whole_path(); empty: none
+  bool mark_log = false;         ///< adds labels to its clouds, which keep all points
   bool write_poses = false;
   bool write_page = false;  ///< of dynains view
   bool write_beliefs = false;
@@ -59,7 +57,7 @@ struct RunOutputs {
   double map_voxel = 0.0;                   ///< m, of attributes
 
   /// Whether a result holds beliefs.
-  bool needs_beliefs() const { return write_beliefs || write_mcap || map_attributes; }
+  bool needs_beliefs() const { return write_beliefs || map_attributes; }
   bool has_outside_map() const;
   bool has_las_map() const { return is_las(map); }
   /// The map relative to the folder if it lies there, so that the folder can be moved; else
@@ -143,7 +141,6 @@ class RunResults {
   PointFileWriter dynamic_points_;
   Overview overview_;
   std::filesystem::path overview_file_;
-  std::unique_ptr<VerdictLog> log_;
   std::unique_ptr<MapFile> map_;
   std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;

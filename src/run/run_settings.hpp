@@ -44,7 +44,6 @@ struct RunSettings {
   bool one_thread = false;                             ///< works, reads and writes in one thread
   bool write_online = false;
   bool write_clean = false;
-  bool write_mcap = false;
   std::string log;        ///< file or folder of the log without moving points; empty: none
   bool mark_log = false;  ///< the log keeps all points, with their labels
   bool write_beliefs = false;
@@ -145,9 +144,6 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
                     "too far; the map never has them"});
   visitor(Parameter{"write_beliefs", self.write_beliefs, Bounds(), "",
                     "also write the probability that a point moves, to the folder beliefs"});
-  visitor(Parameter{"write_mcap", self.write_mcap, Bounds(), "",
-                    "also write verdicts.mcap, a log of ROS 2 with all scans, their labels, "
-                    "instances, beliefs and causes, the poses and the map"});
   visitor(Parameter{"one_thread", self.one_thread, Bounds(), "",
                     "after the check of poses, the run works, reads and writes in one thread, for "
                     "machines on which many runs use all cores"});

@@ -232,37 +232,6 @@ TEST_CASE(
   CHECK(scan.xyzi[0] != raw.xyzi[0]);
 }
 
-TEST_CASE("The log of --write-mcap is a recording with the scans of the input") {
-  const TemporaryFolder folder;
-  write_tiny_sequence(folder / "seq", kLogScans, kPosition);
-  const std::string out = folder / "out";
-  REQUIRE(start({"run", folder / "seq", "--out", out}).code == 0);
-  const std::string labels = all_labels(out);
-  REQUIRE(start({"run", folder / "seq", "--out", out, "--write-mcap", "--force"}).code == 0);
-  CHECK(all_labels(out) == labels);
-  RecordingOptions options;
-  options.cloud_topic = "/points";
-  const Recording verdicts(out + "/verdicts.mcap", options);
-  const Recording input(folder / "seq");
-  REQUIRE(verdicts.size() == input.size());
-  CHECK(verdicts.read_scan(3).xyzi == input.read_scan(3).xyzi);
-  CHECK(verdicts.T_world_sensor(3).isApprox(input.T_world_sensor(3), 1e-9));
-  CHECK(verdicts.time(3) == Approx(input.time(3)));
-  std::vector<std::uint32_t> expected =
-      read_labels(fs::path(out) / "labels" / "000003.label", input.point_count(3));
-  for (std::uint32_t& label : expected) label &= 0xFFFFU;
-  CHECK(verdicts.read_labels(3) == expected);
-  write_text(folder / "poses.tum", "1.1 0 0 0 0 0 0 1\n");
-  options.poses = folder / "poses.tum";
-  options.cloud_topic = "/static_map";
-  CHECK(Recording(out + "/verdicts.mcap", options).point_count(0) ==
-        read_point_file_header(out + "/static_map.ply").point_count);
-
-  // Results of a run without the flag replace the log.
-  REQUIRE(start({"run", folder / "seq", "--out", out, "--force"}).code == 0);
-  CHECK_FALSE(fs::exists(out + "/verdicts.mcap"));
-}
-
 TEST_CASE("Memory for reading does not grow with the log") {
   const TemporaryFolder folder;
   constexpr std::size_t kMegabyte = std::size_t{1} << 20U;

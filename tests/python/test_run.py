@@ -17,7 +17,7 @@ import pytest
 @pytest.fixture(scope="module")
 def finished(drive, tmp_path_factory):
     out = tmp_path_factory.mktemp("run") / "out"
-    return dynains.run(drive, out, view=True, write_mcap=True)
+    return dynains.run(drive, out, view=True)
 
 
 def read_labels(folder):
@@ -49,15 +49,6 @@ def test_labels_of_a_run_are_those_of_the_remover(drive, finished):
         written = np.fromfile(finished.labels / name, np.uint32) & 0xFFFF
         np.testing.assert_array_equal(written == 251, verdict.labels == dynains.Label.DYNAMIC)
         np.testing.assert_array_equal(written == 9, dynains.is_static(verdict.labels))
-
-
-def test_the_log_of_a_run_is_a_recording(finished, street):
-    with pytest.raises(dynains.IoError, match="/static_map"):
-        dynains.Recording(finished.folder / "verdicts.mcap")
-    recording = dynains.Recording(finished.folder / "verdicts.mcap", cloud_topic="/points")
-    assert len(recording) == len(street)
-    np.testing.assert_allclose(recording[5].points[:, :3], street[5].points[:, :3], atol=1e-5)
-    np.testing.assert_allclose(recording.poses[5], street[5].T_world_sensor, atol=1e-5)
 
 
 def test_arguments_by_name(drive, tmp_path):
@@ -122,7 +113,7 @@ def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
     before = read_labels(finished.folder)
     with pytest.raises(dynains.IoError, match="holds earlier results"):
         dynains.run(drive, finished.folder)
-    dynains.run(drive, finished.folder, view=True, write_mcap=True, force=True)
+    dynains.run(drive, finished.folder, view=True, force=True)
     assert read_labels(finished.folder) == before
 
 
