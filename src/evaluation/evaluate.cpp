@@ -26,7 +26,6 @@ void check_lengths(const LabelledScan& scan, std::size_t index) {
   };
   check(scan.in_map.size(), "verdicts");
   check(scan.causes.size(), "causes");
-  check(scan.instances.size(), "instance ids");
 }
 
 /// The row of `name` by voxels, points and objects; the columns of maps are empty.
@@ -57,8 +56,8 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
         map.points_world);
   }
   if (!estimates.empty() && config.analyses_errors) {
-    result.errors.emplace(ErrorAnalysis::Settings{config.min_range, config.point_max_range,
-                                                  config.ring_width, config.truth});
+    result.errors.emplace(
+        ErrorAnalysis::Settings{config.min_range, config.point_max_range, config.truth});
   }
 
   LabelledScan scan;

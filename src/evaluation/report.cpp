@@ -81,85 +81,28 @@ std::string objects_to_table(const EvaluationRow& row) {
   return "\nobjects, " + row.name + '\n' + table.to_string();
 }
 
-Json to_json(const ErrorAnalysis& errors) {
+Json to_json(const ErrorAnalysis& errors, const TruthClasses& truth) {
   Json json;
   json["by_class"] = Json::array();
-  for (const auto& one : errors.by_class()) {
-    json["by_class"].push_back({{"class", one.id},
-                                {"name", semantic_class_name(one.id)},
-                                {"truth", name(one.truth)},
-                                {"points", one.counts.points},
-                                {"removed", one.counts.removed},
-                                {"removed_percent", json_number(one.counts.removed_percent())}});
-  }
-  json["by_instance"] = Json::array();
-  for (const auto& one : errors.by_instance()) {
-    json["by_instance"].push_back({{"class", one.class_id},
-                                   {"instance", one.instance},
-                                   {"name", semantic_class_name(one.class_id)},
-                                   {"truth", name(one.truth)},
-                                   {"points", one.counts.points},
-                                   {"removed", one.counts.removed},
-                                   {"removed_percent", json_number(one.counts.removed_percent())},
-                                   {"scans", one.scans},
-                                   {"mean_range_m", one.mean_range},
-                                   {"speed_mps", one.speed ? Json(*one.speed) : Json()}});
-  }
-  json["by_range"] = Json::array();
-  for (const auto& ring : errors.by_range()) {
-    Json score = to_json(ring.score);
-    score["from_m"] = ring.from;
-    score["to_m"] = ring.to;
-    json["by_range"].push_back(score);
+  for (const auto& [id, one] : errors.by_class()) {
+    json["by_class"].push_back({{"class", id},
+                                {"name", semantic_class_name(id)},
+                                {"truth", name(truth(id))},
+                                {"points", one.points},
+                                {"removed", one.removed},
+                                {"removed_percent", json_number(one.removed_percent())}});
   }
   json["by_cause"] = Json();
-  if (errors.has_causes()) {
-    json["by_cause"] = Json::array();
-    for (std::size_t c = 0; c < kCauseCount; ++c) {
-      const auto& cause = errors.by_cause()[c];
-      json["by_cause"].push_back({{"cause", kCauseNames[c]},
-                                  {"missed_dynamic", cause.missed_dynamic},
-                                  {"lost_static", cause.lost_static},
-                                  {"right", cause.right}});
-    }
-  }
-  json["merged"] = Json();
-  if (errors.has_clusters()) {
-    json["merged"] = {{"missed_dynamic", errors.merged().missed_dynamic},
-                      {"lost_static", errors.merged().lost_static}};
+  if (!errors.has_causes()) return json;
+  json["by_cause"] = Json::array();
+  for (std::size_t c = 0; c < kCauseCount; ++c) {
+    const auto& cause = errors.by_cause()[c];
+    json["by_cause"].push_back({{"cause", kCauseNames[c]},
+                                {"missed_dynamic", cause.missed_dynamic},
+                                {"lost_static", cause.lost_static},
+                                {"right", cause.right}});
   }
   return json;
-}
-
-/// Instances of one truth, most wrong points first.
-std::string worst_instances(const ErrorAnalysis& errors, Truth truth, std::size_t max_instances) {
-  std::vector<ErrorAnalysis::InstanceErrors> instances;
-  for (const auto& one : errors.by_instance()) {
-    if (one.truth == truth) instances.push_back(one);
-  }
-  if (instances.empty()) return {};
-  const auto wrong = [](const ErrorAnalysis::InstanceErrors& one) {
-    return one.truth == Truth::kDynamic ? one.counts.points - one.counts.removed
-                                        : one.counts.removed;
-  };
-  std::stable_sort(instances.begin(), instances.end(),
-                   [&](const auto& a, const auto& b) { return wrong(a) > wrong(b); });
-  const bool dynamic = truth == Truth::kDynamic;
-  TextTable table({dynamic ? "dynamic instance" : "static instance", "id", "points",
-                   dynamic ? "missed" : "lost", "removed %", "scans", "range m", "speed m/s"});
-  const std::size_t shown = std::min(max_instances, instances.size());
-  for (std::size_t i = 0; i < shown; ++i) {
-    const auto& one = instances[i];
-    table.add({semantic_class_name(one.class_id), std::to_string(one.instance),
-               std::to_string(one.counts.points), std::to_string(wrong(one)),
-               format_number(one.counts.removed_percent(), 2), std::to_string(one.scans),
-               format_number(one.mean_range, 1), one.speed ? format_number(*one.speed, 2) : "-"});
-  }
-  std::string text = '\n' + table.to_string();
-  if (shown < instances.size()) {
-    text += "... and " + std::to_string(instances.size() - shown) + " more\n";
-  }
-  return text;
 }
 
 }  // namespace
@@ -203,50 +146,24 @@ std::string to_table(const Evaluation& evaluation) {
   return text.str();
 }
 
-std::string errors_to_table(const Evaluation& evaluation, std::size_t max_instances) {
+std::string errors_to_table(const Evaluation& evaluation) {
   if (!evaluation.errors) return {};
   const ErrorAnalysis& errors = *evaluation.errors;
-  std::string text;
-
   TextTable classes({"class", "id", "truth", "points", "removed", "removed %"});
-  for (const auto& one : errors.by_class()) {
-    classes.add({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
-                 std::to_string(one.counts.points), std::to_string(one.counts.removed),
-                 format_number(one.counts.removed_percent(), 2)});
+  for (const auto& [id, one] : errors.by_class()) {
+    classes.add({semantic_class_name(id), std::to_string(id), name(evaluation.config.truth(id)),
+                 std::to_string(one.points), std::to_string(one.removed),
+                 format_number(one.removed_percent(), 2)});
   }
-  text += classes.to_string();
-
-  text += worst_instances(errors, Truth::kDynamic, max_instances);
-  text += worst_instances(errors, Truth::kStatic, max_instances);
-
-  TextTable rings({"range m", "static", "lost", "SA %", "dynamic", "missed", "DA %"});
-  for (const auto& ring : errors.by_range()) {
-    const PointScore& score = ring.score;
-    rings.add({format_number(ring.from, 0) + "-" + format_number(ring.to, 0),
-               std::to_string(score.static_total),
-               std::to_string(score.static_total - score.static_kept),
-               format_number(score.static_accuracy(), 2), std::to_string(score.dynamic_total),
-               std::to_string(score.dynamic_total - score.dynamic_removed),
-               format_number(score.dynamic_accuracy(), 2)});
+  if (!errors.has_causes()) return classes.to_string();
+  TextTable causes({"cause", "missed dynamic", "lost static", "right"});
+  for (std::size_t c = 0; c < kCauseCount; ++c) {
+    const auto& cause = errors.by_cause()[c];
+    if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
+    causes.add({kCauseNames[c], std::to_string(cause.missed_dynamic),
+                std::to_string(cause.lost_static), std::to_string(cause.right)});
   }
-  text += '\n' + rings.to_string();
-
-  if (errors.has_causes()) {
-    TextTable causes({"cause", "missed dynamic", "lost static", "right"});
-    for (std::size_t c = 0; c < kCauseCount; ++c) {
-      const auto& cause = errors.by_cause()[c];
-      if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
-      causes.add({kCauseNames[c], std::to_string(cause.missed_dynamic),
-                  std::to_string(cause.lost_static), std::to_string(cause.right)});
-    }
-    text += '\n' + causes.to_string();
-  }
-  if (errors.has_clusters()) {
-    text += "\nin clusters of mostly the other truth: " +
-            std::to_string(errors.merged().missed_dynamic) + " points missed, " +
-            std::to_string(errors.merged().lost_static) + " lost\n";
-  }
-  return text;
+  return classes.to_string() + '\n' + causes.to_string();
 }
 
 std::string to_json(const Evaluation& evaluation) {
@@ -267,11 +184,13 @@ std::string to_json(const Evaluation& evaluation) {
     if (row.foreign_points) json["foreign_points"] = *row.foreign_points;
     rows.push_back(json);
   }
-  const Json json = {{"settings", settings},
-                     {"scans", evaluation.scans},
-                     {"points", evaluation.points},
-                     {"rows", rows},
-                     {"errors", evaluation.errors ? to_json(*evaluation.errors) : Json()}};
+  const Json json = {
+      {"settings", settings},
+      {"scans", evaluation.scans},
+      {"points", evaluation.points},
+      {"rows", rows},
+      {"errors",
+       evaluation.errors ? to_json(*evaluation.errors, evaluation.config.truth) : Json()}};
   // Names of files need not be UTF-8.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }

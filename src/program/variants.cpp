@@ -64,7 +64,9 @@ class RevisedVerdicts {
   PointBuffer points_;
 };
 
-}  // namespace
+/// Verdicts of all variants, per scan of the window and point: bit v is set if variant v keeps the
+/// point.
+using VariantVerdicts = std::vector<std::vector<std::uint8_t>>;
 
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done) {
@@ -77,18 +79,12 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
                   std::to_string(sequence.missing_truths()) +
                   " scans have no ground truth; an experiment needs that of all");
   }
-  VariantVerdicts verdicts;
-  verdicts.in_map.resize(sequence.size());
-  verdicts.instances.resize(sequence.size());
+  VariantVerdicts in_map(sequence.size());
   const auto take = [&](std::size_t variant, const ScanVerdict& verdict) {
-    auto& in_map = verdicts.in_map[verdict.scan];
+    auto& kept = in_map[verdict.scan];
     for (std::size_t p = 0; p < verdict.labels.size(); ++p) {
-      if (is_static(verdict.labels[p])) {
-        in_map[p] = static_cast<std::uint8_t>(in_map[p] | (1U << variant));
-      }
-    }
-    if (variant == 0) {
-      verdicts.instances[verdict.scan].assign(verdict.instances.begin(), verdict.instances.end());
+      if (is_static(verdict.labels[p]))
+        kept[p] = static_cast<std::uint8_t>(kept[p] | (1U << variant));
     }
   };
 
@@ -109,7 +105,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   }
   evaluation::LabelledScan scan;
   for (std::size_t i = 0; sequence.read(i, scan); ++i) {
-    verdicts.in_map[i].assign(scan.size(), 0);
+    in_map[i].assign(scan.size(), 0);
     for (std::size_t v = 0; v < removers.size(); ++v) {
       const FrameResult frame = naming_scan(sequence.sequence(), sequence.index(i), [&] {
         return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
@@ -132,17 +128,10 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
       revised[v].reset();
     }
   }
-  return verdicts;
+  return in_map;
 }
 
-evaluation::ScanSource judged_source(LabelledSequence& sequence, const VariantVerdicts& verdicts) {
-  return [&sequence, &verdicts](std::size_t i, evaluation::LabelledScan& scan) {
-    if (!sequence.read(i, scan)) return false;
-    scan.in_map = verdicts.in_map[i];
-    scan.instances = verdicts.instances[i];
-    return true;
-  };
-}
+}  // namespace
 
 evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
                                          const std::vector<Variant>& variants, Answer answer,
@@ -152,7 +141,12 @@ evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
   std::vector<std::string> names;
   names.reserve(variants.size());
   for (const Variant& variant : variants) names.push_back(variant.name);
-  return evaluation::evaluate(judged_source(sequence, verdicts), names, {}, config);
+  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
+    if (!sequence.read(i, scan)) return false;
+    scan.in_map = verdicts[i];
+    return true;
+  };
+  return evaluation::evaluate(source, names, {}, config);
 }
 
 }  // namespace dynains::program

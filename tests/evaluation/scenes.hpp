@@ -20,7 +20,6 @@ struct OwnedScan {
   std::vector<std::uint32_t> truth;
   std::vector<std::uint8_t> in_map;
   std::vector<std::uint8_t> causes;
-  std::vector<std::uint32_t> instances;
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
   double time = 0;
 
@@ -38,7 +37,6 @@ struct OwnedScan {
     scan.truth = truth;
     scan.in_map = in_map;
     scan.causes = causes;
-    scan.instances = instances;
     return scan;
   }
 };

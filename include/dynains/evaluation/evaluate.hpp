@@ -23,7 +23,6 @@ struct EvaluationConfig {
   double max_range = 0.0;
   double point_max_range = 50.0;
   double point_radius = 0.05;
-  double ring_width = 10.0;
   TruthClasses truth;
   bool analyses_errors = true;  ///< whether Evaluation::errors is made
 
@@ -40,8 +39,6 @@ struct EvaluationConfig {
                       "the error analysis; 0 = no limit"});
     visitor(Parameter{"point_radius", self.point_radius, closed(0.0001, 10.0), "m",
                       "largest distance to a map point for a point to be in a map file (KTH)"});
-    visitor(Parameter{"ring_width", self.ring_width, closed(0.1, 10000.0), "m",
-                      "width of the range rings of the error analysis"});
   }
   /// Throws ConfigError for a field out of bounds.
   void validate() const { validate_parameters("EvaluationConfig", *this); }

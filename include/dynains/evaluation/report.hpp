@@ -10,9 +10,8 @@ namespace dynains::evaluation {
 /// Settings, and one aligned line per row. Ends with a newline. A percentage of zero points is "-".
 std::string to_table(const Evaluation& evaluation);
 
-/// Tables of the error analysis: classes, the `max_instances` static and dynamic instances with
-/// most errors, range rings and, if available, causes. Empty without an analysis.
-std::string errors_to_table(const Evaluation& evaluation, std::size_t max_instances = 20);
+/// Tables of the error analysis: classes and, if available, causes. Empty without an analysis.
+std::string errors_to_table(const Evaluation& evaluation);
 
 /// Settings, rows with counts, and error analysis. A percentage of zero points is null.
 std::string to_json(const Evaluation& evaluation);

@@ -26,8 +26,6 @@ struct LabelledScan {
   Span<const std::uint8_t> in_map;
   /// Cause of each verdict of estimate 0 (dynains::evaluation::Cause). May be empty.
   Span<const std::uint8_t> causes;
-  /// Instance or cluster ids of estimate 0, 0 = none. May be empty.
-  Span<const std::uint32_t> instances;
 
   std::size_t size() const { return truth.size(); }
   Eigen::Vector3d point(std::size_t i) const {
