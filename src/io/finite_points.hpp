@@ -9,11 +9,11 @@
 
 namespace dynains {
 
-/// The points with finite coordinates that are not all zero, m, sensor frame.
-inline PointBuffer finite_points(const RecordedScan& scan) {
+/// Of every `step`-th point, those with finite coordinates that are not all zero, m, sensor frame.
+inline PointBuffer finite_points(const RecordedScan& scan, std::size_t step = 1) {
   PointBuffer points;
-  for (auto* const axis : {&points.x, &points.y, &points.z}) axis->reserve(scan.size());
-  for (std::size_t i = 0; i < scan.size(); ++i) {
+  for (auto* const axis : {&points.x, &points.y, &points.z}) axis->reserve(scan.size() / step + 1);
+  for (std::size_t i = 0; i < scan.size(); i += step) {
     const float* p = scan.xyzi.data() + 4 * i;
     const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
     if (!finite || (p[0] == 0.0F && p[1] == 0.0F && p[2] == 0.0F)) continue;

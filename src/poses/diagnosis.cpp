@@ -13,7 +13,6 @@
 #include "dynains/median.hpp"
 #include "given_motion.hpp"
 #include "in_two_threads.hpp"
-#include "io/finite_points.hpp"
 #include "landmarks.hpp"
 #include "openings.hpp"
 #include "pose_fit.hpp"
@@ -94,10 +93,11 @@ class ScanSample {
 
   /// Sets the members of `d` that describe points and mounting.
   void describe(Diagnosis& d) const {
-    std::size_t all = 0, valid = 0, near = 0;  // points
+    std::size_t size = 0, all = 0, valid = 0, near = 0;  // points
     std::vector<double> ranges, heights;
     Eigen::Vector3d up = Eigen::Vector3d::Zero();
     for (const auto& [i, scan] : scans_) {
+      size += scan.size;
       all += scan.all;
       valid += scan.valid;
       near += scan.near;
@@ -106,7 +106,7 @@ class ScanSample {
       heights.push_back(scan.mounting.height);
       up += scan.mounting.up_sensor;
     }
-    if (!scans_.empty()) d.points = static_cast<double>(all) / static_cast<double>(scans_.size());
+    if (!scans_.empty()) d.points = static_cast<double>(size) / static_cast<double>(scans_.size());
     if (all > 0) d.invalid_share = static_cast<double>(all - valid) / static_cast<double>(all);
     if (valid > 0) d.ego_share = static_cast<double>(near) / static_cast<double>(valid);
     if (!ranges.empty()) {
@@ -119,7 +119,8 @@ class ScanSample {
 
  private:
   struct Scan {
-    std::size_t all = 0;  // points
+    std::size_t size = 0;  // points
+    std::size_t all = 0;   // sampled
     std::size_t valid = 0;
     std::size_t near = 0;
     std::vector<double> ranges;  // m, of some points
@@ -129,9 +130,12 @@ class ScanSample {
     Scan(const Recording& recording, std::size_t i) : Scan(recording.read_scan(i)) {}
 
    private:
-    explicit Scan(const RecordedScan& scan) : Scan(finite_points(scan)) { all = scan.size(); }
+    explicit Scan(const RecordedScan& scan) : Scan(sampled_points(scan)) {
+      size = scan.size();
+      all = (size + sample_step(scan) - 1) / sample_step(scan);
+    }
     explicit Scan(const PointBuffer& points)
-        : valid(points.size()), mounting(mounting_of(points)), landmarks(points, mounting) {
+        : valid(points.size()), mounting(estimate_mounting(points)), landmarks(points, mounting) {
       for (std::size_t k = 0; k < points.size(); ++k) {
         const float x = points.x[k], y = points.y[k], z = points.z[k];
         const double range = std::sqrt(x * x + (y * y + z * z));
@@ -282,6 +286,13 @@ bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion&
   return 4 * missed > moving;
 }
 
+/// Whether there are enough motions for a decision.
+bool are_enough(const std::vector<RegisteredMotion>& motions) {
+  const auto is_step = [](const RegisteredMotion& m) { return m.second == m.first + 1; };
+  const auto steps = std::count_if(motions.begin(), motions.end(), is_step);
+  return motions.size() >= kFewestMotions && steps >= std::ptrdiff_t{kFewestPairs};
+}
+
 /// What scans show: landmarks of pairs, and registered motions.
 struct Evidence {
   const Recording& recording;
@@ -289,11 +300,6 @@ struct Evidence {
   std::vector<RegisteredMotion> motions;
   Agreement as_given, standing;
 
-  bool has_motions() const {
-    const auto is_step = [](const RegisteredMotion& m) { return m.second == m.first + 1; };
-    const auto steps = std::count_if(motions.begin(), motions.end(), is_step);
-    return motions.size() >= kFewestMotions && steps >= std::ptrdiff_t{kFewestPairs};
-  }
   /// The pairs and motions for which `motion` has poses. Shifted poses are missing for scans at one
   /// end of the recording.
   Evidence where_known(const BodyMotion& motion) const {
@@ -481,8 +487,14 @@ Diagnosis diagnose_as_opened(const Recording& recording) {
                     : PoseVerdict::kDisagree;
     return d;
   }
-  evidence.motions = register_motions(recording);
-  if (evidence.has_motions()) {
+  // Poses that are exact without exception need no further places.
+  const BodyMotion given = given_motion(recording);
+  evidence.motions = register_motions(recording, [&](const auto& motions) {
+    return are_enough(motions) && std::all_of(motions.begin(), motions.end(), [&](const auto& one) {
+             return error_at_points({one}, given) < kExact;
+           });
+  });
+  if (are_enough(evidence.motions)) {
     judge_by_motions(evidence, d);
   } else {
     judge_by_landmarks(evidence, sampled.neighbours, d);

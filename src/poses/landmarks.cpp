@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>
+#include <optional>
 #include <utility>
 
+#include "cell_surfaces.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "io/finite_points.hpp"
 
 namespace dynains {
 namespace {
@@ -24,10 +25,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    const auto cell = [&](Eigen::Index axis) {
-      return static_cast<std::int64_t>(std::floor(p[axis] / kVoxel));
-    };
-    const VoxelKey key = voxel_key(cell(0), cell(1), cell(2));
+    const VoxelKey key = cell_key(p, kVoxel);
     if (occupied.insert(key) == kept.size()) kept.emplace_back(key, p);
   }
   // Every n-th of them is spread over the scan.
@@ -55,9 +53,9 @@ struct NearestWithin {
 
 }  // namespace
 
-// The points, as nanoflann reads them, and the tree over them.
+// The points, as nanoflann reads them, and the tree over them, which the first search builds.
 struct Landmarks::Tree {
-  explicit Tree(std::vector<Eigen::Vector3d> of) : points(std::move(of)) { index.buildIndex(); }
+  explicit Tree(std::vector<Eigen::Vector3d> of) : points(std::move(of)) {}
 
   std::size_t kdtree_get_point_count() const { return points.size(); }
   double kdtree_get_pt(std::size_t i, std::size_t axis) const {
@@ -70,7 +68,7 @@ struct Landmarks::Tree {
 
   std::vector<Eigen::Vector3d> points;
   using Distance = nanoflann::L2_Simple_Adaptor<double, Tree>;
-  nanoflann::KDTreeSingleIndexAdaptor<Distance, Tree, 3> index{3, *this};
+  std::optional<nanoflann::KDTreeSingleIndexAdaptor<Distance, Tree, 3>> index;
 };
 
 Landmarks::Landmarks(PointsView points, const Mounting& mounting, double farthest)
@@ -83,7 +81,9 @@ const std::vector<Eigen::Vector3d>& Landmarks::points() const { return tree_->po
 
 double Landmarks::distance_to(const Eigen::Vector3d& p) const {
   NearestWithin nearest{kFarthestGap * kFarthestGap};
-  if (size() > 0) tree_->index.findNeighbors(nearest, p.data(), {});
+  if (size() == 0) return kFarthestGap;
+  if (!tree_->index) tree_->index.emplace(3, *tree_);
+  tree_->index->findNeighbors(nearest, p.data(), {});
   return std::sqrt(nearest.squared);
 }
 
@@ -105,21 +105,10 @@ Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
           count};
 }
 
-Mounting mounting_of(PointsView points) {
-  constexpr std::size_t kMost = 40000;
-  const std::size_t stride = 1 + points.size() / kMost;
-  if (stride == 1) return estimate_mounting(points);
-  PointBuffer sample;
-  for (std::size_t i = 0; i < points.size(); i += stride) {
-    sample.push_back(points.x[i], points.y[i], points.z[i]);
-  }
-  return estimate_mounting(sample);
-}
-
 Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
   recording.read_scan(i, scan);
-  const PointBuffer points = finite_points(scan);
-  return Landmarks(points, mounting_of(points));
+  const PointBuffer points = sampled_points(scan);
+  return Landmarks(points, estimate_mounting(points));
 }
 
 }  // namespace dynains

@@ -11,11 +11,12 @@
 #include "dynains/pose.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/sensor/mounting.hpp"
+#include "io/finite_points.hpp"
 
 namespace dynains {
 
 /// Points of one scan: above the ground, 2 m to `farthest` from the sensor, one per voxel of 0.25
-/// m, sorted by voxel.
+/// m, sorted by voxel. The first search builds a tree; only after it may threads search at once.
 class Landmarks {
  public:
   /// `points`: m, sensor frame. If `mounting` is known, points near the ground are excluded.
@@ -36,11 +37,17 @@ class Landmarks {
 
  private:
   struct Tree;
-  std::unique_ptr<const Tree> tree_;
+  std::unique_ptr<Tree> tree_;
 };
 
-/// The mounting that a sample of the points of one scan (m, sensor frame) shows.
-Mounting mounting_of(PointsView points);
+/// The step of a sample of about 40,000 points of a scan. Odd, since scans have their beams in
+/// turn.
+inline std::size_t sample_step(const RecordedScan& scan) { return 1 + 2 * (scan.size() / 80000); }
+
+/// A sample of the measured points of a scan, m, sensor frame.
+inline PointBuffer sampled_points(const RecordedScan& scan) {
+  return finite_points(scan, sample_step(scan));
+}
 
 /// Those of scan i, without the ground under its mounting. `scan`: memory for the scan. Throws
 /// IoError.

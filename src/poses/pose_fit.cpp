@@ -9,7 +9,6 @@
 #include "dynains/median.hpp"
 #include "dynains/threads/background.hpp"
 #include "given_motion.hpp"
-#include "io/finite_points.hpp"
 #include "landmarks.hpp"
 #include "scan_registration.hpp"
 #include "way_search.hpp"
@@ -23,7 +22,7 @@ constexpr double kLever = 10.0;  // m, distance of the points at which a rotatio
 class ChainScan {
  public:
   explicit ChainScan(const PointBuffer& points)
-      : planes_(points), landmarks_(points, mounting_of(points), kWayRange) {}
+      : planes_(points), landmarks_(points, estimate_mounting(points), kWayRange) {}
 
   const RegistrationScan& planes() const { return planes_; }
   const Landmarks& landmarks() const { return landmarks_; }
@@ -242,11 +241,13 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 
 /// Scans at which chains begin, evenly spread. `scans`: at least 2.
 std::vector<std::size_t> starts_of_chains(std::size_t scans) {
-  constexpr std::size_t kChains = 12;
+  constexpr std::size_t kChains = 12, kApart = 4;
   std::vector<std::size_t> starts;
   const std::size_t count = std::min(kChains, scans - 1);
-  for (std::size_t k = 0; k < count; ++k) {
-    starts.push_back(count == 1 ? 0 : k * (scans - 2) / (count - 1));
+  for (std::size_t offset = 0; offset < kApart; ++offset) {
+    for (std::size_t k = offset; k < count; k += kApart) {
+      starts.push_back(count == 1 ? 0 : k * (scans - 2) / (count - 1));
+    }
   }
   return starts;
 }
@@ -289,7 +290,7 @@ class Chain {
 
  private:
   std::unique_ptr<ChainScan> read(std::size_t i) const {
-    return std::make_unique<ChainScan>(finite_points(recording_->read_scan(i)));
+    return std::make_unique<ChainScan>(sampled_points(recording_->read_scan(i)));
   }
   bool add(std::size_t step, const std::vector<Pose>& guesses, double farthest) {
     const std::size_t second = first_ + step;
@@ -310,7 +311,9 @@ class Chain {
 
 }  // namespace
 
-std::vector<RegisteredMotion> register_motions(const Recording& recording) {
+std::vector<RegisteredMotion> register_motions(
+    const Recording& recording,
+    const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice) {
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording.size());
@@ -322,12 +325,13 @@ std::vector<RegisteredMotion> register_motions(const Recording& recording) {
   };
   const auto take = [&] {
     if (before) motions.insert(motions.end(), before->motions().begin(), before->motions().end());
+    return suffice(motions);
   };
   for (std::size_t number = 0; number < starts.size(); ++number) {
     Chain chain(recording, number, starts[number]);
     run_both(
         &other, [&] { chain.begin(elsewhere); }, finish);
-    take();
+    if (take()) return motions;
     if (!chain.motions().empty()) elsewhere = chain.motions().front().T_first_second;
     before.emplace(std::move(chain));
   }

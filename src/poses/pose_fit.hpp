@@ -24,11 +24,13 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart, in the
-/// order of the recording. The given poses are one of several first guesses. Pairs that determine
-/// no motion are left out, and those whose landmarks meet better under the given poses. Throws
-/// IoError.
-std::vector<RegisteredMotion> register_motions(const Recording& recording);
+/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. The
+/// given poses are one of several first guesses. Pairs that determine no motion are left out, and
+/// those whose landmarks meet better under the given poses. Places that follow each other are far
+/// apart: `suffice` tells of the motions so far whether further places are needed. Throws IoError.
+std::vector<RegisteredMotion> register_motions(
+    const Recording& recording,
+    const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "given_motion.hpp"
+
 namespace dynains {
 namespace {
 
@@ -95,9 +97,7 @@ RegistrationScan::RegistrationScan(PointsView points) {
   constexpr std::size_t kFinest = kCellLevels - 1;
   std::vector<Cell> cells;  // of the finest level
   VoxelHashTable<> numbers, taken, thinned;
-  constexpr std::size_t kMost = 40000;  // points
-  const std::size_t stride = 1 + points.size() / kMost;
-  for (std::size_t i = 0; i < points.size(); i += stride) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                             static_cast<double>(points.z[i]));
     const double range = p.norm();
@@ -149,13 +149,21 @@ std::optional<Registration> registration_at(const RegistrationScan& a, const Reg
 std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
                                            const std::vector<Pose>& guesses) {
   constexpr double kDistinct = 0.5;  // m
+  constexpr double kSame = 0.1;      // m, at points 10 m away
   constexpr double kAlmost = 0.93;   // ratio of scores
   Pose best = Pose::Identity();
   double best_score = 0.0;
   std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
+  std::vector<Pose> starts;
   for (const Pose& guess : guesses) {
-    Pose T = refine(a, b, guess, 0, 1.0, 4, 12);
-    T = refine(a, b, T, 1, 0.4, 3, 10);
+    const Pose start = refine(a, b, guess, 0, 1.0, 4, 12);
+    // Most guesses lead to one place.
+    const bool is_known = std::any_of(starts.begin(), starts.end(), [&](const Pose& other) {
+      return extent_of(other.inverse() * start, 10.0) < kSame;
+    });
+    if (is_known) continue;
+    starts.push_back(start);
+    const Pose T = refine(a, b, start, 1, 0.4, 3, 10);
     const Linearization step = linearize(a, b, T, 1, 0.3, 2);
     const double score =
         step.weight / (0.5 * static_cast<double>(std::max<std::size_t>(1, b.points().size())));
