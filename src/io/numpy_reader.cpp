@@ -18,9 +18,8 @@ struct NpyColumn {
   Role role;
   Scalar type;
   bool swap;
-  std::uint64_t begin;                    // byte of the first value
-  std::uint64_t stride;                   // bytes from value to value
-  std::optional<std::size_t> other = {};  // place among the other values of a point
+  std::uint64_t begin;   // byte of the first value
+  std::uint64_t stride;  // bytes from value to value
 };
 
 struct NpyPoints {
@@ -74,49 +73,11 @@ NpyPoints points_of_array(const Bytes& place, const NpyArray& array, PointSink& 
                                : plain_points(place, array, sink);
 }
 
-/// PLY, which holds the clean clouds of arrays, has no 64-bit integers: they become doubles.
-Scalar type_in_ply(Scalar type) {
-  return type == Scalar::kInt64 || type == Scalar::kUint64 ? Scalar::kDouble : type;
-}
-
-/// Adds the columns that have no role: fields, or those of a table, named by their number.
-void add_other_columns(const NpyArray& array, NpyPoints& points, PointSink& sink) {
-  const auto add = [&](const NpyArray::Field& field, const std::string& column, std::uint64_t begin,
-                       std::uint64_t stride) {
-    begin += array.data_begin;
-    const bool has_role = std::any_of(points.columns.begin(), points.columns.end(),
-                                      [&](const NpyColumn& one) { return one.begin == begin; });
-    if (has_role || !field.type) return;
-    const auto place = sink.claim_other(column, type_in_ply(*field.type));
-    if (!place) return;
-    points.columns.push_back({Role::kNone, *field.type, field.swap, begin, stride, place});
-  };
-  if (array.is_structured()) {
-    for (const NpyArray::Field& field : array.fields) {
-      add(field, field.name, field.offset, array.item_size);
-    }
-    return;
-  }
-  const std::uint64_t columns = array.shape.back();
-  const std::uint64_t step = array.is_column_major ? points.count : 1;
-  const std::uint64_t stride = array.item_size * (array.is_column_major ? 1 : columns);
-  for (std::uint64_t i = 0; i < columns; ++i) {
-    add(array.fields.front(), "column_" + std::to_string(i), i * step * array.item_size, stride);
-  }
-}
-
-/// Whole numbers of 64 bits are rounded to 53 bits.
-bool store_value(const NpyColumn& column, const char* value, std::size_t i, PointSink& sink) {
-  const double number = load_scalar(column.type, value, column.swap);
-  return column.other ? store_scalar(type_in_ply(column.type), number, sink.other(i, *column.other))
-                      : sink.set(i, column.role, number);
-}
-
 void store_column(const Bytes& place, const NpyColumn& column, std::uint64_t count,
                   const std::uint8_t* bytes, PointSink& sink) {
   const char* value = reinterpret_cast<const char*>(bytes) + column.begin;
   for (std::size_t i = 0; i < count; ++i, value += column.stride) {
-    if (store_value(column, value, i, sink)) continue;
+    if (sink.set(i, column.role, load_scalar(column.type, value, column.swap))) continue;
     place.fail("expected whole numbers of at least 0 for rings and labels");
   }
 }
@@ -139,7 +100,6 @@ NpyFile open_npy(const std::filesystem::path& path, PointSink& sink, bool with_p
   const NpyArray array = parse_npy_header(bytes, raw.size());
   file.points = points_of_array(bytes, array, sink);
   require_xyz(path, sink);
-  add_other_columns(array, file.points, sink);
   return file;
 }
 

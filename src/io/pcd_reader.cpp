@@ -27,7 +27,6 @@ struct Field {
   std::size_t count = 1;
   Scalar type = Scalar::kFloat;
   Role role = Role::kNone;
-  std::optional<std::size_t> other;  ///< place among the other values of a point
 
   std::size_t bytes() const { return size * count; }
 };
@@ -190,11 +189,7 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
     if (field.type_letter == 0) reader.fail_on_line("expected TYPE before DATA");
     field.type = scalar_of(reader, field);
     const Role role = field.count == 1 ? role_of(field.name) : Role::kNone;
-    if (role != Role::kNone && sink.claim(role)) {
-      field.role = role;
-    } else {
-      field.other = sink.claim_other(field.name, field.type, field.count);
-    }
+    if (role != Role::kNone && sink.claim(role)) field.role = role;
   }
   if (const auto name = sink.missing()) reader.fail_on_line("expected a field " + *name);
   if (!header.has_width && !header.has_points) {
@@ -284,19 +279,6 @@ BlockSizes read_block_sizes(ByteReader& reader, const PcdHeader& header) {
   return {compressed_size, plain_size};
 }
 
-/// A value of a text among the other values; 64-bit integers keep all digits.
-bool store_other(Scalar type, std::string_view token, double value, char* bytes) {
-  const auto store_whole = [&](auto number) {
-    const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), number);
-    if (error != std::errc{} || stop != token.data() + token.size()) return false;
-    std::memcpy(bytes, &number, sizeof(number));
-    return true;
-  };
-  if (type == Scalar::kInt64 && store_whole(std::int64_t{})) return true;
-  if (type == Scalar::kUint64 && store_whole(std::uint64_t{})) return true;
-  return store_scalar(type, value, bytes);
-}
-
 void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
   check_ascii(reader, header);
   sink.resize(static_cast<std::size_t>(header.points));
@@ -315,10 +297,7 @@ void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
                               (token.empty() ? "the end of the line"
                                              : "\"" + std::string(token.substr(0, 40)) + "\""));
         }
-        const bool is_held = field.other ? store_other(field.type, token, *value,
-                                                       sink.other(i, *field.other + k * field.size))
-                                         : sink.set(i, field.role, *value);
-        if (!is_held) {
+        if (!sink.set(i, field.role, *value)) {
           reader.fail_on_line("expected a whole number that " + field.name + " can have");
         }
       }
@@ -340,7 +319,6 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
           !sink.set(i, field.role, load_scalar(field.type, bytes, false))) {
         fail_value(field, i, reader);
       }
-      if (field.other) std::memcpy(sink.other(i, *field.other), bytes, field.bytes());
       bytes += field.bytes();
     }
   }
@@ -368,9 +346,6 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
       if (!sink.set(i, field.role, load_scalar(field.type, column + i * field.size, false))) {
         fail_value(field, i, reader);
       }
-    }
-    for (std::size_t i = 0; field.other && i < count; ++i) {
-      std::memcpy(sink.other(i, *field.other), column + i * field.bytes(), field.bytes());
     }
     column += field.bytes() * count;
   }

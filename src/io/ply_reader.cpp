@@ -21,7 +21,6 @@ struct Property {
   bool is_list = false;
   Scalar length_type = Scalar::kUint8;  ///< of a list
   Role role = Role::kNone;
-  std::optional<std::size_t> other;  ///< place among the other values of a point
   std::string name;
 };
 
@@ -118,11 +117,7 @@ void add_property(const ByteReader& reader, std::string_view line, HeaderProgres
   Element& element = progress.header.elements.back();
   if (element.is_vertex && !property.is_list) {
     const Role role = role_of(property.name);
-    if (role != Role::kNone && sink.claim(role)) {
-      property.role = role;
-    } else {
-      property.other = sink.claim_other(property.name, property.type);
-    }
+    if (role != Role::kNone && sink.claim(role)) property.role = role;
   }
   element.properties.push_back(std::move(property));
 }
@@ -239,10 +234,7 @@ void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink)
     if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
     for (std::size_t i = 0; i < element.count; ++i) {
       const auto store = [&](const Property& property, double value) {
-        const bool is_held =
-            property.other ? store_scalar(property.type, value, sink.other(i, *property.other))
-                           : sink.set(i, property.role, value);
-        if (is_held) return;
+        if (sink.set(i, property.role, value)) return;
         const std::string what = "expected a whole number that " + property.name + " can have";
         header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
       };

@@ -48,28 +48,7 @@ const PointFileFormat& format_to_read(const fs::path& path) {
                         : "expected a name that ends in .ply, .pcd, .las, .npy, .xyz or .csv");
 }
 
-/// Type of a property of PLY; empty: PLY has none.
-std::string ply_type(const OtherColumn& column) {
-  if (column.type == 'F') return column.size == 4 ? "float" : "double";
-  const char* const name = column.size == 1   ? "char"
-                           : column.size == 2 ? "short"
-                           : column.size == 4 ? "int"
-                                              : "";
-  return *name != '\0' && column.type == 'U' ? std::string("u") + name : name;
-}
-
-/// "name", or "name_0" to "name_2" for three values.
-std::string ply_properties(const OtherColumn& column) {
-  std::string text;
-  for (std::size_t k = 0; k < column.count; ++k) {
-    text += "property " + ply_type(column) + ' ' + column.name +
-            (column.count == 1 ? "" : '_' + std::to_string(k)) + '\n';
-  }
-  return text;
-}
-
-std::string ply_header(std::size_t count, const PointColumns& columns,
-                       const std::vector<OtherColumn>& others, const std::string& padding,
+std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
                        const Pose&) {
   const std::string coordinate = columns.double_xyz ? "double" : "float";
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
@@ -81,7 +60,6 @@ std::string ply_header(std::size_t count, const PointColumns& columns,
   if (columns.ring) text += "property ushort ring\n";
   if (columns.time) text += "property double time\n";
   if (columns.session) text += "property ushort session\n";
-  for (const OtherColumn& column : others) text += ply_properties(column);
   return text + "end_header\n";
 }
 
@@ -96,19 +74,17 @@ std::string viewpoint_line(const Pose& pose) {
   return line.str();
 }
 
-std::string pcd_header(std::size_t count, const PointColumns& columns,
-                       const std::vector<OtherColumn>& others, const std::string& padding,
+std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding,
                        const Pose& viewpoint) {
   std::string fields = "FIELDS x y z";
   std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
   std::string types = "TYPE F F F";
   std::string counts = "COUNT 1 1 1";
-  const auto add = [&](const std::string& name, char type, std::size_t bytes = 4,
-                       std::size_t values = 1) {
+  const auto add = [&](const std::string& name, char type, std::size_t bytes = 4) {
     fields += ' ' + name;
     sizes += ' ' + std::to_string(bytes);
     types += std::string(" ") + type;
-    counts += ' ' + std::to_string(values);
+    counts += " 1";
   };
   if (columns.intensity) add("intensity", 'F');
   if (columns.rgb) add("rgb", 'F');
@@ -116,7 +92,6 @@ std::string pcd_header(std::size_t count, const PointColumns& columns,
   if (columns.ring) add("ring", 'U', 2);
   if (columns.time) add("time", 'F', 8);
   if (columns.session) add("session", 'U', 2);
-  for (const OtherColumn& other : others) add(other.name, other.type, other.size, other.count);
   const std::string size = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
          fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size + "\nHEIGHT 1\n" +
@@ -126,16 +101,12 @@ std::string pcd_header(std::size_t count, const PointColumns& columns,
 }  // namespace
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
-                                 const Pose& viewpoint, std::vector<OtherColumn> others)
+                                 const Pose& viewpoint)
     : columns_(columns),
-      others_(std::move(others)),
       viewpoint_(viewpoint),
       pcd_(is_pcd(path)),
       buffer_(columns, pcd_),
       file_(path) {
-  for (const OtherColumn& column : others_) {
-    if (!pcd_ && ply_type(column).empty()) fail(path, "PLY has no type for " + column.name);
-  }
   file_.stream() << header();
 }
 
@@ -143,15 +114,14 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
 std::string PointFileWriter::header() const {
   const auto text = pcd_ ? pcd_header : ply_header;
   constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
-  const std::size_t length = text(kMost, columns_, others_, "", viewpoint_).size();
-  const std::size_t needed = text(size_, columns_, others_, "", viewpoint_).size();
-  return text(size_, columns_, others_, std::string(length - needed, '.'), viewpoint_);
+  const std::size_t length = text(kMost, columns_, "", viewpoint_).size();
+  const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
+  return text(size_, columns_, std::string(length - needed, '.'), viewpoint_);
 }
 
-void PointFileWriter::add(const FilePoint& point, Span<const char> others) {
+void PointFileWriter::add(const FilePoint& point) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 16U;
   buffer_.add(point);
-  buffer_.add_others(others);
   ++size_;
   if (buffer_.bytes().size() >= kMostBytes) write_buffer();
 }
@@ -203,13 +173,6 @@ PointFile read_points(const fs::path& path) {
   PointSink sink;
   format_to_read(path).read(path, sink);
   return std::move(sink.file());
-}
-
-OtherValues read_other_columns(const fs::path& path) {
-  OtherValues others;
-  PointSink sink(&others);
-  format_to_read(path).read(path, sink);
-  return others;
 }
 
 PointFileHeader read_point_file_header(const fs::path& path) {

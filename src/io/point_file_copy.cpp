@@ -13,7 +13,11 @@ void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> kee
   const std::string extension = text::lower_case(path.extension().string());
   if (extension == ".ply") return copy_ply(path, keep, target);
   if (extension == ".pcd") return copy_pcd(path, keep, target);
-  fail(path, "expected a name that ends in .ply or .pcd");
+  if (extension != ".bin") fail(path, "expected a name that ends in .ply, .pcd or .bin");
+  ByteReader reader(path);
+  const std::uint64_t points = std::max<std::uint64_t>(keep.size(), 1);
+  copy_records(reader, static_cast<std::size_t>(reader.remaining() / points), "a point", keep,
+               target);
 }
 
 void copy_lines(const std::filesystem::path& path, std::uint64_t size, std::ostream& target,

@@ -14,10 +14,10 @@ namespace dynains {
 
 class ByteReader;
 
-/// Writes the PLY or PCD file `path` to `target` without some of its points. All columns and
-/// comments stay as they are; compressed points of PCD become binary ones. `keep`: for each point
-/// of read_points(), 0 if it is left out. Throws IoError, also for a PLY file that has more than
-/// points, such as faces.
+/// Writes the PLY, PCD or raw file (.bin) `path` to `target` without some of its points. All
+/// columns and comments stay as they are; compressed points of PCD become binary ones. `keep`: for
+/// each point of read_points(), 0 if it is left out. Throws IoError, also for a PLY file that has
+/// more than points, such as faces.
 void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> keep,
                  std::ostream& target);
 

@@ -9,10 +9,6 @@ namespace dynains {
 
 class PointSink;
 
-/// The other columns of a file of read_points(): those of .pcd, .ply, .npy and named ones of
-/// text; none of LAS. Throws IoError like read_points().
-OtherValues read_other_columns(const std::filesystem::path& path);
-
 void read_ply(const std::filesystem::path& path, PointSink& sink);
 void read_pcd(const std::filesystem::path& path, PointSink& sink);
 void read_las(const std::filesystem::path& path, PointSink& sink);

@@ -55,22 +55,6 @@ bool PointSink::claim(Role role) {
   return true;
 }
 
-std::optional<std::size_t> PointSink::claim_other(const std::string& name, Scalar type,
-                                                  std::size_t count) {
-  // A name of PCL for bytes between fields.
-  if (others_ == nullptr || count == 0 || name == "_") return std::nullopt;
-  const std::size_t place = others_->bytes_of_point();
-  others_->columns.push_back({free_name(name), letter_of(type), size_of(type), count});
-  return place;
-}
-
-std::string PointSink::free_name(const std::string& name) const {
-  const bool is_taken = role_of(name) != Role::kNone ||
-                        std::any_of(others_->columns.begin(), others_->columns.end(),
-                                    [&](const OtherColumn& column) { return column.name == name; });
-  return is_taken ? free_name(name + "_other") : name;
-}
-
 std::optional<std::string> PointSink::missing() const {
   for (const Role role : {Role::kX, Role::kY, Role::kZ}) {
     const auto index = static_cast<std::size_t>(role);
@@ -91,10 +75,6 @@ PointColumns PointSink::columns() const {
 
 void PointSink::resize(std::size_t count) {
   const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
-  if (others_ != nullptr) {
-    other_bytes_ = others_->bytes_of_point();
-    others_->bytes.resize(count * other_bytes_);
-  }
   file_.positions.resize(count, Eigen::Vector3d::Zero());
   if (claimed(Role::kIntensity)) file_.intensity.resize(count);
   if (claimed(Role::kRing)) file_.ring.resize(count);

@@ -22,20 +22,8 @@ Role role_of(std::string_view name);
 /// Collects points, value by value.
 class PointSink {
  public:
-  /// `others`: for the values of columns without a role; null: they are left out.
-  explicit PointSink(OtherValues* others = nullptr) : others_(others) {}
-
   /// Announces a column. False if another column has its role already: ignore it then.
   bool claim(Role role);
-  bool wants_others() const { return others_ != nullptr; }
-  /// Announces a column that has no role; its first byte among the other values of a point, unless
-  /// they are left out.
-  std::optional<std::size_t> claim_other(const std::string& name, Scalar type,
-                                         std::size_t count = 1);
-  /// The other values of point i from byte `place` on.
-  char* other(std::size_t i, std::size_t place) {
-    return others_->bytes.data() + i * other_bytes_ + place;
-  }
   /// Name of a coordinate without a column.
   std::optional<std::string> missing() const;
 
@@ -51,10 +39,6 @@ class PointSink {
   PointFile& file() { return file_; }
 
  private:
-  std::string free_name(const std::string& name) const;
-
-  OtherValues* others_;
-  std::size_t other_bytes_ = 0;  ///< of a point
   std::array<bool, static_cast<std::size_t>(Role::kNone)> claimed_{};
   PointFile file_;
 };

@@ -149,7 +149,6 @@ void Recording::open_log() {
   choice.pose_frame = options_.pose_frame;
   choice.with_poses = !has_file && !options_.without_poses;
   choice.with_transforms = !options_.sensor_frame.empty();
-  choice.point_time_unit = options_.point_time_unit;
   choice.time_offset = options_.time_offset;
   choice.has_extrinsic = !options_.convention.T_body_sensor.isApprox(Pose::Identity(), 0.0);
   choice.accept_missing = options_.accept_missing;
@@ -159,6 +158,10 @@ void Recording::open_log() {
   frame_ = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;
   files_ = log->log().files();
   early_end_ = log->log().early_end();
+  if (early_end_) {
+    warnings_.push_back(*early_end_ + "; " + std::to_string(log->size()) +
+                        " scans before it are read");
+  }
   if (log->log().missing_parts()) warnings_.push_back(*log->log().missing_parts());
   notes_ = log->notes();
   warnings_.insert(warnings_.end(), log->warnings().begin(), log->warnings().end());
@@ -172,11 +175,6 @@ void Recording::open_log() {
   if (has_file) files_.push_back(options_.poses);
   if (options_.without_poses) {
     if (!options_.sensor_frame.empty()) take_sensor_frame(*log);
-    if (log->columns().time && !options_.is_compensated) {
-      PointClockFinding finding = log->point_clock();
-      if (finding.clock) finding.clock = PointClock{1.0, false, finding.clock->longest_scan};
-      take_clock(finding);
-    }
     reader_ = make_log_reader(std::move(log));
     return leave_unplaced();
   }
@@ -185,11 +183,6 @@ void Recording::open_log() {
   const fs::path& poses = has_file ? options_.poses : folder_;
   if (!options_.sensor_frame.empty()) take_sensor_frame(*log);
   trajectory_.times.empty() ? match_rows(poses) : match_times(poses, log->times());
-  if (options_.deskew) {
-    PointClockFinding finding = log->point_clock();
-    if (finding.clock) finding.clock = PointClock{1.0, false, finding.clock->longest_scan};
-    take_clock(finding);
-  }
   reader_ = make_log_reader(std::move(log));
   place_scans(poses);
 }
@@ -407,10 +400,6 @@ RecordedScan Recording::read_scan(std::size_t i) const {
   RecordedScan scan;
   read_scan(i, scan);
   return scan;
-}
-
-OtherValues Recording::read_other_values(std::size_t i) const {
-  return reader_->read_other_values(address(i));
 }
 
 bool Recording::has_labels(std::size_t i) const {

@@ -367,8 +367,8 @@ void Recording::place_scans(const fs::path& poses) {
   }
   if (placed.empty()) fail(poses, "has no pose for any scan; check --pose-shift");
   if (placed.size() < all) {
-    notes_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
-                     " scans have no pose and are left out, " + missing + " first");
+    warnings_.push_back(std::to_string(all - placed.size()) + " of " + std::to_string(all) +
+                        " scans have no pose and are left out, " + missing + " first");
   }
   scans_ = std::move(placed);
 }
@@ -414,14 +414,11 @@ void Recording::find_point_clock() {
   std::vector<double> times;
   for (const Scan& scan : scans_) times.push_back(scan.time);
   RecordedScan scan;
-  take_clock(find_clock(times, has_times_, options_.point_time_unit,
-                        [&](std::size_t i) -> const RecordedScan& {
-                          reader_->read(address(i), nullptr, scan);
-                          return scan;
-                        }));
-}
-
-void Recording::take_clock(const PointClockFinding& finding) {
+  const PointClockFinding finding = find_clock(times, has_times_, options_.point_time_unit,
+                                               [&](std::size_t i) -> const RecordedScan& {
+                                                 reader_->read(address(i), nullptr, scan);
+                                                 return scan;
+                                               });
   if (!finding.clock && !finding.text.empty()) {
     fail(folder_, "cannot be de-skewed: " + finding.text);
   }
@@ -437,7 +434,7 @@ void Recording::prepare_deskewing() {
   if (frame_ == PointFrame::kWorld) {
     fail(folder_, "de-skewing needs points in the frame of the sensor");
   }
-  if (!clock_) find_point_clock();
+  find_point_clock();
   notes_.push_back("points are de-skewed by their times");
   if (options_.without_poses) return;
   const Trajectory& rows = motion_.times.empty() ? trajectory_ : motion_;

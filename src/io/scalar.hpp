@@ -101,24 +101,4 @@ bool store_number(double value, Number& target) {
   return true;
 }
 
-/// Converts a number and stores it at `bytes`. False, with nothing stored, if the type cannot hold
-/// it.
-inline bool store_scalar(Scalar type, double value, char* bytes) {
-  return with_type(type, [&](auto number) {
-    if (!store_number(value, number)) return false;
-    std::memcpy(bytes, &number, sizeof(number));
-    return true;
-  });
-}
-
-/// As in PCD: I integer, U unsigned, F floating-point.
-inline char letter_of(Scalar type) {
-  return with_type(type, [](auto zero) {
-    using Number = decltype(zero);
-    constexpr bool kIsSigned = std::is_signed_v<Number>;
-    if (std::is_floating_point_v<Number>) return 'F';
-    return kIsSigned ? 'I' : 'U';
-  });
-}
-
 }  // namespace dynains

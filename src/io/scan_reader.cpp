@@ -46,7 +46,6 @@ class BinReader final : public ScanReader {
              : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
     transform(T_target_file, points);
   }
-  OtherValues read_other_values(const ScanAddress&) const override { return {}; }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     fail(scan.file, "has no labels");
   }
@@ -80,9 +79,6 @@ class PointFileReader final : public ScanReader {
     points.ring = std::move(file.ring);
     points.time = std::move(file.time);
   }
-  OtherValues read_other_values(const ScanAddress& scan) const override {
-    return read_other_columns(scan.file);
-  }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     PointFile points = read_points(scan.file);
     if (points.label.size() != points.positions.size()) {
@@ -109,10 +105,6 @@ class LogReader final : public ScanReader {
       scans_->read(scan.index, points);
     }
     transform(T_target_file, points);
-  }
-  OtherValues read_other_values(const ScanAddress& scan) const override {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return scans_->read_other_values(scan.index);
   }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     const std::lock_guard<std::mutex> lock(mutex_);

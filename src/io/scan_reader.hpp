@@ -40,8 +40,6 @@ class ScanReader {
   /// lacks become empty; memory of `points` is reused.
   virtual void read(const ScanAddress& scan, const FileTransform* T_target_file,
                     RecordedScan& points) const = 0;
-  /// The columns that read() leaves out, but labels.
-  virtual OtherValues read_other_values(const ScanAddress& scan) const = 0;
   /// The column `label`.
   virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
   /// Null if the scans are files.

@@ -90,26 +90,9 @@ Recording RecordingFlags::open_of_run(const std::filesystem::path& report_file,
   return open();
 }
 
-namespace {
-
-void print_warnings(const Recording& recording) {
-  if (recording.early_end()) {
-    print_warning(*recording.early_end() + "; " + std::to_string(recording.scan_file_count()) +
-                  " scans before it are read");
-  }
-  for (const std::string& warning : recording.warnings()) print_warning(warning);
-}
-
-}  // namespace
-
 Recording RecordingFlags::open(const std::filesystem::path& folder) const {
   Recording recording(folder, settings_.checked());
-  if (recording.missing_pose_count() > 0) {
-    print_warning(std::to_string(recording.missing_pose_count()) + " of " +
-                  std::to_string(recording.scan_file_count()) +
-                  " scans have no pose and are left out; see: dynains check " + as_given());
-  }
-  print_warnings(recording);
+  for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }
 
@@ -125,7 +108,7 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
   options.without_poses = true;
   options.is_compensated = is_compensated;
   Recording recording(folder_, options);
-  print_warnings(recording);
+  for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }
 

@@ -131,18 +131,10 @@ RecordingPointer to_recording(const py::object& recording, const py::dict& optio
   return recording.cast<RecordingPointer>();
 }
 
-void warn_of_missing_scans(const Recording& recording) {
+void show_warnings(const Recording& recording) {
   const auto warn = [](const std::string& text) {
     if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
   };
-  const std::string total = std::to_string(recording.scan_file_count());
-  if (recording.missing_pose_count() > 0) {
-    warn(recording.folder().string() + ": " + std::to_string(recording.missing_pose_count()) +
-         " of " + total + " scans have no pose and are left out; see the notes of the recording");
-  }
-  if (recording.early_end()) {
-    warn(*recording.early_end() + "; " + total + " scans before it are read");
-  }
   for (const std::string& text : recording.warnings()) {
     warn(recording.folder().string() + ": " + text);
   }
@@ -178,7 +170,7 @@ void bind_recording(py::module_& module) {
       .def(
           py::init([](const std::filesystem::path& path, const py::kwargs& options) {
             RecordingPointer recording = open(path, py::dict(options));
-            warn_of_missing_scans(recording->get());
+            show_warnings(recording->get());
             return recording;
           }),
           py::arg("path"),

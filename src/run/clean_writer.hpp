@@ -1,4 +1,4 @@
-// Scans without dynamic points, in the format of their recording.
+// Scans without dynamic points.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,6 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
-#include "dynains/pose.hpp"
 
 namespace dynains::program {
 
@@ -20,20 +19,17 @@ class CleanWriter {
   static std::string name(const Recording& recording, std::size_t i);
 
   /// Writes scan i of the recording: all finite points that are not dynamic, or with
-  /// `drop_not_judged` all static ones, in their order, in the frame they had, with all their
-  /// columns but labels. Columns that a run does not read keep their bytes.
+  /// `drop_not_judged` all static ones, in their order and frame. Files of .bin, .pcd and .ply are
+  /// copied without the other points, so that all columns stay as they are. Scans of other formats
+  /// become .pcd with the columns of `scan`, m.
   void write(std::size_t i, const RecordedScan& scan, Span<const PointLabel> labels) const;
 
  private:
-  void write_bin(const std::filesystem::path& file, std::size_t i, const RecordedScan& scan,
-                 Span<const PointLabel> labels) const;
-  Pose T_file_sensor(std::size_t i) const;
   bool is_kept(PointLabel label) const;
 
   std::filesystem::path folder_;
   const Recording& recording_;
   bool drop_not_judged_;
-  bool has_others_;  ///< whether scans have columns that a run does not read
 };
 
 }  // namespace dynains::program

@@ -169,8 +169,8 @@ TEST_CASE("Labels become the last field of a cloud, and all others are as they w
     CHECK(after.frame == before.frame);
     RecordedScan points;
     RecordedScan marked_points;
-    read_cloud(kCloud, serialised(cloud, encoding), nullptr, points);
-    read_cloud(kCloud, message, nullptr, marked_points);
+    read_cloud(kCloud, serialised(cloud, encoding), points);
+    read_cloud(kCloud, message, marked_points);
     CHECK(marked_points.xyzi == points.xyzi);
     // By hand: two rows of two points of 14 + 4 bytes, and the flag of dense clouds behind them.
     for (std::size_t i = 0; i < 4; ++i) {

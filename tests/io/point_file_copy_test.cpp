@@ -87,5 +87,5 @@ TEST_CASE("copies refuse what is more than points, and other formats") {
                     ContainsSubstring("expected vertices without the list around"));
   CHECK_THROWS_WITH(copy_of("a.ply", ply("ascii", 3) + "1 2 3 7\n"),
                     ContainsSubstring("file ends"));
-  CHECK_THROWS_WITH(copy_of("a.xyz", points), ContainsSubstring("ends in .ply or .pcd"));
+  CHECK_THROWS_WITH(copy_of("a.xyz", points), ContainsSubstring("ends in .ply, .pcd or .bin"));
 }

@@ -400,6 +400,9 @@ TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") 
       file.add(point);
     }
     file.commit();
+    const std::string name = folder / ("seq/pcd/" + std::to_string(i) + ".pcd");
+    std::string text = read_text(name);
+    write_text(name, text.replace(text.find("intensity"), 9, "reflectivity"));
   }
   const Outcome outcome = start(
       {"run", folder / "seq", "-o", folder / "out", "-q", "--write-clean", "--frame", "world"});
@@ -427,6 +430,8 @@ TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") 
     CHECK(kept.ring.front() == 5);
     CHECK(kept.time.front() == 0.125);
   }
+  CHECK_THAT(read_text(folder / "out/clean/0.pcd"),
+             ContainsSubstring("FIELDS x y z reflectivity ring time"));
   const PointFile moving = read_points(folder / "out/dynamic_points.ply");
   CHECK(moving.ring.size() == moving.positions.size());
   CHECK(moving.time.size() == moving.positions.size());

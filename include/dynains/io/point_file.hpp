@@ -24,15 +24,12 @@ inline constexpr double kFloatCoordinateLimit = 1e4;
 class PointFileWriter {
  public:
   /// The extension .ply or .pcd determines the format. `viewpoint`: pose of the sensor for the
-  /// header of PCD; ignored for PLY. `others`: further columns, behind those of `columns`; PLY gets
-  /// a property for each of their values. Throws IoError for another extension, a folder that is
-  /// not writable, or 64-bit integers for PLY.
+  /// header of PCD; ignored for PLY. Throws IoError for another extension, or a folder that is not
+  /// writable.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
-                           const Pose& viewpoint = Pose::Identity(),
-                           std::vector<OtherColumn> others = {});
+                           const Pose& viewpoint = Pose::Identity());
 
-  /// `others`: the bytes of the point in the other columns.
-  void add(const FilePoint& point, Span<const char> others = {});
+  void add(const FilePoint& point);
   std::size_t size() const { return size_; }
   /// Puts the file in place. Throws IoError unless it was written completely.
   void commit(AtomicFile::Sync sync = AtomicFile::Sync::kNow);
@@ -42,7 +39,6 @@ class PointFileWriter {
   void write_buffer();
 
   PointColumns columns_;
-  std::vector<OtherColumn> others_;
   Pose viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;

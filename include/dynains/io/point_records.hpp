@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <string>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -36,36 +35,12 @@ struct PointColumns {
   bool session = false;     ///< uint16 `session`, of a map of many sessions
 };
 
-/// A column beside those of PointColumns, whose values stay as they are.
-struct OtherColumn {
-  std::string name;
-  char type = 'F';        ///< as in PCD: I integer, U unsigned, F floating-point
-  std::size_t size = 4;   ///< bytes of a value
-  std::size_t count = 1;  ///< values of a point
-};
-
-/// Other columns, with the bytes of one point behind those of another, in the order of the machine.
-struct OtherValues {
-  std::vector<OtherColumn> columns;
-  std::vector<char> bytes;
-
-  std::size_t bytes_of_point() const {
-    std::size_t sum = 0;
-    for (const OtherColumn& column : columns) sum += column.size * column.count;
-    return sum;
-  }
-};
-
 /// Points in memory, packed as PLY (or PCD) stores them.
 class PointRecords {
  public:
   explicit PointRecords(const PointColumns& columns, bool is_pcd = false);
 
   void add(const FilePoint& point);
-  /// Appends the bytes of other columns of the point before.
-  void add_others(Span<const char> bytes) {
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  }
   void clear() { bytes_.clear(); }
   Span<const char> bytes() const { return {bytes_.data(), bytes_.size()}; }
 

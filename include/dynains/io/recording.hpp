@@ -99,7 +99,6 @@ enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kXyz, kCsv, kNuScenes, kLo
 class LogScans;
 class ScanReader;
 struct PointClock;
-struct PointClockFinding;
 struct ScanAddress;
 
 /// Recorded scans with poses. Supported recordings:
@@ -214,9 +213,6 @@ class Recording {
   /// for each scan. Other scans are left out.
   void take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor);
 
-  /// The columns of scan i beside x y z, those of RecordedScan and labels: of .pcd, .ply, .npy
-  /// and clouds of logs.
-  OtherValues read_other_values(std::size_t i) const;
   /// One label per point of scan i.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
@@ -286,7 +282,6 @@ class Recording {
       std::size_t i) const;
   void prepare_deskewing();
   void find_point_clock();
-  void take_clock(const PointClockFinding& finding);
   ScanAddress address(std::size_t i) const;
 
   std::filesystem::path folder_;

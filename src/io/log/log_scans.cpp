@@ -72,9 +72,7 @@ LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
   if (choice.with_poses) choose_pose_topic();
   read_log();
   check_clouds();
-  if (columns_.time) find_point_clock();
   if (choice.with_poses) place_scans();
-  if (log_->early_end()) notes_.push_back(*log_->early_end());
 }
 
 void LogScans::choose_cloud_topic() {
@@ -183,17 +181,6 @@ void LogScans::check_clouds() {
   if (disordered_ >= size()) fail(log_->path(), "expected stamps that increase: " + count);
   const bool are_many = 10 * disordered_ > size();
   (are_many ? warnings_ : notes_).push_back(count + ", and are left out");
-}
-
-void LogScans::find_point_clock() {
-  const PointClock raw;
-  RecordedScan scan;
-  point_clock_ = find_clock(
-      times_, true, choice_.point_time_unit, [&](std::size_t i) -> const auto& {
-        const LogMessage& message = clouds_[i];
-        read_cloud(log_->topics()[message.topic].type, load(message), &raw, scan);
-        return scan;
-      });
 }
 
 void LogScans::place_scans() {
@@ -333,13 +320,7 @@ SerialisedMessage LogScans::load(const LogMessage& message) {
 
 void LogScans::read(std::size_t i, RecordedScan& scan) {
   const LogMessage& message = clouds_.at(i);
-  const PointClock* const clock = point_clock_.clock ? &*point_clock_.clock : nullptr;
-  read_cloud(log_->topics()[message.topic].type, load(message), clock, scan);
-}
-
-OtherValues LogScans::read_other_values(std::size_t i) {
-  const LogMessage& message = clouds_.at(i);
-  return dynains::read_other_values(log_->topics()[message.topic].type, load(message));
+  read_cloud(log_->topics()[message.topic].type, load(message), scan);
 }
 
 std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "../point_clock.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
@@ -23,7 +22,6 @@ struct LogChoice {
   std::string pose_frame;        ///< the fixed frame, if poses come from transforms
   bool with_poses = true;        ///< false: the log's poses are not used
   bool with_transforms = false;  ///< transforms are read even if its poses are not used
-  double point_time_unit = 0.0;  ///< s per unit of times of points; 0: to be found
   double time_offset = 0.0;      ///< s; a cloud at time t has the pose at t + time_offset
   /// Whether the user gives the pose of the sensor in the body, which transforms then may lack.
   bool has_extrinsic = false;
@@ -67,11 +65,8 @@ class LogScans {
   const std::vector<std::string>& notes() const { return notes_; }
   /// Defects that results depend on.
   const std::vector<std::string>& warnings() const { return warnings_; }
-  /// How times of points were understood. read() makes them seconds after the stamp.
-  const PointClockFinding& point_clock() const { return point_clock_; }
 
   void read(std::size_t i, RecordedScan& scan);
-  OtherValues read_other_values(std::size_t i);
   std::vector<std::uint32_t> read_labels(std::size_t i);
 
  private:
@@ -81,7 +76,6 @@ class LogScans {
   void take_cloud(const LogMessage& message);
   void take_poses(const LogMessage& message);
   void check_clouds();
-  void find_point_clock();
   void place_scans();
   void choose_frames();
   std::string body_frame() const;
@@ -103,7 +97,6 @@ class LogScans {
   std::vector<std::size_t> point_counts_;
   std::size_t disordered_ = 0;  ///< clouds whose stamp is not after that of the cloud before
   PointColumns columns_;
-  PointClockFinding point_clock_;
   Trajectory poses_;  ///< of the pose topic
   TransformTree transforms_;
   bool is_in_world_ = false;

@@ -25,18 +25,12 @@ PointCloud2::PointCloud2(MessageReader& in) {
   for (Field* const field : {&x, &y, &z, &intensity, &ring, &time, &label}) {
     field->is_big_endian = is_big_endian;
   }
-  for (OtherField& other : others_) other.first.is_big_endian = is_big_endian;
   point_step_ = in.number<std::uint32_t>("a point step");
   row_step_ = in.number<std::uint32_t>("a row step");
   const std::uint32_t bytes = in.length(1, "data");
   data_ = in.take(bytes, "data");
   if (size() == 0) return;
   check_fields(in);
-  const auto is_beyond = [this](const OtherField& other) {
-    return other.first.offset + std::uint64_t{other.count} * size_of(other.first.type) >
-           point_step_;
-  };
-  others_.erase(std::remove_if(others_.begin(), others_.end(), is_beyond), others_.end());
   check_size(in, bytes);
 }
 
@@ -84,13 +78,10 @@ void PointCloud2::read_fields(MessageReader& in) {
     const std::string name = in.string("a field name");
     const auto offset = in.number<std::uint32_t>("a field offset");
     const auto datatype = in.number<std::uint8_t>("a field datatype");
-    const auto values = std::max(std::uint32_t{1}, in.number<std::uint32_t>("a field count"));
+    in.number<std::uint32_t>("a field count");
     Field* const field = field_of(name);
+    if (field == nullptr || field->is_there) continue;
     const std::optional<Scalar> type = scalar_of(datatype);
-    if (field == nullptr || field->is_there) {
-      if (type) others_.push_back({name, {true, offset, *type, false}, values});
-      continue;
-    }
     if (!type) {
       in.fail("expected a datatype from 1 to 8 of field " + name + ", found " +
               std::to_string(datatype));

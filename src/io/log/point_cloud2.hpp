@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
@@ -43,14 +42,6 @@ class PointCloud2 {
   }
   PointColumns columns() const;
 
-  /// Fields that have no meaning here.
-  struct OtherField {
-    std::string name;
-    Field first;  ///< of its values
-    std::uint32_t count = 1;
-  };
-  const std::vector<OtherField>& others() const { return others_; }
-
   Field x, y, z, intensity, ring, time, label;
 
  private:
@@ -59,7 +50,6 @@ class PointCloud2 {
   void check_fields(const MessageReader& in) const;
   void check_size(const MessageReader& in, std::uint64_t bytes);
 
-  std::vector<OtherField> others_;
   std::uint32_t height_ = 0;
   std::uint32_t width_ = 0;
   std::uint64_t point_step_ = 0;  // bytes

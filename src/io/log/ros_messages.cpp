@@ -2,12 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <iterator>
-#include <limits>
-#include <optional>
 
-#include "../point_sink.hpp"
 #include "message_reader.hpp"
 #include "point_cloud2.hpp"
 
@@ -62,20 +58,6 @@ StampedPose read_transform(MessageReader& in) {
   return {header.time, header.frame, std::move(child), read_pose(in)};
 }
 
-/// The clock of times whose meaning nobody told: seconds, or nanoseconds if integer or huge.
-PointClock usual_clock(bool is_integer, const std::vector<double>& times) {
-  constexpr double kLongestOffset = 10.0;  // s
-  constexpr double kNanoseconds = 1e14;    // of an absolute time; as seconds it is in year 3170000
-  double least = 0.0;                      // of points with a return; others may have the time 0
-  for (const double time : times) {
-    if (std::isfinite(time) && time != 0.0 && (least == 0.0 || time < least)) least = time;
-  }
-  PointClock clock;
-  clock.unit = is_integer || least > kNanoseconds ? 1e-9 : 1.0;
-  clock.is_absolute = std::abs(least * clock.unit) > kLongestOffset;
-  return clock;
-}
-
 std::uint16_t ring_of(double value) {
   return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
 }
@@ -86,8 +68,7 @@ void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns)
   scan.time.resize(columns.time ? points : 0);
 }
 
-void read_point_cloud2(MessageReader& in, const PointClock* clock, RecordedScan& scan) {
-  const double stamp = read_header(in).time;
+void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
   const PointCloud2 cloud(in);
   resize(scan, cloud.size(), cloud.columns());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
@@ -101,9 +82,6 @@ void read_point_cloud2(MessageReader& in, const PointClock* clock, RecordedScan&
     if (cloud.ring.is_there) scan.ring[i] = ring_of(cloud.ring.value(point));
     if (cloud.time.is_there) scan.time[i] = cloud.time.value(point);
   }
-  const PointClock seconds =
-      clock != nullptr ? *clock : usual_clock(cloud.time.is_integer(), scan.time);
-  for (double& time : scan.time) time = seconds.after(stamp, time);
 }
 
 PointColumns livox_columns() {
@@ -124,56 +102,16 @@ std::uint32_t read_livox_size(MessageReader& in) {
   return in.length(kLeastPoint, "points");
 }
 
-void read_livox(MessageReader& in, const PointClock* clock, RecordedScan& scan) {
-  const double stamp = read_header(in).time;
-  PointClock seconds;
-  seconds.unit = 1e-9;
-  if (clock != nullptr) seconds = *clock;
+void read_livox(MessageReader& in, RecordedScan& scan) {
   const std::uint32_t points = read_livox_size(in);
   resize(scan, points, livox_columns());
   for (std::uint32_t i = 0; i < points; ++i) {
-    scan.time[i] = seconds.after(stamp, in.number<std::uint32_t>("an offset time"));
+    scan.time[i] = in.number<std::uint32_t>("an offset time");
     float* const xyzi = scan.xyzi.data() + 4 * std::size_t{i};
     for (int axis = 0; axis < 3; ++axis) xyzi[axis] = in.number<float>("a coordinate");
     xyzi[3] = static_cast<float>(in.number<std::uint8_t>("a reflectivity"));
     in.number<std::uint8_t>("a tag");
     scan.ring[i] = in.number<std::uint8_t>("a line");
-  }
-}
-
-/// The fields that have no meaning here.
-void read_others_of_point_cloud2(MessageReader& in, OtherValues& others) {
-  const PointCloud2 cloud(in);
-  PointSink sink(&others);
-  std::vector<std::optional<std::size_t>> places;
-  for (const PointCloud2::OtherField& field : cloud.others()) {
-    places.push_back(sink.claim_other(field.name, field.first.type, field.count));
-  }
-  sink.resize(cloud.size());
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    const auto& [name, first, count] = cloud.others()[k];
-    const std::size_t size = size_of(first.type);
-    for (std::size_t i = 0; places[k] && i < cloud.size(); ++i) {
-      char* const to = sink.other(i, *places[k]);
-      std::memcpy(to, cloud.point(i) + first.offset, size * count);
-      for (std::size_t value = 0; first.is_big_endian && value < count; ++value) {
-        std::reverse(to + value * size, to + (value + 1) * size);
-      }
-    }
-  }
-}
-
-void read_others_of_livox(MessageReader& in, OtherValues& others) {
-  const std::uint32_t points = read_livox_size(in);
-  PointSink sink(&others);
-  const std::size_t place = *sink.claim_other("tag", Scalar::kUint8);
-  sink.resize(points);
-  for (std::uint32_t i = 0; i < points; ++i) {
-    in.number<std::uint32_t>("an offset time");
-    for (int axis = 0; axis < 3; ++axis) in.number<float>("a coordinate");
-    in.number<std::uint8_t>("a reflectivity");
-    *sink.other(i, place) = static_cast<char>(in.number<std::uint8_t>("a tag"));
-    in.number<std::uint8_t>("a line");
   }
 }
 
@@ -211,18 +149,10 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
   return {header.time, header.frame, cloud.size(), cloud.columns()};
 }
 
-void read_cloud(const std::string& type, const SerialisedMessage& message, const PointClock* clock,
-                RecordedScan& scan) {
-  MessageReader in(message);
-  is_livox(type) ? read_livox(in, clock, scan) : read_point_cloud2(in, clock, scan);
-}
-
-OtherValues read_other_values(const std::string& type, const SerialisedMessage& message) {
+void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan) {
   MessageReader in(message);
   read_header(in);
-  OtherValues others;
-  is_livox(type) ? read_others_of_livox(in, others) : read_others_of_point_cloud2(in, others);
-  return others;
+  is_livox(type) ? read_livox(in, scan) : read_point_cloud2(in, scan);
 }
 
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "../point_clock.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
@@ -58,17 +57,10 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
 ///   x y z      float32 or float64
 ///   intensity  also i, reflectivity: any type
 ///   ring       also channel, line: any type
-///   time       also t, timestamp, time_stamp, offset_time: by `clock`. `scan.time` is relative to
-///              the stamp, s.
+///   time       also t, timestamp, time_stamp, offset_time: any type
 ///
-/// Without a clock (null), times are seconds if floating-point, and nanoseconds if integer or above
-/// 1e14; if they are more than 10 s, they are absolute. Throws IoError that begins with the place
-/// of the message.
-void read_cloud(const std::string& type, const SerialisedMessage& message, const PointClock* clock,
-                RecordedScan& scan);
-
-/// The fields of a cloud that read_cloud() ignores. Throws IoError likewise.
-OtherValues read_other_values(const std::string& type, const SerialisedMessage& message);
+/// Throws IoError that begins with the place of the message.
+void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan);
 
 /// The field `label` (also class) of a PointCloud2.
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
