@@ -64,9 +64,7 @@ class RevisedVerdicts {
   PointBuffer points_;
 };
 
-/// Verdicts of all variants, per scan of the window and point: bit v is set if variant v keeps the
-/// point.
-using VariantVerdicts = std::vector<std::vector<std::uint8_t>>;
+}  // namespace
 
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done) {
@@ -130,8 +128,6 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   }
   return in_map;
 }
-
-}  // namespace
 
 evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
                                          const std::vector<Variant>& variants, Answer answer,

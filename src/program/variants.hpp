@@ -1,6 +1,7 @@
 // Several configurations of the remover over the same scans, in one process.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -21,10 +22,17 @@ struct Variant {
 /// Which answer of the remover is judged.
 enum class Answer { kFinal, kNewest };
 
-/// Runs every variant over the window, in one pass or two, and evaluates them: the rows are
-/// identity, oracle, then the variants. `done(scans)` is called after each scan of the first pass.
-/// Memory: 1 byte per point, 7 of a second pass. Throws ConfigError for more than
-/// evaluation::kMaxEstimates variants.
+/// Verdicts of all variants, per scan of the window and point: bit v is set if variant v keeps the
+/// point.
+using VariantVerdicts = std::vector<std::vector<std::uint8_t>>;
+
+/// Runs every variant over the window, in one pass or two. `done(scans)` is called after each scan
+/// of the first pass. Memory: 1 byte per point, 7 of a second pass. Throws ConfigError for more
+/// than evaluation::kMaxEstimates variants.
+VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
+                             Answer answer, const std::function<void(std::size_t)>& done);
+
+/// Both: the rows are identity, oracle, then the variants.
 evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
                                          const std::vector<Variant>& variants, Answer answer,
                                          const evaluation::EvaluationConfig& config,

@@ -325,13 +325,13 @@ TEST_CASE("Variants label every point once, each with its own configuration") {
   const VariantVerdicts both =
       run_variants(sequence, variants, Answer::kFinal, [&](std::size_t) { ++calls; });
   CHECK(calls == scans.size());
-  REQUIRE(both.in_map.size() == scans.size());
+  REQUIRE(both.size() == scans.size());
   for (std::size_t v = 0; v < variants.size(); ++v) {
     const VariantVerdicts alone = run_variants(sequence, {variants[v]}, Answer::kFinal, nullptr);
     for (std::size_t i = 0; i < scans.size(); ++i) {
-      REQUIRE(both.in_map[i].size() == scans[i].truth.size());
-      for (std::size_t p = 0; p < both.in_map[i].size(); ++p) {
-        REQUIRE((both.in_map[i][p] >> v & 1U) == alone.in_map[i][p]);
+      REQUIRE(both[i].size() == scans[i].truth.size());
+      for (std::size_t p = 0; p < both[i].size(); ++p) {
+        REQUIRE((both[i][p] >> v & 1U) == alone[i][p]);
       }
     }
   }
@@ -343,11 +343,11 @@ TEST_CASE("Variants label every point once, each with its own configuration") {
     const evaluation::LabelledScan scan = scans[i].view();
     const FrameResult frame = remover.push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
                                            scan.T_world_sensor, scan.time);
-    REQUIRE(newest.in_map[i].size() == scan.size());
+    REQUIRE(newest[i].size() == scan.size());
     for (std::size_t p = 0; p < scan.size(); ++p) {
-      REQUIRE((newest.in_map[i][p] != 0) == is_static(frame.newest.labels[p]));
+      REQUIRE((newest[i][p] != 0) == is_static(frame.newest.labels[p]));
     }
-    differs = differs || newest.in_map[i] != both.in_map[i];
+    differs = differs || newest[i] != both[i];
   }
   CHECK(differs);
 
