@@ -1,20 +1,54 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "command.hpp"
 #include "recording_options.hpp"
+#include "run/output_folder.hpp"
+#include "run/pose_returns.hpp"
 #include "run/recording_check.hpp"
 
 namespace dynains::program {
 namespace {
 
-void check(const RecordingFlags& flags) {
-  const RecordingCheck check = check_recording(Recording(flags.folder(), flags.options()));
+struct CheckFlags {
+  explicit CheckFlags(CLI::App& command) : recording(command, "recording") {
+    command.add_option(
+        "--closures", closures,
+        "writes where the trajectory comes back to a place, as edges of a pose graph "
+        "(g2o);\nreads all scans");
+    command.add_flag("--force", force, "replaces the file of --closures");
+  }
+
+  RecordingFlags recording;
+  std::string closures;
+  bool force = false;
+};
+
+void find_closures(const Recording& recording, const CheckFlags& flags) {
+  InputFiles inputs;
+  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
+  OutputFile file(flags.closures, flags.force, inputs);
+  const std::vector<ReturnToPlace> returns = find_returns(recording, file.path().parent_path());
+  write_closures(file.path(), returns);
+  file.put_in_place();
+  for (const ReturnError& error : return_errors(recording, 0, returns)) {
+    std::cout << sentence(error, recording) << '\n';
+  }
+}
+
+void check(const CheckFlags& given) {
+  const RecordingFlags& flags = given.recording;
+  const Recording recording(flags.folder(), flags.options());
+  const RecordingCheck check = check_recording(recording);
   std::cout << check.findings << check.advice << std::flush;
   if (!check.flags.empty()) {
     std::cout << "    dynains run " << flags.as_given(check.flags) << " --out OUT\n";
   }
   std::cout << check.remark << std::flush;
+  if (!given.closures.empty()) find_closures(recording, given);
   if (!check.passed) throw Finding{};
 }
 
@@ -23,7 +57,7 @@ void check(const RecordingFlags& flags) {
 void add_check_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand(
       "check", "Tell in seconds whether a recording will work, and which option it needs");
-  const auto flags = std::make_shared<RecordingFlags>(command, "recording");
+  const auto flags = std::make_shared<CheckFlags>(command);
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
       "points, "

@@ -11,7 +11,9 @@ namespace {
 constexpr double kKeyWay = 2.0;         // m, between two key scans
 constexpr double kLookReach = 60.0;     // m, between two sensors: that of looks at places
 constexpr double kNearby = 8.0;         // m, between two sensors that see the same surfaces
+constexpr double kLeastInliers = 0.6;   // share of points
 constexpr double kMostMovement = 0.05;  // m, of points 10 m away, of scans that fit
+constexpr double kMapDeviation = 0.03;  // m, of the earlier poses around, at 10 m
 constexpr float kFarthest = 60.0F;      // m, of points that count
 constexpr float kStoredStep = 0.002F;   // m, of stored coordinates
 constexpr std::size_t kMostPoints = 12000;
@@ -21,14 +23,13 @@ using Steps = std::array<std::int16_t, 3>;
 
 }  // namespace
 
-bool ReturnToPlace::fits() const {
-  constexpr double kMostDeviation = 0.1;  // m
-  return !is_wrong() && deviation <= kMostDeviation;
-}
+bool ReturnToPlace::fits() const { return is_known() && movement <= kMostMovement; }
 
-bool ReturnToPlace::is_wrong() const {
-  constexpr double kLeastInliers = 0.6;
-  return inliers < kLeastInliers || movement > kMostMovement;
+bool ReturnToPlace::is_wrong() const { return inliers < kLeastInliers || movement > kMostMovement; }
+
+bool ReturnToPlace::is_known() const {
+  constexpr double kMostDeviation = 0.1;  // m
+  return inliers >= kLeastInliers && deviation <= kMostDeviation;
 }
 
 // Puts the points that stand into kept_, and into the store.
@@ -51,43 +52,81 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
   kept_.count = kept_.points.size();
 }
 
-void Returns::add_planes(const KeyScan& key, const Pose& T_origin_world) {
-  store_.read(key.offset, key.size, bytes_);
-  const Pose T = T_origin_world * key.T_world_sensor;
-  planes_.begin_scan(T);
-  detail::VoxelPlanes::Block block;
-  for (std::size_t i = 0; i + sizeof(Steps) <= bytes_.size(); i += sizeof(Steps)) {
-    Steps at;
-    std::memcpy(at.data(), bytes_.data() + i, sizeof(at));
-    const auto metres = [&](std::size_t axis) {
-      return static_cast<double>(kStoredStep * static_cast<float>(at[axis]));
-    };
-    block.push_back(T, metres(0), metres(1), metres(2));
-    if (block.is_full()) planes_.add(block);
+// Finds the planes of the scans in near_.
+void Returns::find_planes(detail::VoxelPlanes& planes) {
+  planes.clear();
+  const Pose T_origin_world = near_.front()->T_world_sensor.inverse();
+  for (const KeyScan* const key : near_) {
+    store_.read(key->offset, key->size, bytes_);
+    const Pose T = T_origin_world * key->T_world_sensor;
+    planes.begin_scan(T);
+    detail::VoxelPlanes::Block block;
+    for (std::size_t i = 0; i + sizeof(Steps) <= bytes_.size(); i += sizeof(Steps)) {
+      Steps at;
+      std::memcpy(at.data(), bytes_.data() + i, sizeof(at));
+      const auto metres = [&](std::size_t axis) {
+        return static_cast<double>(kStoredStep * static_cast<float>(at[axis]));
+      };
+      block.push_back(T, metres(0), metres(1), metres(2));
+      if (block.is_full()) planes.add(block);
+    }
+    planes.add(block);
   }
-  planes_.add(block);
 }
 
-// Aligns the newest key scan with those in near_.
+// Aligns the newest key scan with those in near_. Poses may be off by more than an alignment with
+// small planes finds.
 ReturnToPlace Returns::aligned(const Pose& T_world_sensor) {
-  planes_.clear();
-  const Pose T_origin_world = near_.front()->T_world_sensor.inverse();
-  for (const KeyScan* const key : near_) add_planes(*key, T_origin_world);
-  detail::AlignmentPoints selected(0.0, 0.0);
-  selected.select(kept_, {});
-  detail::PlaneAligner aligner;
+  const Pose T_given = near_.front()->T_world_sensor.inverse() * T_world_sensor;
+  find_planes(planes_);
+  selected_.select(kept_, {});
+  const ReturnToPlace result = aligned_from(T_given, T_given);
+  if (!result.is_wrong()) return result;
+  find_planes(coarse_planes_);
+  const detail::Alignment coarse =
+      detail::PlaneAligner().align(selected_, coarse_planes_, T_given, false);
+  const ReturnToPlace other = aligned_from(detail::moved(T_given, coarse.found), T_given);
+  return other.inliers > result.inliers ? other : result;
+}
+
+ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given) {
   const detail::Alignment alignment =
-      aligner.align(selected, planes_, T_origin_world * T_world_sensor, false);
+      detail::PlaneAligner().align(selected_, planes_, T_guess, false);
   ReturnToPlace result = {near_.front()->scan, scans_ - 1};
-  result.distance = (T_origin_world * T_world_sensor).translation().norm();
+  result.T_earlier_later = detail::moved(T_guess, alignment.found);
+  result.distance = T_given.translation().norm();
   if (alignment.matched == 0) return result;
   result.inliers = static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched);
-  result.movement = detail::movement(alignment.found);
+  const Pose T_error = result.T_earlier_later * T_given.inverse();
+  const double angle = Eigen::AngleAxisd(T_error.linear()).angle();
+  result.movement =
+      std::hypot((result.T_earlier_later.translation() - T_given.translation()).norm(),
+                 detail::kLever * angle);
   result.deviation = 0.0;
   for (std::size_t i = 0; i < 6; ++i) {
     const double lever = i < 3 ? 1.0 : detail::kLever;
     result.deviation =
         std::max(result.deviation, lever * std::sqrt(std::max(0.0, alignment.covariance[i][i])));
+  }
+  detail::PoseCovariance map = alignment.covariance;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double deviation = i < 3 ? kMapDeviation : kMapDeviation / detail::kLever;
+    map[i][i] += deviation * deviation;
+  }
+  // From the axes of the map to those of the sensor.
+  const Eigen::Matrix3d R = result.T_earlier_later.linear();
+  const auto turned = [&](std::size_t row, std::size_t column) {
+    Eigen::Matrix3d block;
+    for (std::size_t i = 0; i < 9; ++i) {
+      block(i / 3, i % 3) = map[row + i / 3][column + i % 3];
+    }
+    block = R.transpose() * block * R;
+    for (std::size_t i = 0; i < 9; ++i) {
+      result.covariance[row + i / 3][column + i % 3] = block(i / 3, i % 3);
+    }
+  };
+  for (const std::size_t row : {0, 3}) {
+    for (const std::size_t column : {0, 3}) turned(row, column);
   }
   return result;
 }
@@ -139,10 +178,12 @@ std::uint32_t Returns::add(PointsView points, Span<const PointLabel> verdicts,
   const bool begins = keys_.empty() || pose.begins_epoch;
   if (!is_key(pose.T_world_sensor.translation(), begins)) return visit_;
   keep(points, verdicts);
+  KeyScan key = {scans_ - 1, 0, pose.T_world_sensor, store_.append(bytes_), bytes_.size()};
   if (begins) visit_ = visits_;
   choose_visit(pose.T_world_sensor);
   visits_ = std::max(visits_, visit_ + 1);
-  keys_.push_back({scans_ - 1, visit_, pose.T_world_sensor, store_.append(bytes_), bytes_.size()});
+  key.visit = visit_;
+  keys_.push_back(key);
   return visit_;
 }
 

@@ -14,18 +14,10 @@ void check_sizes(PointsView points, std::size_t labels, std::size_t causes, std:
                    " instances on " + std::to_string(points.size()) + " points");
 }
 
-// Scans that the first pass compares with each other.
-std::uint32_t compared_scans(const SecondPassConfig& config) {
-  const int others = config.evidence.lookback_scans + config.evidence.lookahead_scans;
-  return static_cast<std::uint32_t>(others) + 1;
-}
-
 }  // namespace
 
 SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
-    : config_((config.validate(), config)),
-      store_(store),
-      returns_(store, compared_scans(config)) {}
+    : config_((config.validate(), config)), store_(store), returns_(store, config.evidence) {}
 
 void SecondPass::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
   if (verdict.scan != scans_.size() || is_decided_) {
@@ -44,7 +36,7 @@ void SecondPass::add(PointsView points, const ScanVerdict& verdict, const Compar
 
 void SecondPass::test(const std::function<bool()>& keep_going) {
   for (std::unique_ptr<Visit>& visit : visits_) {
-    if (visit->length() <= compared_scans(config_)) {
+    if (visit->length() <= returns_.compared()) {
       visit.reset();
     } else if (!visit->test(keep_going)) {
       return;

@@ -261,20 +261,25 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   const RunOutputs outputs = partial_outputs(plan, out, outside);
   RunResults results(plan.sequence, plan.range, outputs);
   if (session) results.contribute_to(*session);
-  std::optional<ScratchFile> store;
+  ScratchFile store(outputs.folder);
+  Returns returns(store, plan.config.evidence);
   std::optional<SecondPass> second_pass;
   if (plan.passes > 1) {
     SecondPassConfig config;
     config.static_policy = plan.static_policy;
     config.evidence = plan.config.evidence;
     config.threads = outputs.thread == std::launch::async ? 2 : 1;
-    results.wait_for(second_pass.emplace(store.emplace(outputs.folder), config));
+    results.wait_for(second_pass.emplace(store, config));
+  } else {
+    results.watch(returns);
   }
   const RunTiming timing = process(plan, listener, results);
   RunOutcome outcome = outcome_of(plan, results, timing);
   outcome.alignment = alignment;
   check_not_empty(plan, results);
-  const RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
+  RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
+  doubts.returns = return_errors(plan.sequence, plan.range.first,
+                                 second_pass ? second_pass->returns() : returns.found());
   for (const std::string& text : sentences(doubts, plan.sequence)) warn(listener, text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);

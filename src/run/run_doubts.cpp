@@ -103,6 +103,10 @@ std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& rec
     result.push_back(text_of(doubts.jumps, recording));
   }
   for (const SuspiciousScans& part : doubts.parts) result.push_back(text_of(part, recording));
+  for (const ReturnError& error : doubts.returns) {
+    result.push_back(sentence(error, recording) +
+                     ": what moved is not compared there; see: dynains check --closures");
+  }
   return result;
 }
 
@@ -124,7 +128,15 @@ nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recordi
                      {"misfits", part.worst.misfits},
                      {"residual_metres", part.worst.residual}});
   }
-  return {{"jumps", jumps}, {"suspicious", parts}};
+  nlohmann::ordered_json returns = nlohmann::ordered_json::array();
+  for (const ReturnError& error : doubts.returns) {
+    returns.push_back(
+        {{"earlier", {recording.name(error.first_earlier), recording.name(error.last_earlier)}},
+         {"later", {recording.name(error.first_later), recording.name(error.last_later)}},
+         {"metres", error.metres},
+         {"degrees", error.degrees}});
+  }
+  return {{"jumps", jumps}, {"suspicious", parts}, {"returns", returns}};
 }
 
 }  // namespace dynains::program

@@ -8,6 +8,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/plausibility.hpp"
+#include "pose_returns.hpp"
 #include "run_timing.hpp"
 #include "scan_range.hpp"
 
@@ -32,6 +33,7 @@ struct PoseJump {
 struct RunDoubts {
   std::vector<PoseJump> jumps;
   std::vector<SuspiciousScans> parts;  ///< at most one for each kind: the first one
+  std::vector<ReturnError> returns;
 };
 
 /// `timing`: of the scans of `range` that were pushed. Throws IoError.
@@ -40,7 +42,7 @@ RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const 
 /// One sentence for each doubt.
 std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording);
 
-/// "jumps" and "suspicious" of a report.
+/// "jumps", "suspicious" and "returns" of a report.
 nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording);
 
 }  // namespace dynains::program

@@ -130,7 +130,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 
 void RunResults::take_newest(const FrameResult& frame) {
   const NewestVerdict& verdict = frame.newest;
-  if (second_pass_ != nullptr) compared_.add(frame);
+  compared_.add(frame);
   if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
@@ -150,7 +150,7 @@ void JudgedScan::refer_to_arrays() {
 void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(verdict, needs_beliefs_);
-  if (second_pass_ != nullptr) judged_.compared = compared_[verdict.scan];
+  judged_.compared = compared_[verdict.scan];
   if (scan != nullptr) std::swap(judged_.scan, *scan);
   writing_.begin([this, reads = scan == nullptr] {
     if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
@@ -164,10 +164,11 @@ void RunResults::finish() { writing_.wait(); }
 void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdict) {
   final_labels_.take(verdict);
   final_labels_.write(recording_.name(range_.first + verdict.scan));
+  copy_points(scan, judged_.points);
   if (second_pass_ != nullptr) {
-    copy_points(scan, judged_.points);
     second_pass_->add(judged_.points, verdict, judged_.compared);
   } else {
+    if (returns_ != nullptr) returns_->add(judged_.points, verdict.labels, judged_.compared);
     complete_scan(scan, verdict);
   }
 }

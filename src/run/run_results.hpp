@@ -29,8 +29,9 @@
 #include "session_contribution.hpp"
 
 namespace dynains {
+class Returns;
 class SecondPass;
-}
+}  // namespace dynains
 
 namespace dynains::program {
 
@@ -80,7 +81,7 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range);
 /// A scan and a copy of its final verdict.
 struct JudgedScan {
   RecordedScan scan;
-  PointBuffer points;  ///< of the scan, for a second pass
+  PointBuffer points;  ///< of the scan
   ComparedPose compared;
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
@@ -111,6 +112,8 @@ class RunResults {
   /// Final verdicts are first ones, which `pass` takes; revise() completes the results. It outlives
   /// this.
   void wait_for(SecondPass& pass) { second_pass_ = &pass; }
+  /// Final verdicts also go to `returns`, which outlives this.
+  void watch(Returns& returns) { returns_ = &returns; }
   SecondPass* second_pass() const { return second_pass_; }
   /// Adds the points with `keep` to the map; m, sensor frame.
   using AddToMap =
@@ -147,6 +150,7 @@ class RunResults {
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
   SecondPass* second_pass_ = nullptr;
+  Returns* returns_ = nullptr;
   ComparedPoses compared_;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;

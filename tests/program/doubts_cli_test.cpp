@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -109,6 +110,49 @@ TEST_CASE("run names the scan at which poses jump, and the size") {
   CHECK_THAT(outcome.err, ContainsSubstring("warning: " + warnings[0].get<std::string>()));
   CHECK(jumps[0]["metres"].get<double>() == Approx(3.0).margin(0.3));
   CHECK(jumps[0]["degrees"].get<double>() == Approx(2.0).margin(1.0));
+}
+
+TEST_CASE("run tells the error of a return to a place, and check writes it for a pose graph") {
+  constexpr int kScans = 75;  // of the way there
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, kScans, 4));
+  const auto drive_back = [&](double drift) {
+    std::vector<Pose> rows;
+    for (int i = 0; i < 2 * kScans; ++i) {
+      const auto scan = static_cast<std::size_t>(i < kScans ? i : 2 * kScans - 1 - i);
+      if (i >= kScans)
+        write_scan(drive.file_of(static_cast<std::size_t>(i)), drive.scan(scan).xyzi);
+      rows.push_back(drive.pose(scan));
+      rows.back().translation().y() += drift * static_cast<double>(i);
+    }
+    write_poses(drive.path() / "poses.txt", rows);
+  };
+  const std::string told = "the trajectory returns to scan";
+  const auto check_edges = [&](bool is_told) {
+    const std::string file = drive.out() + ".g2o";
+    const Outcome outcome = start({"check", drive.path(), "--closures", file, "--force"});
+    CHECK((outcome.out.find(told) != std::string::npos) == is_told);
+    std::istringstream edge(read_text(file));
+    std::string tag;
+    std::size_t from = 0, to = 0;
+    Eigen::Vector3d place(0.0, 0.0, 0.0);
+    edge >> tag >> from >> to >> place.x() >> place.y() >> place.z();
+    CHECK(tag == "EDGE_SE3:QUAT");
+    REQUIRE((from < to && to < 2 * kScans));
+    const Pose T_from_to = drive.pose(from).inverse() * drive.pose(2 * kScans - 1 - to);
+    CHECK((place - T_from_to.translation()).norm() < 0.15);
+  };
+  drive_back(0.0);
+  check_edges(false);
+  CHECK_THAT(drive.run().err, !ContainsSubstring(told));
+
+  drive_back(0.006);  // m
+  check_edges(true);
+  for (const char* const passes : {"1", "2"}) {
+    CHECK_THAT(drive.run({"--passes", passes}).err, ContainsSubstring(told));
+    const nlohmann::json returns = drive.report()["doubts"]["returns"];
+    REQUIRE(returns.size() == 1);
+    CHECK(returns[0]["metres"].get<double>() == Approx(0.85).margin(0.1));
+  }
 }
 
 TEST_CASE("check and run tell coordinates that float32 put into stripes") {

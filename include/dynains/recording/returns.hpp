@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -20,10 +21,13 @@ namespace dynains {
 
 /// A scan near earlier ones of a visit, and what an alignment with their planes tells.
 struct ReturnToPlace {
-  std::uint32_t earlier, later;  ///< numbers of scans, the nearest earlier one
-  double distance = 0.0;         ///< m, between the two sensors
-  double inliers = 1.0;          ///< share of the points in voxels with a plane
-  double movement = 0.0;         ///< m, of points 10 m away to where they fit best
+  std::uint32_t earlier, later;             ///< numbers of scans, the nearest earlier one
+  Pose T_earlier_later = Pose::Identity();  ///< as the surfaces fit
+  /// Of T_earlier_later: translation (m) and rotation (rad) along the axes of the later sensor.
+  detail::PoseCovariance covariance = {};
+  double distance = 0.0;  ///< m, between the two sensors
+  double inliers = 1.0;   ///< share of the points in voxels with a plane
+  double movement = 0.0;  ///< m, of points 10 m away to where they fit best
   /// m, of that movement along its least certain direction; infinity: no surface is in both
   double deviation = std::numeric_limits<double>::infinity();
 
@@ -31,6 +35,8 @@ struct ReturnToPlace {
   bool fits() const;
   /// Whether they seem not to fit. If neither, the surfaces do not tell.
   bool is_wrong() const;
+  /// Whether T_earlier_later is certain.
+  bool is_known() const;
 };
 
 /// Divides a recording into visits. Key scans, one each 2 m of way, are aligned with those of each
@@ -39,14 +45,18 @@ struct ReturnToPlace {
 /// begins an epoch, seems not to fit its own visit, or is not known to fit it within 8 m.
 class Returns {
  public:
-  /// Points of the scans wait in `store`, which outlives this. `compared`: scans; younger ones were
-  /// compared before.
-  Returns(ByteStore& store, std::uint32_t compared) : store_(store), compared_(compared) {}
+  /// Points of the scans wait in `store`, which outlives this. `evidence`: of the first pass.
+  Returns(ByteStore& store, const FreeSpaceConfig& evidence)
+      : store_(store),
+        compared_(1 +
+                  static_cast<std::uint32_t>(evidence.lookback_scans + evidence.lookahead_scans)) {}
 
   /// Takes the next scan: points (m, sensor frame) with their verdicts. Returns its visit, numbered
   /// from 0; a new one has the next number. Throws what the store throws.
   std::uint32_t add(PointsView points, Span<const PointLabel> verdicts, const ComparedPose& pose);
 
+  /// Scans that the first pass compares with each other.
+  std::uint32_t compared() const { return compared_; }
   /// All alignments.
   const std::vector<ReturnToPlace>& found() const { return found_; }
 
@@ -62,8 +72,9 @@ class Returns {
   void keep(PointsView points, Span<const PointLabel> verdicts);
   void choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor);
   void choose_visit(const Pose& T_world_sensor);
-  void add_planes(const KeyScan& key, const Pose& T_origin_world);
+  void find_planes(detail::VoxelPlanes& planes);
   ReturnToPlace aligned(const Pose& T_world_sensor);
+  ReturnToPlace aligned_from(const Pose& T_guess, const Pose& T_given);
 
   ByteStore& store_;
   std::uint32_t compared_;
@@ -76,7 +87,9 @@ class Returns {
   std::vector<ReturnToPlace> found_;
   GroundSplit kept_;  // points of the newest key scan that stand
   std::vector<std::uint8_t> bytes_;
-  detail::VoxelPlanes planes_;  // in the frame of the nearest scan
+  detail::AlignmentPoints selected_{0.0, 0.0};  // of these
+  // In the frame of the nearest scan. An alignment starts within half an edge of the truth.
+  detail::VoxelPlanes planes_, coarse_planes_{4.0};
 };
 
 }  // namespace dynains

@@ -86,9 +86,9 @@ class PlaneAligner {
   /// keep the first estimate.
   Alignment align(const AlignmentPoints& selected, VoxelPlanes& planes, const Pose& T_guess,
                   bool is_exact) {
-    constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // m, by iteration
+    constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // edges, by iteration
     constexpr double kSmall = 0.01;                             // m, change by one iteration
-    constexpr double kScale = 0.06;                             // m
+    const double fine = 0.06 * planes.edge();                   // m
     constexpr int kMostIterations = 3;
     constexpr double kConverged = 0.002;  // m
     const PointsView points = selected.points();
@@ -102,17 +102,17 @@ class PlaneAligner {
     };
     for (const double scale : kCoarseScales) {
       find_planes(points, kCoarseStep, planes, T, found);
-      equations = sum_equations(scale, found, is_exact);
+      equations = sum_equations(scale * planes.edge(), found, is_exact);
       const Vector step = equations.solve();
       if (equations.change(pose_step(step)) <= kSmall) break;  // left to the fine steps
       advance(step);
     }
     for (int iteration = 0; iteration < kMostIterations; ++iteration) {
       find_planes(points, 1, planes, T, found);
-      equations = sum_equations(kScale, found, is_exact);
+      equations = sum_equations(fine, found, is_exact);
       if (advance(equations.solve()) <= kConverged) break;
     }
-    return result_of(selected, equations, found, is_exact, kScale);
+    return result_of(selected, equations, found, is_exact, fine);
   }
 
   /// How well the upright surfaces of a scan fit at a pose: number of points at a small distance

@@ -57,7 +57,11 @@ class VoxelPlanes {
 
   /// Maximum number of voxels.
   static constexpr std::size_t kMostVoxels = 24576;
-  static constexpr double kEdge = 1.0;  ///< edge of the voxels, m
+
+  /// `edge`: of the voxels, m.
+  explicit VoxelPlanes(double edge = 1.0) : edge_(edge), per_metre_(1.0 / edge) {}
+
+  double edge() const { return edge_; }
 
   void clear() {
     table_.clear();
@@ -124,7 +128,7 @@ class VoxelPlanes {
  private:
   // Fewer points lie on a plane by chance, for example in foliage.
   static constexpr double kFewestPoints = 12.0;
-  static constexpr double kMostThickness = 0.06;  // m, standard deviation along the normal
+  static constexpr double kMostThickness = 0.06;  // standard deviation along the normal / edge
   static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
   static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
 
@@ -141,8 +145,8 @@ class VoxelPlanes {
     std::uint32_t last_scan = 0;
   };
 
-  static double centre(VoxelKey key, int axis) {
-    return (static_cast<double>(voxel_index(key, axis)) + 0.5) * kEdge;
+  double centre(VoxelKey key, int axis) const {
+    return (static_cast<double>(voxel_index(key, axis)) + 0.5) * edge_;
   }
 
   // Computes the keys of the voxels of a block, and prefetches their entries in the table.
@@ -150,7 +154,7 @@ class VoxelPlanes {
     for (std::size_t i = 0; i < block.count; ++i) {
       std::int64_t index[3];
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        index[axis] = floor_to<std::int64_t>(block.points[i][axis] / kEdge);
+        index[axis] = floor_to<std::int64_t>(block.points[i][axis] * per_metre_);
       }
       keys[i] = voxel_key(index[0], index[1], index[2]);
       __builtin_prefetch(&table_.first_slot(voxel_hash(keys[i])));
@@ -211,7 +215,7 @@ class VoxelPlanes {
       }
     }
     plane.is_flat = flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
-                    thickness_squared <= kMostThickness * kMostThickness &&
+                    thickness_squared <= kMostThickness * kMostThickness * edge_ * edge_ &&
                     !is_trace_of_beam(plane, moments.sums);
     return plane;
   }
@@ -258,6 +262,7 @@ class VoxelPlanes {
 
   static constexpr std::uint32_t kLongest = 64;  // scans
 
+  double edge_, per_metre_;
   VoxelHashTable<> table_{4096};  // numbers of the voxels
   std::vector<VoxelKey> keys_;    // by voxel
   std::vector<Moments> moments_;  // by voxel
