@@ -43,6 +43,7 @@ struct CleanOptions {
   RecordingFlags sequence;
   std::string cleaned;
   double voxel = 0.2;  // m
+  CLI::Option* voxel_option = nullptr;
   bool force = false;
   bool quiet = false;
 };
@@ -75,6 +76,15 @@ void check_target(const fs::path& target, const Recording& recording, const Resu
     throw IoError(target.string() + ": lies in " + taken.string() +
                   ", which is read; choose another folder for --map");
   }
+}
+
+/// The edge of voxels that hold about one point of the map, m; at least `least`.
+double edge_by_spacing(const std::vector<Eigen::Vector3d>& map, double least) {
+  constexpr double kMost = 2.0;     // m
+  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
+  double edge = least;
+  while (edge < kMost && map.size() < 2 * MapVotes(map, kDouble * edge).voxel_count()) edge *= 1.2;
+  return edge;
 }
 
 /// Adds the points of all scans of the run with their labels. Throws Interrupted.
@@ -136,7 +146,8 @@ void clean(CleanOptions& options) {
   const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
 
   const InterruptGuard interrupt;
-  MapVotes votes(positions, options.voxel);
+  const bool is_given = options.voxel_option->count() > 0;
+  MapVotes votes(positions, is_given ? options.voxel : edge_by_spacing(positions, options.voxel));
   add_scans(recording, out, options.quiet, votes);
   const Verdicts verdicts = judge(votes, positions.size(), options.map);
   AtomicFile file(cleaned.path());
@@ -168,7 +179,8 @@ void add_clean_command(CLI::App& app) {
       ->type_name("FILE");
   SettingFlags{command}(Parameter{"voxel", options->voxel, closed(0.01, 10.0), "m",
                                   "edge of the voxels in which points of the scans decide about "
-                                  "those of the map"});
+                                  "those of the map; more by default if the map is coarser"});
+  options->voxel_option = command.get_option("--voxel");
   command.add_flag("--force", options->force, "replace the cleaned map if it exists");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(

@@ -34,6 +34,8 @@ class MapVotes {
     counts_.resize(table_.size());
   }
 
+  std::size_t voxel_count() const { return counts_.size(); }
+
   /// Adds a point of a scan, in the world frame.
   void add(const Eigen::Vector3d& point, bool is_moving) {
     const std::optional<VoxelKey> key = key_of(point);
