@@ -258,13 +258,30 @@ double coarse_step(const std::vector<Pose>& poses) {
   return coarsest;
 }
 
+/// PoseFlaws::period, by scans in the middle of the recording.
+std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
+  constexpr std::size_t kMost = 80, kPairs = 8;
+  const std::size_t last_period = std::min(kMost, recording.size() / 2);
+  const std::size_t first = (recording.size() - 2 * last_period) / 2;
+  Agreement neighbours;
+  for (std::size_t period = 1; period < last_period; ++period) {
+    const Pairs pairs = sample.pairs(first, first + last_period + period, period, kPairs);
+    const Agreement given = agreement_under(given_motion(recording), pairs);
+    const Agreement standing = agreement_under(no_motion, pairs);
+    const Agreement& best = is_clearly_better(standing, given) ? standing : given;
+    if (period == 1) neighbours = best;
+    if (best.share > 2.0 * neighbours.share && is_clearly_better(best, neighbours)) return period;
+  }
+  return 0;
+}
+
 PoseFlaws flaws_of(const Recording& recording) {
   std::vector<Pose> poses;
   for (std::size_t i = 0; i < recording.size(); ++i) poses.push_back(recording.T_world_sensor(i));
   const bool are_equal = std::all_of(poses.begin(), poses.end(), [&](const Pose& T) {
     return T.linear().isApprox(poses[0].linear(), 1e-9);
   });
-  return {are_equal, coarse_step(poses)};
+  return {are_equal, coarse_step(poses), 0};
 }
 
 /// Whether poses and scans do not move alike at a fourth of the pairs between which one of them
@@ -499,6 +516,7 @@ Diagnosis diagnose_as_opened(const Recording& recording) {
   } else {
     judge_by_landmarks(evidence, sampled.neighbours, d);
   }
+  if (d.verdict == PoseVerdict::kDisagree) d.flaws.period = period_of_views(recording, sample);
   return d;
 }
 

@@ -127,6 +127,11 @@ std::string text_on_proposal(const Recording& recording, const Diagnosis& d) {
 
 /// The reason of poses that are inexact or wrong, if they show it.
 std::string text_on_flaws(const PoseFlaws& flaws) {
+  if (flaws.period > 0) {
+    return " Scans " + std::to_string(flaws.period) +
+           " apart agree better than neighbours, as those of several sensors on one topic "
+           "(--frame-id takes one), or of parts of a turn (record whole turns).";
+  }
   if (flaws.has_equal_orientations) {
     return " All orientations of the poses are equal: they have positions alone, or are frozen.";
   }

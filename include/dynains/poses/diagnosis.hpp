@@ -30,6 +30,9 @@ enum class PoseVerdict {
 struct PoseFlaws {
   bool has_equal_orientations = false;  ///< all orientations are equal, though the way bends
   double step = 0.0;  ///< m, coordinates of the poses are multiples of it; 0: of nothing coarse
+  /// Scans so many apart agree clearly better than neighbours, as those of several sensors in turn,
+  /// or of parts of a turn; 0: none do.
+  std::size_t period = 0;
 };
 
 struct Diagnosis {
