@@ -13,6 +13,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/median.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "kitti_files.hpp"
@@ -135,6 +136,28 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
   }
   if (options.without_poses && columns_.time && !options.is_compensated) options_.deskew = true;
   if (options_.deskew) prepare_deskewing();
+  tell_lost_scans();
+}
+
+/// Warns of scans that are missing among scans at even intervals.
+void Recording::tell_lost_scans() {
+  constexpr double kEven = 0.2;  // of the usual interval
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < scans_.size(); ++i) {
+    if (scans_[i].match != scans_[i - 1].match + 1) continue;
+    steps.push_back(scans_[i].time - scans_[i - 1].time);
+  }
+  const double period = median(steps);
+  std::size_t even = 0;
+  double lost = 0.0, longest = 0.0;
+  for (const double step : steps) {
+    even += std::abs(step / period - 1.0) < kEven ? 1 : 0;
+    lost += std::max(0.0, std::round(step / period) - 1.0);
+    longest = std::max(longest, step);
+  }
+  if (!has_times_ || lost == 0.0 || 10 * even < 9 * steps.size()) return;
+  warnings_.push_back(text::to_text(lost) + " scans seem to be missing: the longest interval is " +
+                      text::to_text(std::round(longest / period)) + " times the usual one");
 }
 
 /// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
@@ -143,16 +166,7 @@ void Recording::open_log() {
     fail(options_.times, "expected no file of times: " + folder_.string() + " has stamps");
   }
   const bool has_file = !options_.poses.empty();
-  LogChoice choice;
-  choice.cloud_topic = options_.cloud_topic;
-  choice.pose_topic = options_.pose_topic;
-  choice.pose_frame = options_.pose_frame;
-  choice.with_poses = !has_file && !options_.without_poses;
-  choice.with_transforms = !options_.sensor_frame.empty();
-  choice.time_offset = options_.time_offset;
-  choice.has_extrinsic = !options_.convention.T_body_sensor.isApprox(Pose::Identity(), 0.0);
-  choice.accept_missing = options_.accept_missing;
-  auto log = std::make_unique<LogScans>(folder_, choice);
+  auto log = std::make_unique<LogScans>(folder_, options_, !has_file && !options_.without_poses);
   scan_folder_ = folder_;
   format_ = ScanFormat::kLog;
   frame_ = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;

@@ -167,6 +167,10 @@ Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
 
 Trajectory read_trajectory(const std::filesystem::path& path) {
   ByteReader reader(path);
+  if (path.extension() == ".pcd") {
+    reader.fail_here(std::string("is a cloud, such as transformations.pcd of LIO-SAM; ") +
+                     kExpectedColumns);
+  }
   Trajectory trajectory;
   Columns columns;
   for (std::string line; reader.read_line(line);) {

@@ -92,6 +92,9 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                     "longest time between two poses of a file for interpolation"});
   visitor(TextParameter{"cloud_topic", o.cloud_topic, kText, "NAME",
                         "topic of the clouds of a log [the only one]"});
+  visitor(TextParameter{"frame_id", o.cloud_frame, kText, "NAME",
+                        "frame of the clouds of a log that count, if several sensors share their "
+                        "topic [the only one]"});
   visitor(TextParameter{"nuscenes_scene", o.scene, kText, "NAME",
                         "scene of nuScenes, for example scene-0061 [the only one]"});
   visitor(TextParameter{"pose_topic", o.pose_topic, kText, "NAME",

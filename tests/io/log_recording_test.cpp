@@ -436,9 +436,38 @@ TEST_CASE("Contradictory poses and clouds are refused with their place") {
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   messages.back().data = small_cloud(1.3, "rear");
   write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  CHECK_THAT(log_error(log),
-             ContainsSubstring("/points at 1330000000 ns: expected a cloud of frame "
-                               "lidar, as before; found frame rear"));
+  CHECK_THAT(log_error(log), ContainsSubstring("expected clouds of one frame, or --frame-id for "
+                                               "those of one sensor; found frames lidar (3), rear "
+                                               "(1)"));
+  RecordingOptions options;
+  options.cloud_frame = "rear";
+  options.without_poses = true;
+  CHECK(Recording(log, options).size() == 1);
+  options.cloud_frame = "lidar";
+  CHECK(Recording(log, options).size() == 3);
+  options.cloud_frame = "front";
+  CHECK_THAT(log_error(log, options), ContainsSubstring("found frames lidar (3), rear (1)"));
+}
+
+TEST_CASE("Clouds that a log has lost are told, and uneven stamps are not") {
+  const TemporaryFolder folder;
+  const auto warnings_of = [&](const std::vector<double>& stamps) {
+    std::vector<WrittenMessage> messages;
+    for (const double time : stamps) {
+      messages.push_back({0, nanoseconds(time), small_cloud(time, "lidar")});
+      messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(time, 0))});
+    }
+    write_text(folder / "drive.mcap", mcap_file({kPoints, kOdometry}, messages, {}));
+    return Recording(folder / "drive.mcap").warnings();
+  };
+  std::vector<double> stamps;
+  for (int i = 0; i < 20; ++i) stamps.push_back(1.0 + 0.1 * (i < 12 ? i : i + 3));
+  CHECK(warnings_of(stamps) ==
+        std::vector<std::string>{"3 scans seem to be missing: the longest interval is 4 times "
+                                 "the usual one"});
+  stamps.resize(12);
+  CHECK(warnings_of(stamps).empty());
+  CHECK(warnings_of({1.0, 1.1, 1.25, 1.7, 1.75, 1.9, 2.4, 2.5, 2.7}).empty());
 }
 
 TEST_CASE("Clouds whose stamps do not increase are left out and counted") {

@@ -50,6 +50,7 @@ struct RecordingOptions {
   double time_offset = 0.0;           ///< s; a scan at time t has the pose at t + time_offset
   double pose_gap = kLongestPoseGap;  ///< s, longest interval between poses for interpolation
   std::string cloud_topic;            ///< for logs; empty: the only topic of clouds
+  std::string cloud_frame;            ///< for logs: of the clouds that count; empty: the only one
   std::string pose_topic;             ///< for logs; empty: the only topic of poses
   std::string pose_frame;  ///< for logs: fixed frame of transforms; empty: root of their tree
   std::string scene;       ///< for nuScenes: name of the scene; empty: the only one
@@ -253,6 +254,7 @@ class Recording {
   void open_log();
   void take_sensor_frame(const LogScans& log);
   void open_nuscenes(const std::filesystem::path& tables);
+  void tell_lost_scans();
   void list_scans();
   bool find_scan_folder();
   void check_names() const;

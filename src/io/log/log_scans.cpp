@@ -66,13 +66,14 @@ SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint6
   return {bytes.data(), bytes.size(), topic.encoding, std::move(place)};
 }
 
-LogScans::LogScans(const std::filesystem::path& path, const LogChoice& choice)
-    : log_(open_log(path, choice.accept_missing)), choice_(choice) {
+LogScans::LogScans(const std::filesystem::path& path, const RecordingOptions& options,
+                   bool with_poses)
+    : log_(open_log(path, options.accept_missing)), options_(options), with_poses_(with_poses) {
   choose_cloud_topic();
-  if (choice.with_poses) choose_pose_topic();
+  if (with_poses) choose_pose_topic();
   read_log();
   check_clouds();
-  if (choice.with_poses) place_scans();
+  if (with_poses) place_scans();
 }
 
 void LogScans::choose_cloud_topic() {
@@ -81,7 +82,7 @@ void LogScans::choose_cloud_topic() {
     const std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
     fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()) + end);
   }
-  const std::string& wanted = choice_.cloud_topic;
+  const std::string& wanted = options_.cloud_topic;
   if (wanted.empty() && clouds.size() > 1) {
     fail(log_->path(), "expected one topic with clouds, or --cloud-topic; found " + list(clouds));
   }
@@ -99,7 +100,7 @@ void LogScans::choose_pose_topic() {
   const Topics direct = filter(log_->topics(), [](const auto& type) {
     return is_pose_type(type) && !is_transform_type(type);
   });
-  const std::string& wanted = choice_.pose_topic;
+  const std::string& wanted = options_.pose_topic;
   if (poses.empty()) {
     fail(log_->path(), "expected a topic with poses, or a file of poses by --poses; found " +
                            list(log_->topics()) +
@@ -108,7 +109,7 @@ void LogScans::choose_pose_topic() {
   if (!wanted.empty() && !has(poses, wanted)) {
     fail(log_->path(), "expected poses on topic " + wanted + "; found " + list(poses));
   }
-  const bool by_frame = wanted.empty() && !choice_.pose_frame.empty();
+  const bool by_frame = wanted.empty() && !options_.pose_frame.empty();
   if (wanted.empty() && !by_frame && direct.size() > 1) {
     fail(log_->path(), "expected one topic with poses, or --pose-topic; found " + list(poses));
   }
@@ -128,8 +129,8 @@ void LogScans::read_log() {
     const LogTopic& topic = log_->topics()[message.topic];
     if (message.topic == cloud_topic_) take_cloud(message);
     const bool is_transform = is_readable(topic) && is_transform_type(topic.type);
-    const bool is_wanted = choice_.with_poses ? message.topic == pose_topic_ || is_transform
-                                              : choice_.with_transforms && is_transform;
+    const bool is_wanted = with_poses_ ? message.topic == pose_topic_ || is_transform
+                                       : !options_.sensor_frame.empty() && is_transform;
     if (is_wanted) take_poses(message);
   }
   transforms_.sort();
@@ -139,14 +140,12 @@ void LogScans::read_log() {
 void LogScans::take_cloud(const LogMessage& message) {
   const SerialisedMessage serialised = load(message);
   const CloudInfo cloud = inspect_cloud(log_->topics()[message.topic].type, serialised);
+  ++clouds_of_frames_[cloud.frame];
   if (clouds_.empty()) {
-    cloud_frame_ = cloud.frame;
+    cloud_frame_ = options_.cloud_frame.empty() ? cloud.frame : options_.cloud_frame;
     columns_ = cloud.columns;
   }
-  if (cloud.frame != cloud_frame_) {
-    throw IoError(serialised.place + ": expected a cloud of frame " + cloud_frame_ +
-                  ", as before; found frame " + cloud.frame);
-  }
+  if (cloud.frame != cloud_frame_) return;
   if (!times_.empty() && !(cloud.time > times_.back())) {
     ++disordered_;
     return;
@@ -173,7 +172,16 @@ void LogScans::take_poses(const LogMessage& message) {
 }
 
 void LogScans::check_clouds() {
-  if (clouds_.empty()) fail(log_->path(), "expected at least one cloud");
+  if (clouds_.empty() || (clouds_of_frames_.size() > 1 && options_.cloud_frame.empty())) {
+    std::vector<std::string> found;
+    for (const auto& [frame, count] : clouds_of_frames_) {
+      found.push_back(frame + " (" + std::to_string(count) + ")");
+    }
+    fail(log_->path(),
+         "expected clouds of one frame, or --frame-id for those of one sensor; found "
+         "frames " +
+             text::listed(found));
+  }
   if (disordered_ == 0) return;
   const std::string count = std::to_string(disordered_) + " of " +
                             std::to_string(disordered_ + size()) +
@@ -193,7 +201,7 @@ void LogScans::place_scans() {
                      " transforms contradict earlier ones of their frame, and are left out");
   }
   for (const double stamp : times_) {
-    const double time = stamp + choice_.time_offset;
+    const double time = stamp + options_.time_offset;
     const std::optional<Pose> T_world_sensor = pose_at(time);
     if (!T_world_sensor) continue;
     trajectory_.times.push_back(time);
@@ -212,8 +220,8 @@ void LogScans::fail_without_poses() const {
                      (found == 0 ? "none" : std::to_string(found)) + " for " +
                      std::to_string(size()) + " clouds, which are from " +
                      text::in_seconds(times_.front()) + " to " + text::in_seconds(times_.back());
-  if (choice_.time_offset != 0.0) {
-    text += " (by --time-offset " + text::in_seconds(choice_.time_offset) + " later)";
+  if (options_.time_offset != 0.0) {
+    text += " (by --time-offset " + text::in_seconds(options_.time_offset) + " later)";
   }
   if (!poses.empty()) {
     text += "; poses are from " + text::in_seconds(poses.front()) + " to " +
@@ -243,7 +251,7 @@ Trajectory LogScans::motion() const {
 
 /// The fixed frame of poses from transforms is that of the options, or the root of the tree.
 void LogScans::choose_frames() {
-  const bool is_led = !choice_.pose_frame.empty() || transforms_.is_moving(cloud_frame_) ||
+  const bool is_led = !options_.pose_frame.empty() || transforms_.is_moving(cloud_frame_) ||
                       transforms_.moving_frames().empty();
   if (!transforms_.has(cloud_frame_) || !is_led) {
     posed_frame_ = body_frame();
@@ -257,13 +265,13 @@ void LogScans::choose_frames() {
                            std::to_string(TransformTree::kDeepest) +
                            " levels, found a loop or more above frame " + posed_frame_);
   }
-  pose_frame_ = choice_.pose_frame.empty() ? *root : choice_.pose_frame;
+  pose_frame_ = options_.pose_frame.empty() ? *root : options_.pose_frame;
 }
 
 /// The frame of the robot whose pose in the world transforms give.
 std::string LogScans::body_frame() const {
   const std::vector<std::string> moving = transforms_.moving_frames();
-  if (!choice_.has_extrinsic) {
+  if (options_.convention.T_body_sensor.isApprox(Pose::Identity(), 0.0)) {
     const bool is_known = transforms_.has(cloud_frame_);
     const std::string body = moving.empty() ? std::string("that frame") : moving.front();
     fail(
@@ -302,7 +310,7 @@ void LogScans::describe_extrinsic() {
 /// T_world_sensor at `time`, s.
 std::optional<Pose> LogScans::pose_at(double time) const {
   if (!pose_topic_) return transforms_.find(pose_frame_, posed_frame_, time);
-  const std::optional<TrajectoryMatch> match = match_time(poses_, time);
+  const std::optional<TrajectoryMatch> match = match_time(poses_, time, options_.pose_gap);
   if (!match) return std::nullopt;
   const Pose T_world_child =
       interpolate(poses_.poses[match->before], poses_.poses[match->after], match->share);

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
@@ -14,19 +16,6 @@
 #include "transform_tree.hpp"
 
 namespace dynains {
-
-/// Topics and frame that the user asked for; empty: found in the log.
-struct LogChoice {
-  std::string cloud_topic;
-  std::string pose_topic;
-  std::string pose_frame;        ///< the fixed frame, if poses come from transforms
-  bool with_poses = true;        ///< false: the log's poses are not used
-  bool with_transforms = false;  ///< transforms are read even if its poses are not used
-  double time_offset = 0.0;      ///< s; a cloud at time t has the pose at t + time_offset
-  /// Whether the user gives the pose of the sensor in the body, which transforms then may lack.
-  bool has_extrinsic = false;
-  bool accept_missing = false;  ///< whether parts of the log may be missing
-};
 
 /// A message of a log, of which `bytes` were read. They lose their frame of zstd, if they have one;
 /// `spare` is memory for that. Throws IoError.
@@ -38,7 +27,8 @@ SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint6
 /// of a topic is not clear.
 class LogScans {
  public:
-  LogScans(const std::filesystem::path& path, const LogChoice& choice);
+  /// Without `with_poses`, poses of the log are not looked for.
+  LogScans(const std::filesystem::path& path, const RecordingOptions& options, bool with_poses);
 
   const LogFile& log() const { return *log_; }
   std::size_t size() const { return clouds_.size(); }
@@ -85,11 +75,13 @@ class LogScans {
   SerialisedMessage load(const LogMessage& message);
 
   std::unique_ptr<LogFile> log_;
-  LogChoice choice_;
+  RecordingOptions options_;
+  bool with_poses_;
   std::uint32_t cloud_topic_ = 0;
   std::optional<std::uint32_t> pose_topic_;  ///< without, poses come from transforms
   std::string cloud_frame_;
-  std::string pose_frame_;   ///< fixed frame of the poses
+  std::map<std::string, std::size_t> clouds_of_frames_;  ///< of the topic
+  std::string pose_frame_;                               ///< fixed frame of the poses
   std::string posed_frame_;  ///< whose poses come from transforms: the sensor, or a body
   std::string pose_child_;   ///< moving frame of the poses; empty: the sensor
   std::vector<LogMessage> clouds_;
