@@ -144,10 +144,10 @@ struct alignas(64) RecordingPlace {
   /// it.
   bool stands_since(std::uint32_t scan) const { return !first.removed_last && scan > last_free; }
   /// Whether the first pass removed points of something that stands: it kept most of them or all at
-  /// both ends, and at least twice as many looks hit the place as passed it in a row.
+  /// both ends, and some looks hit the place, and none passed it. Gaps pass in a queue that moves.
   bool stands() const {
     constexpr int kFewestHits = 2;
-    return first.any_removed() && first.are_kept() && hits >= kFewestHits && hits >= 2 * longest;
+    return first.any_removed() && first.are_kept() && hits >= kFewestHits && !was_passed();
   }
 };
 
