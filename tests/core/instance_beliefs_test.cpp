@@ -72,9 +72,7 @@ struct Scan {
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
-  bool removes(bool is_large = false) const {
-    return updater.removes_whole(samples, beliefs, 0, is_large);
-  }
+  bool removes(bool is_large = false) const { return updater.removes_whole(beliefs, 0, is_large); }
 
   InstanceBeliefUpdater updater;
   InstanceSamples samples;
@@ -242,101 +240,6 @@ TEST_CASE("an instance larger than one object is removed if half of its known sa
   CHECK_FALSE(too_little.removes(true));
 }
 
-// A parked car: four layers of supervoxels of four samples each, `per_layer` in each.
-Scan scan_of_layers(std::size_t per_layer) {
-  Scan scan(Instances{std::vector<std::uint32_t>(4 * per_layer, 4)});
-  for (std::size_t s = 0; s < scan.samples.place.size(); ++s) {
-    const auto layer = static_cast<std::int32_t>(s / per_layer) - 2;  // below the sensor, too
-    scan.samples.place[s] = voxel_key(static_cast<std::int32_t>(s % per_layer), 0, layer);
-  }
-  return scan;
-}
-
-// All supervoxels are hit. Then two references see some of them free and hit one other. All may be
-// hit again.
-void see_free_and_hit(Scan& scan, const std::vector<std::size_t>& free, bool again) {
-  std::vector<Scan::Seen> seen(scan.samples.supervoxel_count(), {0, 0});
-  scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
-  for (const std::size_t s : free) seen[s] = {4, 0};
-  std::find_if(seen.begin(), seen.end(), [](const Scan::Seen& s) { return s.free == 0; })->hit = 4;
-  scan.see(seen);
-  scan.see(seen);
-  if (again) scan.see(std::vector<Scan::Seen>(seen.size(), {0, 4}));
-}
-
-TEST_CASE("free windows remove nothing: where beams hit again, the lower half must have moved") {
-  // Five supervoxels a layer; numbers 0 to 9 are the lower half.
-  const std::vector<std::size_t> windows = {10, 12, 16, 19};  // 0.2 of all
-  Scan left = scan_of_layers(5);
-  see_free_and_hit(left, windows, false);
-  CHECK(left.removes());  // no later hit shows that the object still stands
-
-  Scan parked = scan_of_layers(5);
-  see_free_and_hit(parked, windows, true);
-  CHECK(parked.beliefs.counts[0].moved == 16);  // the windows themselves count as moved
-  CHECK(parked.belief(10).hit_again != 0);
-  CHECK(parked.belief(11).hit_again == 0);
-  CHECK_FALSE(parked.removes());
-
-  // One tenth of the lower half is not enough, two tenths are.
-  Scan little = scan_of_layers(5);
-  see_free_and_hit(little, {10, 12, 16, 9}, true);
-  CHECK_FALSE(little.removes());
-  Scan enough = scan_of_layers(5);
-  see_free_and_hit(enough, {10, 12, 0, 9}, true);
-  CHECK(enough.removes());
-
-  // An instance that lost half of its samples moved, in whichever half they are.
-  Scan nearly = scan_of_layers(5);
-  see_free_and_hit(nearly, {10, 11, 12, 13, 14, 15, 16, 17, 18}, true);
-  CHECK_FALSE(nearly.removes());
-  Scan half = scan_of_layers(5);
-  see_free_and_hit(half, {10, 11, 12, 13, 14, 15, 16, 17, 18, 19}, true);
-  CHECK(half.removes());
-}
-
-TEST_CASE("an instance with few known samples in its lower half is removed by the general rule") {
-  // Two supervoxels per layer: 16 samples in the lower half, some without results.
-  const Scan small = scan_of_layers(2);
-  std::vector<Scan::Seen> seen(8, {0, 4});
-  seen[0].hit = 0;
-  for (const bool is_known : {false, true}) {
-    Scan scan = small;
-    std::vector<Scan::Seen> hit = seen;
-    hit[1].hit = is_known ? 4 : 0;
-    scan.see(hit);
-    std::vector<Scan::Seen> free(8, {0, 0});
-    free[4] = free[5] = {4, 0};
-    scan.see(free);
-    scan.see(free);
-    scan.see(hit);
-    INFO((is_known ? 12 : 8) << " samples of the lower half are known");
-    CHECK(scan.belief(4).hit_again != 0);
-    CHECK(scan.removes() == !is_known);
-  }
-}
-
-TEST_CASE("with an odd number of layers the middle layer belongs to the lower half") {
-  Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
-  for (std::size_t s = 0; s < 10; ++s) {
-    scan.samples.place[s] = voxel_key(0, 0, static_cast<std::int32_t>(s / 2) - 3);
-  }
-  Scan above = scan;
-  see_free_and_hit(above, {6, 7}, true);
-  CHECK_FALSE(above.removes());
-  see_free_and_hit(scan, {4, 5}, true);
-  CHECK(scan.removes());
-}
-
-TEST_CASE("a hit before a place was seen free, or on the other side, is not a hit again") {
-  Scan scan = scan_of_layers(5);
-  see_free_and_hit(scan, {10, 12, 16, 19}, false);
-  scan.updater.begin_later_references(scan.samples, scan.beliefs);
-  scan.see(std::vector<Scan::Seen>(20, {0, 4}));
-  CHECK(scan.belief(10).hit_again == 0);
-  CHECK(scan.removes());
-}
-
 // Cause of the last supervoxel of a scan whose only instance is tracked.
 Cause last_cause(const Scan& scan, const FreeSpaceConfig& config,
                  const TrackedInstances::Instance& tracked) {
@@ -460,7 +363,6 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
       if (!stands) belief.peak = std::max(belief.peak, belief.level);
     } else if (lowers) {
       belief.contested = 1;
-      if (belief.level > 0.0F) belief.hit_again = 1;
       belief.level = std::max(0.0F, belief.level + decrement);
       if (belief.turns % 2 == 1 && belief.turns < 4) ++belief.turns;
     }
@@ -529,7 +431,6 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
       REQUIRE(scan.belief(s).peak == supervoxels[s].peak);
       REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
       REQUIRE(scan.belief(s).occupied == supervoxels[s].occupied);
-      REQUIRE(scan.belief(s).hit_again == supervoxels[s].hit_again);
       REQUIRE(scan.belief(s).turns == supervoxels[s].turns);
     }
     for (std::size_t i = 0; i < instances.size(); ++i) {

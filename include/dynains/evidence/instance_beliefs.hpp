@@ -26,7 +26,6 @@ struct InstanceBeliefs {
     float peak = 0.0F;   ///< maximum of `level` that hits cannot take back, over both sides of time
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
     std::uint8_t occupied = 0;   ///< 1 after a reference with hits on enough samples
-    std::uint8_t hit_again = 0;  ///< 1 after a reference with mostly hits while `level` > 0
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
 
     float highest() const { return std::max(peak, level); }
@@ -117,67 +116,22 @@ class InstanceBeliefUpdater {
            belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether an instance is dynamic as a whole: enough of its decided samples are free. If fewer
-  /// than half of them are free and some were hit afterwards, enough samples of its lower half must
-  /// be free, too, unless few of them are decided: beams pass through the windows of a parked car,
-  /// but not through its body. `is_large`: larger than one object; large_removal_ratio of its
-  /// samples must be free.
-  bool removes_whole(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
-                     std::size_t instance, bool is_large) const {
+  /// Whether an instance is dynamic as a whole: enough of its decided samples are free. `is_large`:
+  /// larger than one object; large_removal_ratio of its samples must be free.
+  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance, bool is_large) const {
     const Counts& counts = beliefs.counts[instance];
-    if (!is_enough(counts, is_large ? large_removal_ratio_ : removal_ratio_)) return false;
-    if (2 * counts.moved >= counts.decided || !was_hit_again(samples, beliefs, instance)) {
-      return true;
-    }
-    const Counts lower_half = counts_of_lower_half(samples, beliefs, instance);
-    return lower_half.decided < kLeastBody || is_enough(lower_half, removal_ratio_);
+    const float ratio = is_large ? large_removal_ratio_ : removal_ratio_;
+    return counts.moved > 0 &&
+           static_cast<float>(counts.moved) >= ratio * static_cast<float>(counts.decided);
   }
 
  private:
   static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
   static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
   static constexpr std::uint8_t kTurnsByChance = 4;   // hit, free, hit, free, hit
-  static constexpr std::uint32_t kLeastBody = 12;     // decided samples of the lower half
   static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
   // A supervoxel is occupied if at least two of its samples and one of kSamplesPerHit are hit.
   static constexpr std::uint32_t kSamplesPerHit = 4;
-
-  static bool is_enough(const Counts& counts, float ratio) {
-    return counts.moved > 0 &&
-           static_cast<float>(counts.moved) >= ratio * static_cast<float>(counts.decided);
-  }
-
-  // Whether any free supervoxel of an instance was hit after it had been free.
-  bool was_hit_again(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
-                     std::size_t instance) const {
-    const auto* const all = beliefs.supervoxels.data();
-    return std::any_of(
-        all + samples.supervoxel_begin[instance], all + samples.supervoxel_begin[instance + 1],
-        [&](const Belief& belief) { return belief.hit_again != 0 && is_free(belief); });
-  }
-
-  // Counts of the supervoxels in the lower half of the height of an instance.
-  Counts counts_of_lower_half(const InstanceSamples& samples, const InstanceBeliefs& beliefs,
-                              std::size_t instance) const {
-    const std::uint32_t begin = samples.supervoxel_begin[instance];
-    const std::uint32_t end = samples.supervoxel_begin[instance + 1];
-    std::int64_t lowest = voxel_index(samples.place[begin], 2);
-    std::int64_t highest = lowest;
-    for (std::uint32_t s = begin; s < end; ++s) {
-      lowest = std::min(lowest, voxel_index(samples.place[s], 2));
-      highest = std::max(highest, voxel_index(samples.place[s], 2));
-    }
-    Counts sum;
-    for (std::uint32_t s = begin; s < end; ++s) {
-      if (2 * voxel_index(samples.place[s], 2) > lowest + highest) continue;
-      const Counts counts =
-          counts_of(beliefs.supervoxels[s], samples.sample_begin[s + 1] - samples.sample_begin[s]);
-      sum.total += counts.total;
-      sum.moved += counts.moved;
-      sum.decided += counts.decided;
-    }
-    return sum;
-  }
 
   // Counts of one supervoxel with `samples` samples.
   Counts counts_of(const Belief& belief, std::uint32_t samples) const {
@@ -303,19 +257,13 @@ class InstanceBeliefUpdater {
     }
     if (visible.hit == 0 || free_ratio > FreeSpaceSum::kHitRatio) return false;
     const Belief before = belief;
-    lower(belief);
+    belief.contested = 1;
+    sum_.lower(belief.level);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
     const std::uint32_t least_hits = (samples + kSamplesPerHit - 1) / kSamplesPerHit;
     if (visible.hit >= std::max(std::min(2U, samples), least_hits)) belief.occupied = 1;
     return belief.contested != before.contested || belief.occupied != before.occupied ||
-           belief.hit_again != before.hit_again || belief.level != before.level ||
-           belief.turns != before.turns;
-  }
-
-  void lower(Belief& belief) const {
-    belief.contested = 1;
-    if (belief.level > 0.0F) belief.hit_again = 1;
-    sum_.lower(belief.level);
+           belief.level != before.level || belief.turns != before.turns;
   }
 
   float removal_ratio_;

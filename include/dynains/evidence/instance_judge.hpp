@@ -151,7 +151,7 @@ class InstanceJudge {
   bool removes_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                      std::size_t instance) const {
     const bool is_large = use_tracks_ && !evidence.tracked.shapes[instance].carried;
-    return updater.removes_whole(evidence.samples, evidence.beliefs, instance, is_large);
+    return updater.removes_whole(evidence.beliefs, instance, is_large);
   }
 
   // Writes static verdicts for supervoxels [first, last) and lists the free ones in `free_`.
