@@ -52,7 +52,8 @@ void add_session(const dynains::City& city, const char* name, double begin, bool
   dynains::SessionInfo session;
   session.name = name;
   session.begin = begin;
-  dynains::SessionWriter writer(city, session);
+  dynains::MemoryStore store;
+  dynains::SessionWriter writer(city, session, store);
   for (std::uint32_t number = 0; number < 8; ++number) {
     const double y = static_cast<double>(number) - 4.0;
     const Scan scan = measure(y, has_box);

@@ -2,67 +2,29 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "io/failure.hpp"
-#include "session_files.hpp"
-#include "session_folder.hpp"
-#include "session_json.hpp"
+#include "session_file.hpp"
 
 namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Names of the session folders of a city, sorted. A link is no session.
-std::vector<std::string> session_names(const fs::path& city) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (fs::directory_iterator entry(city, error), end; !error && entry != end;
-       entry.increment(error)) {
-    std::string name = entry->path().filename().string();
-    const bool is_folder = entry->is_directory() && !entry->is_symlink();
-    if (is_session_name(name) && is_folder) names.push_back(std::move(name));
-  }
-  if (error) fail_by_system(city, "cannot be read", error.value());
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-/// Links that have the place of a session.
-std::vector<fs::path> linked_sessions(const fs::path& city) {
-  std::vector<fs::path> links;
-  for (const auto& entry : fs::directory_iterator(city)) {
-    const bool is_link = entry.is_symlink() && entry.is_directory();
-    if (is_link && is_session_name(entry.path().filename().string())) links.push_back(entry.path());
-  }
-  std::sort(links.begin(), links.end());
-  return links;
-}
-
-/// Throws unless session.json tells the number of points of its tiles.
-void check_count(const fs::path& file, const SessionInfo& session) {
-  std::uint64_t points = 0;
-  for (const auto& tile : session.tiles) points += tile.second;
-  if (points == session.points) return;
-  fail(file, "/points: expected " + std::to_string(points) + ", the sum over /tiles");
-}
-
-/// Throws unless every point of a tile lies within the bounds that session.json tells.
-void check_bounds(const fs::path& file, const SessionGrid& grid, const SessionInfo& session,
-                  const TileIndex& tile, const std::vector<SessionPoint>& points) {
-  const Eigen::Vector3d corner = tile_corner(grid, tile);
-  for (const SessionPoint& point : points) {
-    const Eigen::Vector3d position =
-        corner + Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
-    const bool is_within = (position.array() >= session.lowest.array()).all() &&
-                           (position.array() <= session.highest.array()).all();
-    if (!is_within) fail(file, "expected points between lowest and highest of session.json");
-  }
+void refuse_earlier_version(const fs::path& folder) {
+  if (!fs::exists(folder / "city.json")) return;
+  fail(folder / "city.json",
+       "is of a map of an earlier version; expected a new folder, to which the runs are added "
+       "again");
 }
 
 std::string number_text(double value) {
@@ -82,7 +44,26 @@ void refuse_other_grid(const fs::path& city, const SessionGrid& its, const Sessi
   refuse("tile", its.tile, asked.tile);
 }
 
+bool is_within(const SessionGrid& grid, const SessionPoint& point) {
+  const auto most = static_cast<float>(grid.tile);
+  return point.x >= 0.0F && point.x <= most && point.y >= 0.0F && point.y <= most &&
+         std::abs(point.z) < 1e6F;
+}
+
 }  // namespace
+
+FolderLock lock_city(const fs::path& folder) {
+  using namespace std::chrono_literals;
+  const auto end = std::chrono::steady_clock::now() + 10min;
+  while (true) {
+    try {
+      return FolderLock(folder);
+    } catch (const UsageError&) {
+      if (std::chrono::steady_clock::now() > end) throw;
+    }
+    std::this_thread::sleep_for(20ms);
+  }
+}
 
 bool is_session_name(const std::string& name) {
   const auto is_allowed = [](unsigned char c) {
@@ -92,38 +73,52 @@ bool is_session_name(const std::string& name) {
          std::all_of(name.begin(), name.end(), is_allowed);
 }
 
-City::City(const fs::path& folder)
-    : folder_(folder), grid_(session_files::read_city(folder / session_files::kCityFile)) {}
+City::City(const fs::path& folder) : folder_(folder) {
+  const std::vector<SessionInfo> all = sessions();
+  if (all.empty()) fail(folder, "holds no session; expected a map of many sessions");
+  grid_ = all.front().grid;
+}
 
 City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   grid.validate();
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) fail_by_system(folder, "cannot be created", error.value());
-  const FolderLock lock = session_files::lock_city(folder);
-  const fs::path file = folder / session_files::kCityFile;
-  if (!fs::exists(file)) {
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      const std::string name = entry.path().filename().string();
-      if (target_of_temporary(name) == session_files::kCityFile) fs::remove(entry, error);
+  City city(folder, grid);
+  const std::vector<SessionInfo> sessions = city.sessions();
+  if (!sessions.empty()) refuse_other_grid(folder, sessions.front().grid, grid);
+  if (!sessions.empty()) return city;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (target_of_temporary(entry.path().filename().string()).empty()) {
+      fail(folder, "holds files but no session; expected a map of many sessions or nothing");
     }
-    if (!fs::is_empty(folder, error) || error) {
-      fail(folder, "holds files but no city.json; expected a map of many sessions or nothing");
-    }
-    AtomicFile city(file);
-    city.stream() << session_files::city_text(grid);
-    city.commit();
-    return City(folder, grid);
   }
-  City city(folder);
-  refuse_other_grid(folder, city.grid(), grid);
   return city;
 }
 
+// Of the sessions, sorted.
+std::vector<std::string> City::names() const {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const fs::path& path = entry->path();
+    const bool is_session = path.extension() == ".session" && is_session_name(path.stem().string());
+    if (is_session && fs::is_regular_file(entry->symlink_status())) {
+      names.push_back(path.stem().string());
+    }
+  }
+  if (error) fail_by_system(folder_, "cannot be read", error.value());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::vector<SessionInfo> City::sessions() const {
+  refuse_earlier_version(folder_);
   std::vector<SessionInfo> sessions;
-  for (const std::string& name : session_names(folder_)) {
-    sessions.push_back(session_files::read_session(folder_ / name / session_files::kSessionFile));
+  for (const std::string& name : names()) {
+    sessions.push_back(read_session(session_file(name)));
+    refuse_other_grid(session_file(name), sessions.back().grid, sessions.front().grid);
   }
   // The names are sorted already.
   std::stable_sort(sessions.begin(), sessions.end(),
@@ -134,37 +129,43 @@ std::vector<SessionInfo> City::sessions() const {
 std::vector<SessionPoint> City::read_tile(const SessionInfo& session, const TileIndex& tile) const {
   const auto found = session.tiles.find(tile);
   if (found == session.tiles.end()) return {};
-  const fs::path path =
-      session_folder(session.name) / session_files::kTileFolder / session_files::tile_name(tile);
-  std::vector<SessionPoint> points = session_files::read_tile(path, grid_, tile);
-  if (points.size() != found->second) {
-    fail_at_byte(path, 40,
-                 std::to_string(points.size()) + " points; session.json tells of " +
-                     std::to_string(found->second));
+  const fs::path path = session_file(session.name);
+  const std::string bytes = read_block(path, found->second);
+  std::vector<SessionPoint> points(bytes.size() / sizeof(SessionPoint));
+  if (!points.empty()) std::memcpy(points.data(), bytes.data(), points.size() * sizeof(points[0]));
+  if (!std::all_of(points.begin(), points.end(),
+                   [&](const SessionPoint& point) { return is_within(grid_, point); })) {
+    fail_at_byte(path, found->second.offset, "expected points within the tile");
   }
   return points;
 }
 
+void City::read_reference(const SessionInfo& session, const SessionReference& which,
+                          RecordingReference& reference) const {
+  const fs::path path = session_file(session.name);
+  const std::string bytes = read_block(path, which.block);
+  PoseRows rows{};
+  const bool has_pose = bytes.size() >= sizeof(rows);
+  if (has_pose) std::memcpy(rows.data(), bytes.data(), sizeof(rows));
+  reference.scan = which.scan;
+  reference.T_world_beams = pose_of(rows);
+  const auto* const image = reinterpret_cast<const std::uint8_t*>(bytes.data()) + sizeof(rows);
+  if (!has_pose ||
+      !unpack_image(session.image_grid, {image, bytes.size() - sizeof(rows)}, reference.image)) {
+    fail_at_byte(path, which.block.offset, "expected a pose and a coded range image");
+  }
+}
+
 void City::drop(const std::string& name) {
-  const FolderLock lock = session_files::lock_city(folder_);
-  const fs::path session = session_folder(name);
-  if (!is_session_name(name) || !fs::is_directory(fs::symlink_status(session))) {
+  const FolderLock lock = lock_city(folder_);
+  const std::vector<std::string> all = names();
+  if (!std::binary_search(all.begin(), all.end(), name)) {
     fail(folder_, "has no session \"" + name + '"');
   }
-  session_files::read_session(session / session_files::kSessionFile);
-  const fs::path foreign = session_files::foreign_entry(session);
-  if (!foreign.empty()) fail(foreign, "is not part of the session, which stays as it is");
-  // One rename takes the session out of the map. Its files are removed after that.
-  const fs::path aside = session_files::make_staging(folder_, name);
   std::error_code error;
-  fs::rename(session, aside, error);
-  if (error) {
-    const int code = error.value();
-    fs::remove(aside, error);
-    fail_by_system(session, "cannot be moved aside", code);
-  }
+  fs::remove(session_file(name), error);
+  if (error) fail_by_system(session_file(name), "cannot be removed", error.value());
   sync_files(folder_);
-  session_files::remove_session_files(aside);
 }
 
 std::vector<std::string> City::check() const {
@@ -176,40 +177,13 @@ std::vector<std::string> City::check() const {
       defects.emplace_back(error.what());
     }
   };
-  for (const fs::path& link : linked_sessions(folder_)) {
-    defects.push_back(link.string() + ": is a link, which is no session");
-  }
-  for (const std::string& name : session_names(folder_)) {
+  for (const std::string& name : names()) {
     note([&] {
-      const fs::path folder = session_folder(name);
-      const fs::path file = folder / session_files::kSessionFile;
-      const SessionInfo session =
-          session_files::read_session(file, session_files::Checksum::kRequired);
-      check_count(file, session);
-      const fs::path foreign = session_files::foreign_entry(folder);
-      if (!foreign.empty()) fail(foreign, "is not part of the session");
-      for (const auto& tile : session.tiles) {
-        note([&] {
-          const fs::path tiles = folder / session_files::kTileFolder;
-          check_bounds(tiles / session_files::tile_name(tile.first), grid_, session, tile.first,
-                       read_tile(session, tile.first));
-        });
-      }
-      for (const auto& entry : fs::directory_iterator(folder / session_files::kTileFolder)) {
-        const bool is_listed =
-            std::any_of(session.tiles.begin(), session.tiles.end(), [&](const auto& tile) {
-              return session_files::tile_name(tile.first) == entry.path().filename();
-            });
-        if (!is_listed)
-          defects.push_back(entry.path().string() + ": session.json does not list it");
-      }
-      const SessionReferenceReader references(*this, session);
-      if (references.entries().size() != session.references) {
-        fail(file, "/references: expected " + std::to_string(references.entries().size()));
-      }
+      const SessionInfo session = read_session(session_file(name));
+      for (const auto& tile : session.tiles) note([&] { read_tile(session, tile.first); });
       RecordingReference reference;
-      for (const auto& entry : references.entries()) {
-        note([&] { references.read(entry, reference); });
+      for (const SessionReference& which : session.references) {
+        note([&] { read_reference(session, which, reference); });
       }
     });
   }

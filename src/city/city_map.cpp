@@ -1,47 +1,120 @@
 #include "dynains/city/city_map.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "dynains/errors.hpp"
 
 namespace dynains {
 namespace {
 
-/// Points that may be changes, with their sessions.
-struct Candidates {
-  std::vector<ChangedPoint> points;
-  std::vector<std::uint32_t> sessions;
+/// Points that stand in one state of a tile and whose voxels are empty in the other one.
+class Candidates {
+ public:
+  Candidates(const SessionGrid& grid, const TileHistory& history)
+      : grid_(grid), history_(history) {}
 
-  void add(std::size_t session, const ChangedPoint& point) {
-    points.push_back(point);
-    sessions.push_back(static_cast<std::uint32_t>(session));
-  }
-  void keep(const std::vector<bool>& is_kept) {
-    std::size_t size = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!is_kept[i]) continue;
-      points[size] = points[i];
-      sessions[size++] = sessions[i];
+  void add(std::size_t session, std::size_t i) {
+    const VoxelKey key = block(session, i);
+    const std::uint32_t number = numbers_.insert(key);
+    if (number == keys_.size()) {
+      keys_.push_back(key);
+      points_.emplace_back();
     }
-    points.resize(size);
-    sessions.resize(size);
+    points_[number].push_back({session, i});
   }
-  std::vector<CityPoint> selected(const ChangeClusters& clusters) const {
-    const std::vector<bool> is_selected = clusters.select(points);
+  /// Adds a point that stands in both states.
+  void add_standing(std::size_t session, std::size_t i) { standing_.insert(block(session, i)); }
+
+  /// The points of clusters that are objects: larger than 0.5 m, seen standing by their own session
+  /// all the time, and not a part of something that stands in both states.
+  std::vector<CityPoint> objects() const {
     std::vector<CityPoint> result;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (is_selected[i]) result.push_back({sessions[i], points[i].point});
-    }
+    for_each_component(keys_, numbers_, [&](const std::vector<std::uint32_t>& members) {
+      if (!is_object(members)) return;
+      for (const std::uint32_t block : members) {
+        for (const auto& [session, i] : points_[block]) {
+          result.push_back({static_cast<std::uint32_t>(session), history_.points(session)[i]});
+        }
+      }
+    });
     return result;
   }
+
+ private:
+  VoxelKey block(std::size_t session, std::size_t i) const {
+    return block_of(session_voxel(grid_, history_.points(session)[i]));
+  }
+
+  bool is_object(const std::vector<std::uint32_t>& members) const {
+    constexpr float kLeastExtent = 0.5F;  // m
+    constexpr float kLeastHeight = 0.4F;  // m
+    constexpr std::size_t kLeastBlocks = 8;
+    constexpr float kLeastHits = 3.0F;    // references of the own session, mean of the points
+    constexpr float kMostPassed = 0.05F;  // ratio of the points
+    constexpr float kMostContact = 0.7F;  // ratio of the blocks beside what stands in both states
+    Eigen::AlignedBox3f box;
+    float points = 0.0F, hits = 0.0F, passed = 0.0F, contacts = 0.0F;
+    for (const std::uint32_t block : members) {
+      bool touches = false;
+      for_each_touching(keys_[block], [&](VoxelKey key) {
+        touches = touches || standing_.find(key) != VoxelHashTable<>::kNone;
+      });
+      contacts += touches ? 1.0F : 0.0F;
+      for (const auto& [session, i] : points_[block]) {
+        const SessionPoint& point = history_.points(session)[i];
+        box.extend(Eigen::Vector3f(point.x, point.y, point.z));
+        points += 1.0F;
+        hits += static_cast<float>(history_.own_hits(session, i));
+        passed += history_.own_beams_passed(session, i) ? 1.0F : 0.0F;
+      }
+    }
+    return members.size() >= kLeastBlocks && box.sizes().maxCoeff() > kLeastExtent &&
+           box.sizes().z() > kLeastHeight && hits >= kLeastHits * points &&
+           passed <= kMostPassed * points &&
+           contacts <= kMostContact * static_cast<float>(members.size());
+  }
+
+  const SessionGrid& grid_;
+  const TileHistory& history_;
+  VoxelHashTable<> numbers_, standing_;  // of blocks
+  std::vector<VoxelKey> keys_;
+  std::vector<std::vector<std::pair<std::size_t, std::size_t>>> points_;  // by block
 };
 
 }  // namespace
 
-CityMap::CityMap(const City& city) : city_(city), sessions_(city.sessions()) {
-  references_.reserve(sessions_.size());
-  for (const SessionInfo& session : sessions_) references_.emplace_back(city_, session);
+CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, std::uint32_t a,
+                         std::uint32_t b) {
+  VoxelHashTable<> before, after;
+  const auto voxel = [&](std::size_t session, std::size_t i) {
+    return session_voxel(grid, history.points(session)[i]);
+  };
+  const auto is_in = [](const VoxelHashTable<>& voxels, VoxelKey key) {
+    return voxels.find(key) != VoxelHashTable<>::kNone;
+  };
+  history.for_each_standing(
+      a, [&](std::size_t session, std::size_t i) { before.insert(voxel(session, i)); });
+  history.for_each_standing(
+      b, [&](std::size_t session, std::size_t i) { after.insert(voxel(session, i)); });
+  Candidates removed(grid, history), added(grid, history);
+  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
+    if (!history.is_above_ground(history.points(session)[i])) return;
+    if (!is_in(after, voxel(session, i))) removed.add(session, i);
+  });
+  history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
+    if (!history.is_above_ground(history.points(session)[i])) return;
+    if (is_in(before, voxel(session, i))) {
+      removed.add_standing(session, i);
+      added.add_standing(session, i);
+    } else if (history.was_free(session, i)) {
+      added.add(session, i);
+    }
+  });
+  return {removed.objects(), added.objects()};
 }
 
 std::uint32_t CityMap::number_of(const std::string& session) const {
@@ -68,88 +141,31 @@ TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
     history.add_session(city_.read_tile(sessions_[i], tile));
   }
   for (std::size_t i = 0; i < count; ++i) {
-    revise(history, tile, i);
+    revise(history, tile, sessions_[i]);
     history.end_session();
   }
   return history;
 }
 
-CityChanges CityMap::changes(const TileIndex& tile, const TileHistory& history, std::uint32_t a,
-                             std::uint32_t b) const {
+CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
   if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
-  const SessionGrid& grid = city_.grid();
-  ChangeClusters clusters(grid);
-  VoxelHashTable<> before, after;
-  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
-    before.insert(session_voxel(grid, history.points(session)[i]));
-  });
-  history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
-    after.insert(session_voxel(grid, history.points(session)[i]));
-  });
-  Candidates removed, added;
-  const auto sort = [&](std::size_t session, std::size_t i, const VoxelHashTable<>& other,
-                        Candidates& candidates) {
-    const SessionPoint& point = history.points(session)[i];
-    if (!history.is_above_ground(point)) return;
-    if (other.find(session_voxel(grid, point)) != VoxelHashTable<>::kNone) {
-      clusters.add_standing(point);
-    } else {
-      candidates.add(session,
-                     {point, history.own_hits(session, i), history.own_beams_passed(session, i)});
-    }
-  };
-  history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
-    if (!history.stands(session, i, b)) sort(session, i, after, removed);
-  });
-  history.for_each_standing(
-      b, [&](std::size_t session, std::size_t i) { sort(session, i, before, added); });
-  // A point was added if beams of a session before its own passed through its place. Places that
-  // none of them saw are no changes.
-  added.keep(free_before(tile, added.points, added.sessions));
-
-  CityChanges changes;
-  changes.removed = removed.selected(clusters);
-  changes.added = added.selected(clusters);
-  return changes;
+  return find_changes(city_.grid(), history(tile, b), a, b);
 }
 
-std::vector<bool> CityMap::free_before(const TileIndex& tile,
-                                       const std::vector<ChangedPoint>& points,
-                                       const std::vector<std::uint32_t>& sessions) const {
-  if (points.empty()) return {};
-  const std::uint32_t end = *std::max_element(sessions.begin(), sessions.end());
-  // The points are session 0 here, and session i of the map is session i + 1.
-  TileHistory reversed(city_.grid());
-  std::vector<SessionPoint> places;
-  places.reserve(points.size());
-  for (const ChangedPoint& changed : points) places.push_back(changed.point);
-  reversed.add_session(std::move(places));
-  for (std::uint32_t session = 0; session < end; ++session) reversed.add_session({});
-  reversed.end_session();
-  for (std::uint32_t session = 0; session < end; ++session) {
-    revise(reversed, tile, session);
-    reversed.end_session();
-  }
-  std::vector<bool> is_free;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    is_free.push_back(!reversed.stands(0, i, sessions[i]));
-  }
-  return is_free;
-}
-
-void CityMap::revise(TileHistory& history, const TileIndex& tile, std::size_t session) const {
-  ReferenceTest test{FreeSpaceConfig()};
+void CityMap::revise(TileHistory& history, const TileIndex& tile,
+                     const SessionInfo& session) const {
+  ReferenceTest test(session.evidence);
   RecordingReference reference;
+  const double edge = city_.grid().tile;
   const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
-  const Eigen::Vector3d middle =
-      corner + Eigen::Vector3d(0.5 * city_.grid().tile, 0.5 * city_.grid().tile, 0.0);
+  const Eigen::Vector3d middle = corner + Eigen::Vector3d(0.5 * edge, 0.5 * edge, 0.0);
   // Beyond this distance, no point of the tile is in range.
-  const double reach = TileHistory::kRange + std::sqrt(0.5) * city_.grid().tile;
-  for (const SessionReferenceReader::Entry& entry : references_[session].entries()) {
-    if ((entry.sensor - middle).head<2>().norm() > reach) continue;
-    references_[session].read(entry, reference);
-    const Pose T_world_points(Eigen::Translation3d(entry.sensor));
-    history.revise(entry.scan, entry.sensor - corner,
+  const double reach = TileHistory::kRange + std::sqrt(0.5) * edge;
+  for (const SessionReference& which : session.references) {
+    if ((which.sensor - middle).head<2>().norm() > reach) continue;
+    city_.read_reference(session, which, reference);
+    const Pose T_world_points(Eigen::Translation3d(which.sensor));
+    history.revise(which.sensor - corner,
                    [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
                      return test(reference, points, count, T_world_points);
                    });

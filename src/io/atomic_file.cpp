@@ -95,12 +95,16 @@ AtomicFile::~AtomicFile() {
   fs::remove(temporary_, ignored);
 }
 
-void AtomicFile::commit(Sync sync) {
+void AtomicFile::finish(Sync sync) {
   buffer_->pubsync();
   if (sync == Sync::kNow) buffer_->sync_disk();
   buffer_->check_close();
   if (buffer_->error() != 0)
     fail_by_system(target_, "cannot be written to the end", buffer_->error());
+}
+
+void AtomicFile::commit(Sync sync) {
+  finish(sync);
   std::error_code error;
   fs::rename(temporary_, target_, error);
   if (error) fail_by_system(target_, "cannot be put in place", error.value());

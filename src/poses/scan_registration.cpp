@@ -91,9 +91,9 @@ Pose refine(const RegistrationScan& a, const RegistrationScan& b, const Pose& T,
 
 }  // namespace
 
-RegistrationScan::RegistrationScan(PointsView points) {
+RegistrationScan::RegistrationScan(PointsView points, double farthest) {
   constexpr double kThinned = 0.4;  // m
-  constexpr double kNearest = 2.0, kFarthest = 60.0;
+  constexpr double kNearest = 2.0;  // m
   constexpr std::size_t kFinest = kCellLevels - 1;
   std::vector<Cell> cells;  // of the finest level
   VoxelHashTable<> numbers, taken, thinned;
@@ -101,7 +101,7 @@ RegistrationScan::RegistrationScan(PointsView points) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                             static_cast<double>(points.z[i]));
     const double range = p.norm();
-    if (!(range > kNearest && range < kFarthest)) continue;
+    if (!(range > kNearest && range < farthest)) continue;
     // Dense rings would outweigh others: a cell takes one point for each small voxel.
     if (!adds(taken, cell_key(p, 0.1))) continue;
     cell_of(cell_key(p, kCellEdges[kFinest]), numbers, cells).add(p);

@@ -16,10 +16,11 @@ namespace dynains {
 /// One scan as a reference and as a source of a registration.
 class RegistrationScan {
  public:
-  /// `points`: m, sensor frame, finite.
-  explicit RegistrationScan(PointsView points);
+  /// `points`: m, sensor frame, finite. Those more than 2 m and less than `farthest` (m) away
+  /// count.
+  explicit RegistrationScan(PointsView points, double farthest = 60.0);
 
-  /// One point for each voxel of 0.4 m, 2 to 60 m from the sensor.
+  /// One point for each voxel of 0.4 m.
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
   /// The surface in the cell around a point; null if it has too few points or no surface.
   const CellSurface* find(std::size_t level, const Eigen::Vector3d& point) const;

@@ -75,7 +75,7 @@ class CityPointFile {
       las.position = position;
       las.time = map_.sessions()[session].begin;
       las.instance = point.label;
-      if (point.is_ground) las.classification = LasClass::kGround;
+      if (point.is_ground != 0) las.classification = LasClass::kGround;
       las_->add(las);
       return;
     }
@@ -111,8 +111,8 @@ void list(const MapOptions& options) {
   for (const SessionInfo& session : city.sessions()) {
     const Eigen::Vector3d extent = session.highest - session.lowest;
     std::cout << session.name << ", " << std::setprecision(3) << session.begin << ", "
-              << session.scans << ", " << session.references << ", " << session.points << ", "
-              << session.tiles.size() << ", " << std::setprecision(1) << extent.x() << " x "
+              << session.scans << ", " << session.references.size() << ", " << session.points
+              << ", " << session.tiles.size() << ", " << std::setprecision(1) << extent.x() << " x "
               << extent.y() << " x " << extent.z() << '\n';
   }
   std::cout << std::flush;
@@ -190,7 +190,7 @@ void diff(const MapOptions& options) {
   CityPointFile added(map, city.folder(), options.added, options.force);
   CityPointFile removed(map, city.folder(), options.removed, options.force);
   for (const TileIndex& tile : map.tiles()) {
-    const CityChanges changes = map.changes(tile, map.history(tile, b), a, b);
+    const CityChanges changes = map.changes(tile, a, b);
     for (const CityPoint& p : changes.added) {
       added.add(map.position(tile, p.point), p.session, p.point);
     }

@@ -24,6 +24,7 @@
 #include "run/output_folder.hpp"
 #include "run/repose_session.hpp"
 #include "run/run_plan.hpp"
+#include "run/scratch_file.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {
@@ -255,6 +256,7 @@ void remap(RemapOptions& options) {
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path() / "labels",
                 options.map_voxel.value_or(run.map_voxel), options.quiet);
+  std::optional<ScratchFile> store;
   std::unique_ptr<SessionWriter> session;
   if (!options.update.empty()) {
     const auto name = Json::json_pointer("/request/session");
@@ -266,7 +268,7 @@ void remap(RemapOptions& options) {
         {whole_path(options.update),
          options.session.empty() ? run.report[name].get<std::string>() : options.session,
          out.path(), pose_fingerprint(corrected, range), scans},
-        original ? *original : corrected, corrected);
+        original ? *original : corrected, corrected, store.emplace(whole_path(options.update)));
   }
   file.write(map,
              {{"file", kRemappedMap},

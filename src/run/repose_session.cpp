@@ -1,6 +1,6 @@
 #include "repose_session.hpp"
 
-#include <algorithm>
+#include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
@@ -21,12 +21,14 @@ SessionInfo session_of(const City& city, const std::string& name) {
 }  // namespace
 
 std::unique_ptr<SessionWriter> repose_session(const ReposedSession& request,
-                                              const Recording& points, const Recording& corrected) {
+                                              const Recording& points, const Recording& corrected,
+                                              ByteStore& store) {
   const City city(request.city);
   SessionInfo info = session_of(city, request.name);
   info.fingerprint = request.fingerprint;
   info.alignment.reset();
-  auto writer = std::make_unique<SessionWriter>(city, info, SessionWriter::Mode::kReplace);
+  auto writer = std::make_unique<SessionWriter>(city, std::move(info), store, SessionConfig(),
+                                                SessionWriter::Mode::kReplace);
   RecordedScan scan;
   PointBuffer cloud;
   VerdictArrays verdict;

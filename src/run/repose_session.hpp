@@ -20,12 +20,13 @@ struct ReposedSession {
   std::vector<std::size_t> scans;  ///< of the run, indices in the recordings
 };
 
-/// Stages a session of the verdicts of a run at the poses of `corrected`; commit() of the result
-/// puts it in the place of the earlier one. Begin, recording and configuration stay; an alignment
-/// ends: the poses are those of the map. Until the commit, and after any error or signal, the map
-/// is as it was. `points`: the recording as the run read it. Throws ConfigError, IoError,
-/// UsageError, Interrupted.
+/// Writes a session of the verdicts of a run at the poses of `corrected`, whose data waits in
+/// `store`; commit() of the result puts it in the place of the earlier one. Begin, recording and
+/// configuration stay; an alignment ends: the poses are those of the map. Until the commit, and
+/// after any error or signal, the map is as it was. `points`: the recording as the run read it.
+/// Throws ConfigError, IoError, UsageError, Interrupted.
 std::unique_ptr<SessionWriter> repose_session(const ReposedSession& request,
-                                              const Recording& points, const Recording& corrected);
+                                              const Recording& points, const Recording& corrected,
+                                              ByteStore& store);
 
 }  // namespace dynains::program

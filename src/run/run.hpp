@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "dynains/city/session_alignment.hpp"
+#include "dynains/city/session.hpp"
 #include "dynains/io/recording.hpp"
 #include "interrupt.hpp"
 #include "run_report.hpp"

@@ -142,7 +142,7 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   const fs::path out = whole_path(settings.out);
   if (out == request.city || out.parent_path() == request.city) {
     throw ConfigError("--update " + settings.update +
-                      ": its folders are sessions; choose a folder for --out outside of it");
+                      ": is a map of many sessions; choose a folder for --out outside of it");
   }
   request.grid.map_voxel = settings.config.map.map_voxel;
   request.grid.validate();
@@ -156,6 +156,7 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   request.info.recording = settings.recording;
   request.info.fingerprint = pose_fingerprint(sequence, range);
   request.info.config = configuration.dump();
+  request.info.evidence = settings.config.evidence;
   if (settings.align) {
     request.T_city_start =
         settings.align_start.empty() ? Pose::Identity() : read_extrinsic(settings.align_start);

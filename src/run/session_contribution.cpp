@@ -21,23 +21,22 @@ bool has_alignment(const SessionRequest& request, const SessionInfo& session) {
 }  // namespace
 
 bool SessionRequest::is_fulfilled() const {
-  if (!std::filesystem::exists(city / "city.json")) return false;
-  const std::vector<SessionInfo> sessions = City(city).sessions();
+  if (!std::filesystem::exists(city)) return false;
+  const std::vector<SessionInfo> sessions = City::open_or_make(city, grid).sessions();
   return std::any_of(sessions.begin(), sessions.end(), [&](const SessionInfo& session) {
     return session.name == info.name && session.fingerprint == info.fingerprint &&
            session.begin == info.begin && has_alignment(*this, session) &&
-           nlohmann::json::parse(session.config, nullptr, false) ==
-               nlohmann::json::parse(info.config, nullptr, false);
+           session.config == info.config;
   });
 }
 
 SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range) {
   if (!request.T_city_start) return request;
-  if (!std::filesystem::exists(request.city / "city.json")) {
+  if (!std::filesystem::exists(request.city)) {
     throw ConfigError(request.city.string() +
                       ": there is no map to align with; add its first session without --align");
   }
-  SessionAligner aligner{City(request.city)};
+  SessionAligner aligner(City::open_or_make(request.city, request.grid));
   RecordedScan scan;
   PointBuffer points;
   const std::size_t count = std::min(range.size(), SessionAligner::kMostScans);
@@ -53,7 +52,10 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
 }
 
 SessionContribution::SessionContribution(const SessionRequest& request)
-    : writer_(City::open_or_make(request.city, request.grid), request.info) {
+    : SessionContribution(City::open_or_make(request.city, request.grid), request) {}
+
+SessionContribution::SessionContribution(const City& city, const SessionRequest& request)
+    : store_(city.folder()), writer_(city, request.info, store_) {
   if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
 }
 

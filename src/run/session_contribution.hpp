@@ -16,6 +16,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "scan_range.hpp"
+#include "scratch_file.hpp"
 
 namespace dynains::program {
 
@@ -47,6 +48,9 @@ class SessionContribution {
   void commit() { writer_.commit(); }
 
  private:
+  SessionContribution(const City& city, const SessionRequest& request);
+
+  ScratchFile store_;
   SessionWriter writer_;
   std::optional<Pose> T_city_session_;
   PointBuffer points_;

@@ -12,6 +12,7 @@
 #include <iomanip>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -46,7 +47,7 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
 class MeasuredObjects {
  public:
   void add(const simulation::SimulatedScan& scan, std::uint32_t number) {
-    constexpr float kRange = static_cast<float>(SessionPointsConfig().contribution_range);
+    constexpr float kRange = static_cast<float>(SessionConfig().contribution_range);
     std::set<std::uint32_t> measured;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
       const Eigen::Map<const Eigen::Vector3f> point(&scan.xyzi[4 * i]);
@@ -100,6 +101,7 @@ class MeasuredObjects {
 
 /// One simulated day.
 struct Day {
+  std::unique_ptr<MemoryStore> store;
   SessionPoints near;  ///< static and moving points, up to the range of contributions
   SessionPoints all;
   std::set<std::uint32_t> changes = {};  ///< changes of the place that stand there
@@ -113,7 +115,8 @@ void add_day(const City& city, const simulation::Config& config, Day& day) {
   SessionInfo info;
   info.name = "day" + std::to_string(config.day);
   info.begin = config.day;
-  SessionWriter writer(city, info);
+  MemoryStore store;
+  SessionWriter writer(city, info, store);
   std::deque<simulation::SimulatedScan> open;
   const auto take_final = [&](const ScanVerdict& verdict) {
     const simulation::SimulatedScan scan = std::move(open.front());
@@ -178,20 +181,21 @@ bool is_gone(std::uint32_t label, std::size_t session, const std::vector<Day>& d
 constexpr double kNear = 40.0;  // m
 
 /// Positions of the references of all sessions.
-std::vector<std::vector<Eigen::Vector3d>> ways_of(const City& city, const CityMap& map) {
+std::vector<std::vector<Eigen::Vector3d>> ways_of(const CityMap& map) {
   std::vector<std::vector<Eigen::Vector3d>> ways;
   for (const SessionInfo& session : map.sessions()) {
     ways.emplace_back();
-    const SessionReferenceReader reader(city, session);
-    for (const auto& entry : reader.entries()) ways.back().push_back(entry.sensor);
+    for (const SessionReference& reference : session.references) {
+      ways.back().push_back(reference.sensor);
+    }
   }
   return ways;
 }
 
-void judge_map(const City& city, const std::vector<Day>& days, Result& result) {
+void judge_map(const City& city, std::vector<Day>& days, Result& result) {
   const CityMap map(city);
   const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
-  const std::vector<std::vector<Eigen::Vector3d>> ways = ways_of(city, map);
+  const std::vector<std::vector<Eigen::Vector3d>> ways = ways_of(map);
   const auto is_near_later_way = [&](const Eigen::Vector3d& position, std::size_t session) {
     for (std::size_t later = session + 1; later < ways.size(); ++later) {
       for (const Eigen::Vector3d& sensor : ways[later]) {
@@ -257,7 +261,7 @@ struct DiffPoint {
   bool is_of_change;         ///< of an object that stands in one of both maps
 };
 
-constexpr double kClusterCell = 0.4;  // m, as ChangeClusters with the grid of the trials
+constexpr double kClusterCell = 0.4;  // m, as find_changes() with the grid of the trials
 
 /// Calls `visit(members)` for the clusters of points in touching cells of kClusterCell.
 template <class Visitor>
@@ -331,7 +335,7 @@ void judge_diff(const City& city, const std::vector<Day>& days, Result& result) 
     };
     count(0, left);
     count(last, came);
-    const CityChanges changes = map.changes(tile, history, 0, last);
+    const CityChanges changes = find_changes(city.grid(), history, 0, last);
     const auto diff_point = [&](const CityPoint& p) {
       const bool stands = instance_of(p.point.label) != 0 &&
                           days[p.session].objects.stood_to_the_end(p.point.label, p.point.scan);
@@ -361,11 +365,14 @@ void judge_diff(const City& city, const std::vector<Day>& days, Result& result) 
 }
 
 Result try_days(const fs::path& folder, int days, simulation::Config config) {
-  constexpr SessionPointsConfig kAnyDistance{300.0};
   const City city = City::open_or_make(folder, {});
   std::vector<Day> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
-    measured.push_back({SessionPoints(city.grid()), SessionPoints(city.grid(), kAnyDistance)});
+    constexpr double kAnyDistance = 300.0;  // m
+    auto store = std::make_unique<MemoryStore>();
+    SessionPoints near(city.grid(), SessionConfig().contribution_range, *store);
+    SessionPoints all(city.grid(), kAnyDistance, *store);
+    measured.push_back({std::move(store), std::move(near), std::move(all)});
     add_day(city, config, measured.back());
   }
   Result result;
@@ -401,7 +408,6 @@ int main(int argc, char** argv) {
       const Result r = try_days(folder, days, config);
       City city(folder);
       for (const SessionInfo& session : city.sessions()) city.drop(session.name);
-      fs::remove(folder / "city.json");
       fs::remove(folder);
       std::cout << "| " << sensor << " | " << seed;
       for (const Count& count : {r.fixed, r.fixed_far, r.come, r.gone_near, r.gone, r.gone_last}) {

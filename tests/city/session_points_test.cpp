@@ -67,12 +67,12 @@ class Oracle {
                                   static_cast<double>(scan.points.z[i]));
       if (local.squaredNorm() > range_ * range_) continue;
       const Eigen::Vector3d world = scan.T_world_sensor * local;
-      const TileIndex index = {static_cast<std::int32_t>(std::floor(world.x() / grid_.tile)),
-                               static_cast<std::int32_t>(std::floor(world.y() / grid_.tile))};
+      const TileIndex index = {static_cast<std::int64_t>(std::floor(world.x() / grid_.tile)),
+                               static_cast<std::int64_t>(std::floor(world.y() / grid_.tile))};
       const Eigen::Vector3f in_tile = (world - tile_corner(grid_, index)).cast<float>();
-      const SessionPoint point = {in_tile.x(),    in_tile.y(),
-                                  in_tile.z(),    number,
-                                  scan.labels[i], scan.verdicts[i] == PointLabel::kGround};
+      const SessionPoint point = {
+          in_tile.x(), in_tile.y(),    in_tile.z(),
+          number,      scan.labels[i], scan.verdicts[i] == PointLabel::kGround ? 1U : 0U};
       auto& [points, voxels] = tiles_[index];
       const std::size_t before = voxels.size();
       if (voxels.insert(session_voxel(grid_, point)) == before) points.push_back(point);
@@ -104,9 +104,8 @@ TEST_CASE("points of a session: the first of each voxel, whatever floats round t
   SessionGrid grid;
   grid.map_voxel = voxel;
   grid.tile = tile;
-  SessionPointsConfig config;
-  config.contribution_range = range;
-  SessionPoints session(grid, config);
+  MemoryStore store;
+  SessionPoints session(grid, range, store);
   Oracle oracle(grid, range);
   Random random(7);
   for (std::uint32_t number = 0; number < 4; ++number) {

@@ -1,4 +1,4 @@
-// One tile of a map of many sessions: ground of other sessions, cubes, what a session itself saw.
+// One tile of a map of many sessions: cubes, what a session itself saw.
 #include "dynains/city/tile_history.hpp"
 
 #include <cstddef>
@@ -16,16 +16,7 @@ namespace {
 
 /// `label`: 1 for the ground, else of an object.
 SessionPoint point_at(float x, float y, float z, std::uint32_t label) {
-  return {x, y, z, 0, label, label == 1};
-}
-
-/// A street of 10 m x 4 m, its ground at a height.
-std::vector<SessionPoint> street(float height) {
-  std::vector<SessionPoint> points;
-  for (float x = 0.1F; x < 10.0F; x += 0.2F) {
-    for (float y = 0.1F; y < 4.0F; y += 0.2F) points.push_back(point_at(x, y, height, 1));
-  }
-  return points;
+  return {x, y, z, 0, label, label == 1 ? 1U : 0U};
 }
 
 void add_box(std::vector<SessionPoint>& points, float from, float to, float bottom, float top,
@@ -43,11 +34,10 @@ void revise(TileHistory& history, int count, const Beam& beam) {
   const Eigen::Vector3d sensor(5.0, 2.0, 2.0);
   detail::Visibility visibility;
   for (int scan = 0; scan < count; ++scan) {
-    history.revise(static_cast<std::uint32_t>(scan), sensor,
-                   [&](const PointBuffer& points, std::size_t size) -> const detail::Visibility& {
-                     visibility = test::visibility_by(beam, points, size, sensor);
-                     return visibility;
-                   });
+    history.revise(
+        sensor, [&](const PointBuffer& points, std::size_t size) -> const auto& {
+          return visibility = test::visibility_by(beam, points, size, sensor);
+        });
   }
 }
 
@@ -62,58 +52,6 @@ std::size_t count_standing(const TileHistory& history, std::uint32_t last, std::
 }
 
 }  // namespace
-
-TEST_CASE("a tile: ground above the ground of another session leaves, unless another one has it") {
-  // Ground points above the street: the lower part of a car that drove by.
-  const auto with_low_part = [](float height) {
-    std::vector<SessionPoint> points = street(0.19F);
-    for (float x = 2.1F; x < 6.0F; x += 0.2F)
-      points.push_back(point_at(x, 2.1F, 0.19F + height, 1));
-    return points;
-  };
-  const auto is_raised = [](const SessionPoint& p) { return p.is_ground && p.z > 0.2F; };
-  const std::size_t raised = 20, ground = street(0.19F).size();
-  const auto history_of = [](std::vector<std::vector<SessionPoint>> sessions) {
-    TileHistory history(SessionGrid{});
-    for (std::vector<SessionPoint>& points : sessions) history.add_session(std::move(points));
-    for (std::size_t i = 0; i < history.session_count(); ++i) history.end_session();
-    return history;
-  };
-  const std::vector<SessionPoint> with_car = with_low_part(0.11F);
-  // The session alone cannot tell; the next one can, and so can the one before.
-  const TileHistory next = history_of({with_car, street(0.19F)});
-  CHECK(count_standing(next, 0, 0, is_raised) == raised);
-  CHECK(count_standing(next, 1, 0, is_raised) == 0);
-  CHECK(next.removal(0, ground).session == 1);
-  CHECK(count_standing(history_of({street(0.19F), with_car}), 1, 1, is_raised) == 0);
-  // The street itself stands, also below the car.
-  const auto is_street = [&](const SessionPoint& point) { return !is_raised(point); };
-  CHECK(count_standing(history_of({street(0.19F), with_car}), 1, 1, is_street) == ground);
-  // Less than 0.1 m above the ground, it is ground.
-  CHECK(count_standing(history_of({with_low_part(0.09F), street(0.19F)}), 1, 0, is_raised) ==
-        raised);
-
-  // A low wall that both sessions have seen stands, also if the second one saw it 0.05 m lower.
-  const std::vector<SessionPoint> with_wall = with_low_part(0.2F);
-  CHECK(count_standing(history_of({with_wall, with_wall}), 1, 1, is_raised) == raised);
-  const auto count_with = [&](float other) {
-    const TileHistory history = history_of({with_wall, with_low_part(other)});
-    std::size_t count = 0;
-    for (std::size_t i = ground; i < with_wall.size(); ++i) count += history.stands(0, i, 1);
-    return count;
-  };
-  CHECK(count_with(0.15F) == raised);
-  CHECK(count_with(0.06F) == 0);
-  // A car that is parked there stands with its lower part.
-  std::vector<SessionPoint> parked = with_car;
-  add_box(parked, 2.0F, 6.0F, 0.4F, 1.5F, 10);
-  CHECK(count_standing(history_of({street(0.19F), parked}), 1, 1, is_raised) == raised);
-  // A session without points at this place removes nothing there.
-  CHECK(count_standing(history_of({with_car, {point_at(20.0F, 20.0F, 0.0F, 1)}}), 1, 0,
-                       is_raised) == raised);
-  // Ground of which the session saw no lower part anywhere is none of an object.
-  CHECK(history_of({street(0.35F), street(0.19F)}).stands(0, 0, 1));
-}
 
 TEST_CASE("a tile: a tree that was felled beside a wall leaves with what no beam reached") {
   // A wall of 20 m, and a tree that touches its end.

@@ -7,7 +7,6 @@
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
-#include "io/folder_exchange.hpp"
 #include "support/catch.hpp"
 
 namespace fs = std::filesystem;
@@ -138,23 +137,4 @@ TEST_CASE("Names of temporary files give the name of the file, and other names d
     CAPTURE(other);
     CHECK(target_of_temporary(other).empty());
   }
-}
-
-TEST_CASE("A folder is put in place in one step, or not at all") {
-  const TemporaryFolder folder;
-  write_text(folder / "new/a.txt", "new");
-  CHECK_FALSE(put_in_place(folder / "new", folder / "target"));
-  CHECK(read_text(folder / "target/a.txt") == "new");
-  write_text(folder / "newer/a.txt", "newer");
-  CHECK(put_in_place(folder / "newer", folder / "target"));
-  CHECK(read_text(folder / "target/a.txt") == "newer");
-  CHECK(read_text(folder / "newer/a.txt") == "new");
-  // A folder cannot take the place of one that holds it.
-  fs::create_directory(folder / "target/inner");
-  CHECK_THAT(message_of<IoError>([&] { put_in_place(folder / "target/inner", folder / "target"); }),
-             ContainsSubstring("target: cannot be replaced in one step"));
-  CHECK_THAT(message_of<IoError>([&] { put_in_place(folder / "newer", folder / "none/target"); }),
-             ContainsSubstring("none/target: cannot be put in place"));
-  CHECK(read_text(folder / "target/a.txt") == "newer");
-  CHECK(read_text(folder / "newer/a.txt") == "new");
 }

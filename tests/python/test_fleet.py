@@ -110,7 +110,7 @@ def test_the_map_of_a_fleet_is_that_of_one_process(drives, tmp_path):
     for name in reversed(list(some)):
         dynains.run(some[name], tmp_path / "alone" / name, update=tmp_path / "map", session=name)
     assert bytes_of(tmp_path / "city") == bytes_of(tmp_path / "map")
-    assert {"drive0", "drive1", "drive2"} <= {f.name for f in (tmp_path / "city").iterdir()}
+    assert {"drive0.session", "drive1.session", "drive2.session"} == {f.name for f in (tmp_path / "city").iterdir()}
 
 
 def test_a_worker_waits_for_a_folder_that_another_holds(drives, tmp_path, monkeypatch):

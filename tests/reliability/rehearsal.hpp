@@ -241,7 +241,7 @@ inline Scenario moved_session() {
   return {{run_with({"--update", "/maps/city", "--accept-poses"})},
           command,
           command,
-          {"maps/city/seq", "disk/out/static_map_remapped.ply"}};
+          {"maps/city/seq.session", "disk/out/static_map_remapped.ply"}};
 }
 
 inline Scenario simulation() { return {{}, simulate_with({}), simulate_with({"--force"})}; }

@@ -3,13 +3,9 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <limits>
-#include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
-#include "dynains/city/change_clusters.hpp"
 #include "dynains/city/city.hpp"
 #include "dynains/city/tile_history.hpp"
 
@@ -27,12 +23,18 @@ struct CityChanges {
   std::vector<CityPoint> added;    ///< new points whose place beams of earlier sessions passed
 };
 
+/// Changes of a tile from the map after session `a` to the map after session `b`, whose history has
+/// sessions 0 to `b`, or more: clusters of points in touching blocks that are objects, see
+/// docs/scale.md. Places that only one of both maps has seen are no changes.
+CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, std::uint32_t a,
+                         std::uint32_t b);
+
 /// Reads a city as a map. The result is a function of the set of sessions. Memory: one tile of all
 /// sessions and one range image.
 class CityMap {
  public:
-  /// Throws ConfigError, IoError.
-  explicit CityMap(const City& city);
+  /// Throws IoError.
+  explicit CityMap(const City& city) : city_(city), sessions_(city.sessions()) {}
 
   const std::vector<SessionInfo>& sessions() const { return sessions_; }
   /// Number of a session in the order of time. Throws ConfigError if there is none.
@@ -44,33 +46,19 @@ class CityMap {
   /// The history of one tile over sessions 0 to `last`. Throws IoError.
   TileHistory history(const TileIndex& tile, std::uint32_t last = TileHistory::kNever) const;
 
-  /// Objects larger than 0.5 m that came or left from the map after session `a` to the map after
-  /// session `b`, see ChangeClusters. Places that only one of both maps has seen are no changes.
-  /// Throws ConfigError unless `a` is before `b`; IoError.
-  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
-    return changes(tile, history(tile, b), a, b);
-  }
-  /// With the history of the tile over sessions 0 to `b`, or more.
-  CityChanges changes(const TileIndex& tile, const TileHistory& history, std::uint32_t a,
-                      std::uint32_t b) const;
+  /// find_changes(). Throws ConfigError unless `a` is before `b`; IoError.
+  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
 
   /// World position of a point of a tile, m.
   Eigen::Vector3d position(const TileIndex& tile, const SessionPoint& point) const {
-    return tile_corner(city_.grid(), tile) + Eigen::Vector3d(static_cast<double>(point.x),
-                                                             static_cast<double>(point.y),
-                                                             static_cast<double>(point.z));
+    return position_of(city_.grid(), tile, point);
   }
 
  private:
-  // Whether beams of sessions before its own passed through the place of a point. `sessions`:
-  // session of each point.
-  std::vector<bool> free_before(const TileIndex& tile, const std::vector<ChangedPoint>& points,
-                                const std::vector<std::uint32_t>& sessions) const;
-  void revise(TileHistory& history, const TileIndex& tile, std::size_t session) const;
+  void revise(TileHistory& history, const TileIndex& tile, const SessionInfo& session) const;
 
   City city_;
   std::vector<SessionInfo> sessions_;
-  std::vector<SessionReferenceReader> references_;  // by session
 };
 
 }  // namespace dynains

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "dynains/city/city.hpp"
-#include "dynains/city/session_alignment.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -36,14 +35,9 @@ class SessionAligner {
   SessionAlignment align(const Pose& T_city_start) const;
 
  private:
-  struct Scan {
-    Eigen::Vector3d sensor;  // m, session frame
-    std::size_t begin, end;  // in points_
-  };
-
   City city_;
-  std::vector<Scan> scans_;
-  std::vector<Eigen::Vector3d> points_;  // m, session frame; one for each small voxel
+  std::vector<Eigen::Vector3d> sensors_;  // m, session frame, by scan
+  std::vector<Eigen::Vector3d> points_;   // m, session frame; one for each small voxel
   VoxelHashTable<> taken_;
 };
 

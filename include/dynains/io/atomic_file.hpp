@@ -32,9 +32,12 @@ class AtomicFile {
     kLater  ///< the file is on the disk after `sync_files()`; faster for many files
   };
 
-  /// Renames the temporary file to the target. Throws IoError with the reason of the first failure
-  /// if a write failed; the target is then unchanged. Throws IoError also if the rename succeeded,
-  /// but the synchronization of the folder failed.
+  /// Ends the stream, so that nothing but the rename is left to commit(). Throws IoError with the
+  /// reason of the first failure if a write failed.
+  void finish(Sync sync = Sync::kNow);
+
+  /// finish(), and renames the temporary file to the target. If it throws IoError, the target is
+  /// unchanged, except if the rename succeeded, but the synchronization of the folder failed.
   void commit(Sync sync = Sync::kNow);
 
  private:

@@ -73,8 +73,9 @@ template <class Tile>
 class PagedTiles {
  public:
   /// `budget`: bytes of the tiles that stay in memory, if the others are far. The store outlives
-  /// this.
-  PagedTiles(ByteStore& store, std::size_t budget) : store_(&store), budget_(budget) {}
+  /// this. `edge`: m, of a tile.
+  PagedTiles(ByteStore& store, std::size_t budget, double edge = kTileEdge)
+      : store_(&store), budget_(budget), edge_(edge) {}
 
   /// The tile, which is new or not, to be changed. Throws what the store throws.
   Tile& at(const GroundTile& index) {
@@ -111,12 +112,12 @@ class PagedTiles {
   /// Distance of a tile from a position (m, world frame) along the axis where it is larger, m.
   double distance(const GroundTile& index, const Eigen::Vector3d& position) const {
     const Eigen::Vector3d away = position - middle(index);
-    return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * kTileEdge;
+    return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * edge_;
   }
   /// m, world frame; z is 0.
   Eigen::Vector3d middle(const GroundTile& index) const {
-    return {kTileEdge * (static_cast<double>(index[0]) + 0.5),
-            kTileEdge * (static_cast<double>(index[1]) + 0.5), 0.0};
+    return {edge_ * (static_cast<double>(index[0]) + 0.5),
+            edge_ * (static_cast<double>(index[1]) + 0.5), 0.0};
   }
 
   /// Frees the tiles farthest from a position (m, world frame) until the others keep to the budget.
@@ -185,6 +186,7 @@ class PagedTiles {
 
   ByteStore* store_;
   std::size_t budget_;
+  double edge_;                          // m
   std::map<GroundTile, Entry> entries_;  // its elements do not move
   Entry* recent_ = nullptr;
   GroundTile recent_index_ = {};

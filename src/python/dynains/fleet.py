@@ -29,7 +29,7 @@ _PATIENCE = 600.0  # s, for a folder that another process holds
 _LOGS = {".mcap", ".db3", ".bag"}
 _SCANS = {".bin", ".pcd", ".ply", ".las", ".npy", ".xyz", ".csv"}
 _SCAN_FOLDERS = {"velodyne", "pcd", "ply", "scans", "points", "clouds", "lidar", "samples"}
-_MARKERS = {"report.json", "city.json"}  # results of dynains, which are no recordings
+_MARKERS = {"report.json"}  # results of dynains, which are no recordings
 
 PathLike = Union[str, "os.PathLike[str]"]
 Result = TypeVar("Result")
