@@ -152,7 +152,7 @@ def log(tmp_path_factory):
     if "DYNAINS_PROGRAM" not in os.environ:
         pytest.skip("the program is not built")
     folder = tmp_path_factory.mktemp("log") / "log"
-    words = ["simulate", folder, "--format", "mcap", "--sensor", "vlp16", "--scans", "12"]
+    words = ["simulate", folder, "--format", "mcap", "--scans", "12"]
     subprocess.run([os.environ["DYNAINS_PROGRAM"], *words, "--quiet"], check=True)
     return next(folder.glob("*.mcap"))
 
