@@ -109,5 +109,5 @@ int main() {
   const double after = moving_share(scans, verdicts);
   std::cout << "moving points of the van: " << 100.0 * before << " % by the stream, "
             << 100.0 * after << " % by all scans\n";
-  return before < 0.5 && after > 0.9 ? 0 : 1;
+  return before + 0.3 < after && after > 0.9 ? 0 : 1;
 }

@@ -86,8 +86,10 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   if (error) fail_by_system(folder, "cannot be created", error.value());
   City city(folder, grid);
   const std::vector<SessionInfo> sessions = city.sessions();
-  if (!sessions.empty()) refuse_other_grid(folder, sessions.front().grid, grid);
-  if (!sessions.empty()) return city;
+  if (!sessions.empty()) {
+    refuse_other_grid(folder, sessions.front().grid, grid);
+    return city;
+  }
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (target_of_temporary(entry.path().filename().string()).empty()) {
       fail(folder, "holds files but no session; expected a map of many sessions or nothing");

@@ -223,8 +223,9 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
   }
   SessionAlignment alignment;
   alignment.T_city_start = T_city_start;
-  alignment.T_city_session =
-      Eigen::Translation3d(centre) * fit.T * Eigen::Translation3d(-centre) * T_city_start;
+  Pose T_city_centre = Pose::Identity();
+  T_city_centre.translation() = centre;
+  alignment.T_city_session = T_city_centre * fit.T * T_city_centre.inverse() * T_city_start;
   alignment.residual = std::sqrt(fit.squares / std::max(fit.inliers, 1.0));
   alignment.fitting = fit.fitting();
   alignment.uncertainty = fit.uncertainty;

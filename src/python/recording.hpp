@@ -36,7 +36,7 @@ class SharedRecording {
 std::shared_ptr<SharedRecording> to_recording(const pybind11::object& recording,
                                               const pybind11::dict& options);
 
-/// A RuntimeWarning if scans are left out because they have no pose, or if a log is cut off.
-void warn_of_missing_scans(const Recording& recording);
+/// Recording::warnings() as RuntimeWarnings.
+void show_warnings(const Recording& recording);
 
 }  // namespace dynains::python

@@ -172,7 +172,7 @@ PreparedRun prepare(const py::object& recording, const fs::path& out, const py::
   settings.out = out.string();
   program::check_settings(settings);
   const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
-  if (!py::isinstance<SharedRecording>(recording)) warn_of_missing_scans(shared->get());
+  if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared->get());
   settings.recording = shared->get().folder().string();
   const py::dict flags = to_flags(shared->options());
   settings.recording_flags = to_json(flags);

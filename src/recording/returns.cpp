@@ -98,7 +98,7 @@ ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given) {
   if (alignment.matched == 0) return result;
   result.inliers = static_cast<double>(alignment.inliers) / static_cast<double>(alignment.matched);
   const Pose T_error = result.T_earlier_later * T_given.inverse();
-  const double angle = Eigen::AngleAxisd(T_error.linear()).angle();
+  const double angle = Eigen::AngleAxisd(detail::Quaternion(T_error.linear())).angle();
   result.movement =
       std::hypot((result.T_earlier_later.translation() - T_given.translation()).norm(),
                  detail::kLever * angle);
