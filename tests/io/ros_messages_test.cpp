@@ -194,6 +194,26 @@ TEST_CASE("Transforms are chained and interpolated, by the nearest frame above b
   CHECK_FALSE(tree.find("map", "lidar", 0.1));
 }
 
+TEST_CASE("The newest transform of an edge that hardly changes holds, others end at a gap") {
+  TransformTree tree;
+  tree.add({-0.5, "base", "lidar", pose_at(0.5, 0)}, false);
+  for (const int step : {0, 1, 2}) {
+    tree.add({3.0 * step, "map", "odom", pose_at(0.02 * step, 0)}, false);
+    tree.add({3.0 * step, "odom", "base", pose_at(9.0 * step, 0)}, false);
+  }
+  tree.sort();
+  CHECK(tree.find("base", "lidar", 7.0)->isApprox(pose_at(0.5, 0), 1e-12));
+  CHECK(tree.find("map", "odom", 4.5)->isApprox(pose_at(0.02, 0), 1e-12));
+  CHECK(tree.find("map", "odom", 20.0)->isApprox(pose_at(0.04, 0), 1e-12));
+  CHECK_FALSE(tree.find("odom", "base", 4.5));
+
+  TransformTree patient(3.5);
+  for (const int step : {0, 1})
+    patient.add({3.0 * step, "odom", "base", pose_at(9.0 * step, 0)}, false);
+  patient.sort();
+  CHECK(patient.find("odom", "base", 1.5)->isApprox(pose_at(4.5, 0), 1e-12));
+}
+
 TEST_CASE("Poses in any order take the time of sorting, and chains of frames have a limit") {
   TransformTree tree;
   constexpr int kPoses = 300000;

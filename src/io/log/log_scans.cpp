@@ -68,7 +68,10 @@ SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint6
 
 LogScans::LogScans(const std::filesystem::path& path, const RecordingOptions& options,
                    bool with_poses)
-    : log_(open_log(path, options.accept_missing)), options_(options), with_poses_(with_poses) {
+    : log_(open_log(path, options.accept_missing)),
+      options_(options),
+      with_poses_(with_poses),
+      transforms_(options.pose_gap) {
   choose_cloud_topic();
   if (with_poses) choose_pose_topic();
   read_log();

@@ -9,11 +9,25 @@
 namespace dynains {
 namespace {
 
-std::optional<Pose> pose_at(const Trajectory& trajectory, double time) {
-  if (trajectory.times.empty()) return trajectory.poses.front();
-  const std::optional<TrajectoryMatch> match = match_time(trajectory, time);
-  if (!match) return std::nullopt;
-  return interpolate(trajectory.poses[match->before], trajectory.poses[match->after], match->share);
+/// Whether points 10 m away keep their place from one pose to another.
+bool are_alike(const Pose& a, const Pose& b) {
+  constexpr double kMost = 0.1;  // m
+  const Pose T = a.inverse() * b;
+  return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() < kMost;
+}
+
+std::optional<Pose> pose_at(const Trajectory& trajectory, double time, double longest_gap) {
+  const std::vector<Pose>& poses = trajectory.poses;
+  if (trajectory.times.empty()) return poses.front();
+  if (const auto match = match_time(trajectory, time, longest_gap)) {
+    return interpolate(poses[match->before], poses[match->after], match->share);
+  }
+  const auto after = std::upper_bound(trajectory.times.begin(), trajectory.times.end(), time);
+  const auto next = static_cast<std::size_t>(after - trajectory.times.begin());
+  const std::size_t newest = next > 0 ? next - 1 : 0;
+  const std::size_t other = next < poses.size() ? next : newest > 0 ? newest - 1 : 0;
+  if (!are_alike(poses[newest], poses[other])) return std::nullopt;
+  return poses[newest];
 }
 
 }  // namespace
@@ -124,7 +138,7 @@ std::vector<TransformTree::Step> TransformTree::climb(const std::string& source,
   while (steps.size() <= kDeepest) {
     const auto edge = edges_.find(steps.back().frame);
     if (edge == edges_.end()) break;
-    const std::optional<Pose> T_parent_child = pose_at(edge->second.poses, time);
+    const std::optional<Pose> T_parent_child = pose_at(edge->second.poses, time, longest_gap_);
     if (!T_parent_child) break;
     steps.push_back({edge->second.parent, *T_parent_child * steps.back().T_frame_source});
   }

@@ -25,6 +25,10 @@ class TransformTree {
   /// Most edges between a frame and its root. Robots have fewer than 100.
   static constexpr std::size_t kDeepest = 256;
 
+  /// `longest_gap`: s, between two poses of an edge that changes. The newest pose of an edge that
+  /// hardly changes holds until the next one.
+  explicit TransformTree(double longest_gap = kLongestPoseGap) : longest_gap_(longest_gap) {}
+
   /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
   /// that gives a frame a second parent is left out and counted.
   void add(const StampedPose& pose, bool is_static);
@@ -45,7 +49,7 @@ class TransformTree {
   /// if its wheels move. Nothing if there is none.
   std::optional<std::string> moving_body() const;
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
-  /// if a moving edge on the way has no pose at that time (see match_time()).
+  /// if a moving edge on the way has no pose at that time.
   std::optional<Pose> find(const std::string& target, const std::string& source, double time) const;
   /// Times of all moving transforms, s, strictly increasing.
   std::vector<double> times() const;
@@ -69,6 +73,7 @@ class TransformTree {
 
   std::map<std::string, Edge> edges_;  ///< by child
   std::size_t left_out_ = 0;
+  double longest_gap_;
 };
 
 }  // namespace dynains
