@@ -125,9 +125,10 @@ ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given) {
       result.covariance[row + i / 3][column + i % 3] = block(i / 3, i % 3);
     }
   };
-  for (const std::size_t row : {0, 3}) {
-    for (const std::size_t column : {0, 3}) turned(row, column);
-  }
+  turned(0, 0);
+  turned(0, 3);
+  turned(3, 0);
+  turned(3, 3);
   return result;
 }
 
