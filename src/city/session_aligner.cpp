@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "poses/given_motion.hpp"
 #include "poses/scan_registration.hpp"
 
 namespace dynains {
@@ -158,7 +159,7 @@ void check_fit(const City& city, const Fit& fit) {
   }
   if (fit.is_ambiguous) refuse(city, "it fits nearly as well at another place");
   const double way = fit.T.translation().norm();
-  const double angle = Eigen::AngleAxisd(detail::Quaternion(fit.T.linear())).angle() / kDegree;
+  const double angle = angle_of(fit.T.linear()) / kDegree;
   if (way > kSlack * SessionAligner::kMostTranslation ||
       angle > kSlack * SessionAligner::kMostRotation) {
     refuse(city, "the best fit is " + rounded(way, 2) + " m and " + rounded(angle, 2) +

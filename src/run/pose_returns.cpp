@@ -10,6 +10,7 @@
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "points_of.hpp"
+#include "poses/given_motion.hpp"
 #include "scratch_file.hpp"
 
 namespace dynains::program {
@@ -62,8 +63,8 @@ std::vector<ReturnError> return_errors(const Recording& recording, std::size_t f
     const Pose T_error = recording.T_world_sensor(later).inverse() *
                          recording.T_world_sensor(earlier) * place.T_earlier_later;
     const double metres = T_error.translation().norm();
-    const double angle = Eigen::AngleAxisd(detail::Quaternion(T_error.linear())).angle();
-    if (metres >= kLeast) add(errors, earlier, later, metres, 180.0 / M_PI * std::abs(angle));
+    const double degrees = 180.0 / M_PI * angle_of(T_error.linear());
+    if (metres >= kLeast) add(errors, earlier, later, metres, degrees);
   }
   return errors;
 }

@@ -6,6 +6,7 @@
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/parameters.hpp"
+#include "poses/given_motion.hpp"
 
 namespace dynains::program {
 namespace {
@@ -15,15 +16,12 @@ std::string percent(float share) { return std::to_string(std::lround(100.0F * sh
 /// How far the given motion to scan `i` (from 1) lies from the nearer one of the motions before and
 /// after it.
 PoseJump jump_at(const Recording& recording, std::size_t i) {
-  const auto motion_to = [&](std::size_t k) {
-    return Pose(recording.T_world_sensor(k - 1).inverse() * recording.T_world_sensor(k));
-  };
   std::optional<PoseJump> least;
   for (const std::size_t k : {i - 1, i + 1}) {
     if (k == 0 || k >= recording.size()) continue;
-    const Pose E = motion_to(k).inverse() * motion_to(i);
-    const double angle = Eigen::AngleAxisd(detail::Quaternion(E.linear())).angle();
-    const PoseJump jump{i, E.translation().norm(), 180.0 / M_PI * std::abs(angle)};
+    const Pose E =
+        motion_between(recording, k - 1, k).inverse() * motion_between(recording, i - 1, i);
+    const PoseJump jump{i, E.translation().norm(), 180.0 / M_PI * angle_of(E.linear())};
     if (!least || jump.translation < least->translation) least = jump;
   }
   return least.value_or(PoseJump{i, 0.0, 0.0});
