@@ -98,7 +98,7 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   return city;
 }
 
-// Of the sessions, sorted.
+// Returns the names of all sessions in the folder, sorted.
 std::vector<std::string> City::names() const {
   std::vector<std::string> names;
   std::error_code error;

@@ -9,7 +9,8 @@
 
 namespace dynains {
 
-/// Of every `step`-th point, those with finite coordinates that are not all zero, m, sensor frame.
+/// Copies every `step`-th point (m, sensor frame) of a scan, but leaves out points that are not
+/// finite or lie at the origin.
 inline PointBuffer finite_points(const RecordedScan& scan, std::size_t step = 1) {
   PointBuffer points;
   for (auto* const axis : {&points.x, &points.y, &points.z}) axis->reserve(scan.size() / step + 1);

@@ -144,9 +144,9 @@ class OutputFolder {
   bool owns(const char* field, const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Sets "complete" in `marker` and writes it, syncs the results, calls `put_others()`, and
-  /// replaces the target by the results. The target changes last, because its marker says that
-  /// everything is in place. If `put_others()` fails, the results stay in path(). Throws IoError.
+  /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. At last it
+  /// puts the results in the place of the target, whose marker says that everything is in place. If
+  /// `put_others()` fails, the results stay in path(). Throws IoError.
   void finish(
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 

@@ -199,7 +199,7 @@ class TileHistory {
       return i;
     }
   };
-  /// What one session measured in a block.
+  /// The voxels that one session fills in a block, and the evidence about them.
   struct Part {
     std::uint32_t session, block;
     std::uint32_t next;         // part of the session before that has one in the block

@@ -23,7 +23,8 @@ namespace dynains {
 struct ReturnToPlace {
   std::uint32_t earlier, later;             ///< numbers of scans, the nearest earlier one
   Pose T_earlier_later = Pose::Identity();  ///< as the surfaces fit
-  /// Of T_earlier_later: translation (m) and rotation (rad) along the axes of the later sensor.
+  /// Covariance of the translation (m) and the rotation (rad) of T_earlier_later, along the axes of
+  /// the later sensor.
   detail::PoseCovariance covariance = {};
   double distance = 0.0;  ///< m, between the two sensors
   double inliers = 1.0;   ///< share of the points in voxels with a plane
