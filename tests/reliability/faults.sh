@@ -26,7 +26,7 @@ await() { local i; for ((i = 0; i < 2000; ++i)); do [[ -d $1 ]] && break; sleep 
 complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
 
 seq=$work/seq
-"$program" simulate "$seq" --scans 24 --sensor vlp16 --quiet
+"$program" simulate "$seq" --scans 10 --sensor vlp16 --quiet
 begin=$(date +%s%N)
 "$program" run "$seq" --out "$work/expected" --quiet
 span=$((($(date +%s%N) - begin) / 1000))  # us
@@ -66,7 +66,7 @@ echo "$left of them left a folder"
 ((left > 0)) || fail "no kill hit a run"
 
 echo "--- kill -9 of --force: the earlier results or the new ones, whole"
-"$program" run "$seq" --out "$work/earlier" --end 9 --write-online --quiet
+"$program" run "$seq" --out "$work/earlier" --end 4 --write-online --quiet
 kept=0
 for ((i = 0; i < kills; ++i)); do
   rm -rf "$work"/out*
