@@ -9,6 +9,7 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/parameters.hpp"
@@ -19,6 +20,7 @@
 #include "run/input_files.hpp"
 #include "run/interrupt.hpp"
 #include "run/labelled_sequence.hpp"
+#include "run/map_alignment.hpp"
 #include "run/map_votes.hpp"
 #include "run/output_folder.hpp"
 #include "run/write_view.hpp"
@@ -87,11 +89,14 @@ double edge_by_spacing(const std::vector<Eigen::Vector3d>& map, double least) {
   return edge;
 }
 
-/// Adds the points of all scans of the run with their labels. Throws Interrupted.
-void add_scans(const Recording& recording, const ResultFolder& out, bool quiet, MapVotes& votes) {
+/// Adds the points of all scans of the run with their labels, where they lie in the map. Throws
+/// Interrupted.
+void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
+               MapAlignment& alignment, MapVotes& votes) {
   const auto& names = out.listing().scans;
   Progress progress(names.size(), "scans", quiet);
   RecordedScan scan;
+  PointBuffer standing;
   std::size_t done = 0;
   for (std::size_t i = 0; i < recording.size(); ++i) {
     if (names.count(listed_name(recording.name(i))) == 0) continue;
@@ -99,12 +104,17 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet, 
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
     const std::vector<std::uint32_t> labels = read_run_labels(file, scan.size());
+    standing.clear();
+    for (std::size_t k = 0; k < labels.size(); ++k) {
+      const float* const p = &scan.xyzi[4 * k];
+      if (class_of(labels[k]) != kRunMoving) standing.push_back(p[0], p[1], p[2]);
+    }
+    const Pose T_map_sensor = alignment.T_map_sensor(standing, recording.T_world_sensor(i));
     for (std::size_t k = 0; k < labels.size(); ++k) {
       const std::uint32_t label = class_of(labels[k]);
       if (label == kRunNotJudged) continue;
       const float* const p = &scan.xyzi[4 * k];
-      votes.add(recording.T_world_sensor(i) * Eigen::Vector3d(p[0], p[1], p[2]),
-                label == kRunMoving);
+      votes.add(T_map_sensor * Eigen::Vector3d(p[0], p[1], p[2]), label == kRunMoving);
     }
     progress.update(++done);
   }
@@ -148,7 +158,8 @@ void clean(CleanOptions& options) {
   const InterruptGuard interrupt;
   const bool is_given = options.voxel_option->count() > 0;
   MapVotes votes(positions, is_given ? options.voxel : edge_by_spacing(positions, options.voxel));
-  add_scans(recording, out, options.quiet, votes);
+  MapAlignment alignment(positions);
+  add_scans(recording, out, options.quiet, alignment, votes);
   const Verdicts verdicts = judge(votes, positions.size(), options.map);
   AtomicFile file(cleaned.path());
   copy_points(options.map, verdicts.keep, file.stream());
@@ -159,6 +170,15 @@ void clean(CleanOptions& options) {
     print_warning(std::to_string(verdicts.unseen) + " of " + std::to_string(positions.size()) +
                   " points of the map lie near no point of the scans and stay: the map is that of "
                   "another recording, or its poses are not those of the run");
+  }
+  if (alignment.aligned() == 0) {
+    print_warning(
+        "the distance of the map and the scans is not known: too few surfaces are in "
+        "both; points of scans count where their poses put them");
+  } else if (2.0 * alignment.farthest() > options.voxel) {
+    print_warning("the map lies up to " + evaluation::format_number(alignment.farthest(), 2) +
+                  " m from the scans, as if it was made with other poses; points of scans count "
+                  "where they fit to it");
   }
   if (options.quiet) return;
   std::cout << positions.size() << " points, " << verdicts.moving << " left as moving, "
@@ -185,7 +205,9 @@ void add_clean_command(CLI::App& app) {
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "A point of the map leaves if its voxel holds more moving than static points of the scans.\n"
-      "The map must lie in the frame of the poses of the run. All columns of the points stay.");
+      "The map must lie in the frame of the poses of the run, but for about a metre. All columns "
+      "of "
+      "the\npoints stay.");
   command.callback([options] { clean(*options); });
 }
 

@@ -1,0 +1,37 @@
+// Where the scans of a recording lie in a map that was made with other poses.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+
+namespace dynains::program {
+
+/// Aligns a scan each 2 m of way with the surfaces of the map around it. The scans up to the next
+/// one are moved with it. Where the alignment is uncertain, the motion before it stays.
+class MapAlignment {
+ public:
+  /// `map`: positions in the frame of the map, m; those that are not finite do not count.
+  explicit MapAlignment(const std::vector<Eigen::Vector3d>& map);
+
+  /// Pose of the next scan in the map. `standing`: m, sensor frame, points that do not move.
+  /// The frame of the map has to be that of the poses but for about a metre and a few degrees.
+  Pose T_map_sensor(PointsView standing, const Pose& T_world_sensor);
+
+  std::size_t aligned() const { return aligned_; }  ///< scans whose alignment was certain
+  double farthest() const { return farthest_; }     ///< m, most that a sensor was moved
+
+ private:
+  PointBuffer around(const Eigen::Vector3d& centre) const;
+
+  std::vector<Eigen::Vector3d> map_;  // by x
+  Pose T_map_world_ = Pose::Identity();
+  Eigen::Vector3d latest_;  // m, sensor of the latest scan that was aligned
+  std::size_t tried_ = 0, aligned_ = 0;
+  double farthest_ = 0.0;
+};
+
+}  // namespace dynains::program
