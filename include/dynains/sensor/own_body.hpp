@@ -38,9 +38,12 @@ Value middle_of(std::vector<Value>& values) {
   return *middle;
 }
 
-/// The nearest return of each direction, scan by scan, and the nearest ground of each azimuth.
+/// The nearest return of each direction, scan by scan, and the nearest ground of each azimuth, as
+/// far from the sensor as a body may reach.
 class NearestReturns {
  public:
+  static constexpr float kFarthest = 4.5F;  // m, horizontal
+
   struct Return {
     float range = std::numeric_limits<float>::infinity();  // m
     Eigen::Vector3f point = Eigen::Vector3f::Zero();       // m, sensor frame
@@ -54,11 +57,16 @@ class NearestReturns {
 
   void add(PointsView points) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    const BeamAngles angles = beam_angles(points);
+    near_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float x = points.x[i], y = points.y[i];
+      if (x * x + y * y < kFarthest * kFarthest) near_.push_back(x, y, points.z[i]);
+    }
+    const BeamAngles angles = beam_angles(near_);
     nearest_.assign(by_direction_.size(), {});
     nearest_ground_.assign(kColumns, kInfinity);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Eigen::Vector3f p(points.x[i], points.y[i], points.z[i]);
+    for (std::size_t i = 0; i < near_.size(); ++i) {
+      const Eigen::Vector3f p(near_.x[i], near_.y[i], near_.z[i]);
       const float range = p.norm();
       if (!(range > 0.0F)) continue;
       const std::size_t column = cell(angles.azimuth[i] + 180.5F, kColumn, kColumns);
@@ -103,6 +111,7 @@ class NearestReturns {
   Mounting mounting_;
   std::vector<std::vector<Return>> by_direction_;
   std::vector<std::vector<float>> ground_;  // by azimuth, scan by scan
+  PointBuffer near_;
   std::vector<Return> nearest_;
   std::vector<float> nearest_ground_;
 };
@@ -111,7 +120,7 @@ class NearestReturns {
 struct SteadyReturn {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();  // m, sensor frame
   double reach = 0.0;   // m, largest horizontal distance of the returns like it
-  double steady = 0.0;  // ratio of the returns like it; others are beams that pass, or other things
+  double steady = 0.0;  // ratio of the scans with a return like it
 };
 
 /// `returns`: the nearest returns of a direction in `scans` scans. `height`: of a point above the
@@ -120,15 +129,12 @@ struct SteadyReturn {
 template <class Height>
 SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::size_t scans,
                            Height&& height, double ground) {
-  constexpr double kFarthest = 4.5;    // m
   constexpr double kOverGround = 0.4;  // m; the height of the sensor is known to 0.3 m
   constexpr double kBehind = 0.3;      // m, behind visible ground
   constexpr float kTolerance = 0.03F;  // m, and as a ratio of the range
-  if (4 * returns.size() < 3 * scans) return {};
   const NearestReturns::Return usual = middle_of(returns);
   const auto distance = static_cast<double>(usual.point.head<2>().norm());
-  if (distance > kFarthest || distance > ground + kBehind) return {};
-  if (height(usual.point) < kOverGround) return {};
+  if (distance > ground + kBehind || height(usual.point) < kOverGround) return {};
   std::size_t alike = 0;
   SteadyReturn result;
   result.point = usual.point;
@@ -137,7 +143,7 @@ SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::si
     ++alike;
     result.reach = std::max(result.reach, static_cast<double>(other.point.head<2>().norm()));
   }
-  result.steady = static_cast<double>(alike) / static_cast<double>(returns.size());
+  result.steady = static_cast<double>(alike) / static_cast<double>(scans);
   return result;
 }
 
