@@ -41,9 +41,9 @@ class BeliefUpdater {
                         "posterior above which a cluster is dynamic (Eq. 19)"});
       visitor(Parameter{"prior", self.prior, open(0, 1), "",
                         "probability of being dynamic before any observation (Eq. 14)"});
-      visitor(Parameter{"vanished_weight", self.vanished_weight, closed(1, 10), "",
-                        "weight of a cell that is empty in the observation or in the cluster "
-                        "(Eq. 18)"});
+      visitor(Parameter{
+          "vanished_weight", self.vanished_weight, closed(1, 10), "",
+          "weight of a cell that is empty in the observation or in the cluster (Eq. 18)"});
     }
 
     /// Throws ConfigError.

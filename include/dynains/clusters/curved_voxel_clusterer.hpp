@@ -72,7 +72,7 @@ class CurvedVoxelClusterer {
       visitor(Parameter{"voxel_elevation", self.voxel_elevation, closed(0, 45), "deg",
                         "height of a curved voxel; 0: from the sensor"});
       visitor(Parameter{"cluster_range", self.cluster_range, half_open_below(0, 1000), "m",
-                        "points farther away belong to no cluster and stay static"});
+                        "farther points belong to no cluster and stay static"});
     }
 
     /// Number of cells of the grid. The length of a row is padded to a power of two.

@@ -67,9 +67,8 @@ class OccupancyDescriptor {
                         "size of the cells of the belief relative to those of the descriptor"});
       visitor(Parameter{"ignored_low", self.ignored_low, closed(0, 0.9), "",
                         "lowest share of an object of more than 1 m that no descriptor counts"});
-      visitor(
-          Parameter{"bounds_of_ends", self.bounds_of_ends, Bounds(), "",
-                    "the descriptor spans the oldest and the newest observation alone; else all"});
+      visitor(Parameter{"bounds_of_ends", self.bounds_of_ends, Bounds(), "",
+                        "the descriptor spans the oldest and the newest observation alone"});
     }
 
     /// Throws ConfigError.

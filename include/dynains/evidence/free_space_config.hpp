@@ -70,60 +70,58 @@ struct FreeSpaceConfig {
                       "later scans that are used before a verdict is final"});
     visitor(Parameter{"lookback_scans", self.lookback_scans, closed(0, 200), "scans",
                       "earlier scans that are used as evidence"});
-    visitor(
-        Parameter{"reference_step", self.reference_step, closed(1, 10), "scans",
-                  "distance between two reference scans, which give evidence on other scans; about "
-                  "10 for those more than 30 scans back"});
+    visitor(Parameter{
+        "reference_step", self.reference_step, closed(1, 10), "scans",
+        "distance between two reference scans; about 10 for those more than 30 scans back"});
     visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
-                      "points at a larger horizontal range are not tested for free space"});
+                      "points at a larger horizontal range are not tested"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
                       "edge of the supervoxels, whose samples share a belief"});
     visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 64), "",
                       "maximum number of samples of a supervoxel"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "edge of the voxels that have one ground sample each"});
-    visitor(Parameter{"test_ground", self.test_ground, Bounds(), "",
-                      "the ground is tested for free space, too, and gives the height of the "
-                      "ground around for footprint_rise"});
+    visitor(Parameter{
+        "test_ground", self.test_ground, Bounds(), "",
+        "test the ground for free space, too; gives the ground around for footprint_rise"});
     visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
                       "a beam passes a sample if its range is larger by at least this much"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
                       "growth of the margin with range"});
-    visitor(Parameter{"lateral_margin", self.lateral_margin, closed(0, 1), "m",
-                      "no sample at a smaller lateral distance from a return, or in its 3x3 cells, "
-                      "is free"});
+    visitor(Parameter{
+        "lateral_margin", self.lateral_margin, closed(0, 1), "m",
+        "no sample at a smaller lateral distance from a return, or in its 3x3 cells, is free"});
     visitor(Parameter{"pose_tolerance", self.pose_tolerance, closed(0, 1), "m",
                       "poses whose static surfaces lie farther than this (rms) from those of "
-                      "earlier scans are corrected for comparisons; 0: poses are not checked"});
+                      "earlier scans are corrected for comparisons; 0: never"});
     visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
-                      "update probability of a reference whose beams pass (form of Eq. 18)"});
+                      "update probability of a reference whose beams pass (as Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",
-                      "update probability of a reference whose beams hit (form of Eq. 18)"});
+                      "update probability of a reference whose beams hit (as Eq. 18)"});
   }
 
   template <class Self, class Visitor>
   static void visit_verdicts(Self& self, Visitor& visitor) {
     visitor(Parameter{"tau_free", self.tau_free, open(0.5, 1), "",
-                      "belief from which a supervoxel without hits was free (form of Eq. 19)"});
+                      "belief from which a supervoxel without hits was free (as Eq. 19)"});
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
-                      "belief from which a supervoxel with hits was free (form of Eq. 19)"});
+                      "belief from which a supervoxel with hits was free (as Eq. 19)"});
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
                       "ratio of free to decided samples from which the whole instance is removed"});
     visitor(Parameter{"large_removal_ratio", self.large_removal_ratio, half_open_below(0, 1), "",
-                      "removal_ratio of instances that are longer than track_length or higher than "
-                      "track_height"});
+                      "removal_ratio of instances beyond track_length or track_height"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
-                      "ground at a smaller distance from removed points is removed; 0: none"});
-    visitor(Parameter{"footprint_rise", self.footprint_rise, closed(0, 1), "m",
-                      "ground in the footprint is removed only if it lies this much above the "
-                      "ground around; 0: all of it is removed"});
+                      "ground at a smaller distance from removed points is removed"});
+    visitor(Parameter{
+        "footprint_rise", self.footprint_rise, closed(0, 1), "m",
+        "ground in the footprint is removed only if it lies this much above the ground around"});
     visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
                       "propagate beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
-                      "belief along its track from which an instance is dynamic (form of Eq. 19)"});
+                      "belief along its track from which an instance is dynamic (as Eq. 19)"});
     visitor(Parameter{"track_ratio", self.track_ratio, closed(0, 1), "",
-                      "ratio of free to decided samples along its track from which an instance is "
-                      "removed whole although less than half of its own are free"});
+                      "ratio of free to decided samples along its track that the removal of a "
+                      "whole instance needs if less than half of its own are free"});
     visitor(Parameter{"track_cell", self.track_cell, closed(0.2, 5), "m",
                       "cells whose overlap links instances of consecutive scans"});
     visitor(Parameter{"track_overlap", self.track_overlap, half_open_below(0, 1), "",
@@ -139,8 +137,7 @@ struct FreeSpaceConfig {
                       "ratio of dynamic to all samples of a cell above which the others are "
                       "removed, too; 1: never"});
     visitor(Parameter{"ignore_dynamic_returns", self.ignore_dynamic_returns, Bounds(), "",
-                      "returns of surely dynamic points neither count as hits nor as lateral or "
-                      "3x3 protection"});
+                      "returns of surely dynamic points neither hit nor protect"});
     visitor(Parameter{
         "presume_dynamic", self.presume_dynamic, Bounds(), "",
         "the zero-latency verdict removes compact instances at places without "

@@ -74,15 +74,14 @@ struct GroundConfig {
     visitor(Parameter{"ground_uprightness", self.ground_uprightness, closed(0, 1), "",
                       "smallest vertical component of a ground plane's normal"});
     visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
-                      "depth under the ground, as a ratio of sensor_height, from which points "
-                      "of the inner zone do not seed a plane"});
+                      "depth under the ground, as a ratio of sensor_height, from which points of "
+                      "the inner zone seed no plane"});
     visitor(Parameter{"noise_depth", self.noise_depth, closed(0, 100), "",
-                      "points at a larger depth under the sensor, as a ratio of sensor_height, are "
+                      "points deeper under the sensor, as a ratio of sensor_height, are "
                       "reflections and not judged (Patchwork); 0: all are judged"});
-    visitor(
-        Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
-                  "a patch more than this above most of its neighbours is not ground, except in "
-                  "the outermost zone; 0: no such check"});
+    visitor(Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
+                      "a patch more than this above most of its neighbours is not ground, except "
+                      "in the outermost zone; 0: no such check"});
     visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
                       "height over ground from which a patch of ring 1 must be flat"});
     visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",

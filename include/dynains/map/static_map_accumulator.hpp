@@ -38,7 +38,7 @@ class StaticMapAccumulator {
     template <class Self, class Visitor>
     static void visit(Self& self, Visitor&& visitor) {
       visitor(Parameter{"map_voxel", self.map_voxel, closed(0, 10), "m",
-                        "resolution of the static map, one measured point per voxel; 0 keeps all"});
+                        "resolution: one measured point per voxel; 0 keeps all"});
     }
 
     /// Throws ConfigError.
