@@ -45,8 +45,10 @@ Points points_of(const dynains::simulation::SimulatedScan& scan) {
 
 int main(int argc, char** argv) {
   dynains::simulation::Config street;
-  street.scene = dynains::simulation::scene_from_name(argc > 1 ? argv[1] : "crowd");
-  street.sensor = dynains::simulation::sensor_from_name(argc > 2 ? argv[2] : "os1-64");
+  street.scene =
+      dynains::value_of_name<dynains::simulation::Scene>(argc > 1 ? argv[1] : "crowd").value();
+  street.sensor =
+      dynains::value_of_name<dynains::simulation::Sensor>(argc > 2 ? argv[2] : "os1-64").value();
   street.scans = argc > 3 ? std::atoi(argv[3]) : 100;
   street.seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1;
   dynains::simulation::Simulator simulator(street);

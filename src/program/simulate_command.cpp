@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <functional>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -20,36 +19,26 @@ namespace dynains::program {
 namespace {
 
 constexpr const char* kFolder = "kitti";
-constexpr const char* kRandom = "random";  // everything is drawn from the seed
 constexpr const char* kLog = "mcap";
 constexpr const char* kLogName = "drive.mcap";
 
 struct SimulateOptions {
   std::string out;
-  std::string scene = "urban";
-  std::string sensor = "hdl64";
-  std::string labelling = "ever";
   std::string format = kFolder;
   bool force = false;
   bool quiet = false;
+  bool is_random = false;
   ParameterFlags flags;
-  std::function<bool()> has_sensor;  ///< whether a sensor was asked for
 };
 
 simulation::Config make_config(const SimulateOptions& options) {
   simulation::Config config;
   const ParameterValues values = options.flags.values();
-  if (options.scene == kRandom) {
-    values.apply(config);  // the seed
-    config = simulation::random_world(config.seed);
-  } else {
-    config.scene = simulation::scene_from_name(options.scene);
-  }
-  if (options.scene != kRandom || options.has_sensor()) {
-    config.sensor = simulation::sensor_from_name(options.sensor);
-  }
-  config.labelling = simulation::labelling_from_name(options.labelling);
   values.apply(config);
+  if (options.is_random) {
+    config = simulation::random_world(config.seed);
+    values.apply(config);
+  }
   config.validate();
   if (config.rolling_shutter && config.deskewed <= 0 && options.format == kFolder) {
     throw ConfigError(
@@ -82,17 +71,9 @@ OutputListing listing_of(const simulation::Simulator& simulator, const std::stri
   return listing;
 }
 
-template <class Enum>
-const std::string& name_of(Enum value, const std::vector<std::string>& names) {
-  return names.at(static_cast<std::size_t>(value));
-}
-
 /// Everything that is needed to make this sequence again.
 nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config) {
   nlohmann::ordered_json json = begin_marker(simulation_output_kind());
-  json["scene"] = name_of(config.scene, simulation::scene_names());
-  json["sensor"] = name_of(config.sensor, simulation::sensor_names());
-  json["labelling"] = options.labelling;
   json["format"] = options.format;
   simulation::Config::visit(
       config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
@@ -124,12 +105,6 @@ void simulate(const SimulateOptions& options) {
   if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
-std::string list(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 }  // namespace
 
 void add_simulate_command(CLI::App& app) {
@@ -140,18 +115,8 @@ void add_simulate_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command.add_flag("--force", options->force, "replace an earlier simulation in OUT");
-  const auto add_choice = [&](const char* flag, std::string& value,
-                              const std::vector<std::string>& names) {
-    return command.add_option(flag, value, list(names) + " [" + value + ']')
-        ->check(CLI::IsMember(names))
-        ->type_name("NAME");
-  };
-  std::vector<std::string> scenes = simulation::scene_names();
-  scenes.push_back(kRandom);
-  add_choice("--scene", options->scene, scenes);
-  const CLI::Option* sensor = add_choice("--sensor", options->sensor, simulation::sensor_names());
-  options->has_sensor = [sensor] { return sensor->count() > 0; };
-  add_choice("--labelling", options->labelling, simulation::labelling_names());
+  command.add_flag("--random", options->is_random,
+                   "draw scene, sensor and every parameter that is not given from the seed");
   command
       .add_option("--format", options->format,
                   "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap [kitti]")
@@ -159,9 +124,7 @@ void add_simulate_command(CLI::App& app) {
       ->type_name("kitti|mcap");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
-  command.footer(
-      "The same flags give the same files. --scene random draws scene, sensor and every parameter "
-      "that is not given from the seed. simulation.json keeps them.");
+  command.footer("The same flags give the same files. simulation.json keeps all parameters.");
   command.callback([options] { simulate(*options); });
 }
 

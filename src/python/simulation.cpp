@@ -29,10 +29,11 @@ struct ScanOfArrays {
 Simulator make_simulator(const std::string& scene, const std::string& sensor,
                          const std::string& labelling, const py::kwargs& parameters) {
   simulation::Config config;
-  config.scene = simulation::scene_from_name(scene);
-  config.sensor = simulation::sensor_from_name(sensor);
-  config.labelling = simulation::labelling_from_name(labelling);
-  assign_all(config, parameters);
+  py::dict values = parameters;
+  values["scene"] = scene;
+  values["sensor"] = sensor;
+  values["labelling"] = labelling;
+  assign_all(config, values);
   const py::gil_scoped_release release;
   return Simulator(config);
 }
@@ -63,8 +64,7 @@ std::string represent(const Simulator& simulator) {
   const simulation::Config& config = simulator.config();
   std::ostringstream text;
   text << "<dynains.Simulator: " << simulator.size() << " scans of scene "
-       << simulation::scene_names()[static_cast<std::size_t>(config.scene)] << ", sensor "
-       << simulation::sensor_names()[static_cast<std::size_t>(config.sensor)] << ", seed "
+       << plain_value(config.scene) << ", sensor " << plain_value(config.sensor) << ", seed "
        << config.seed << '>';
   return text.str();
 }
@@ -83,20 +83,16 @@ void bind_simulation(py::module_& module) {
       .def("__repr__", [](const ScanOfArrays& scan) { return represent(scan); });
 
   std::string doc =
-      "A labelled street, measured by ray casting: simulator[i] is scan i.\n\nScenes:";
-  for (const std::string& name : simulation::scene_names()) doc += ' ' + name;
-  doc += "\nSensors:";
-  for (const std::string& name : simulation::sensor_names()) doc += ' ' + name;
-  doc += "\nLabelling:";
-  for (const std::string& name : simulation::labelling_names()) doc += ' ' + name;
-  doc += "\nParameters by name:\n";
+      "A labelled street, measured by ray casting: simulator[i] is scan i.\n\nParameters by "
+      "name:\n";
   simulation::Config defaults;
   simulation::Config::visit(defaults, [&doc](const auto& parameter) {
     doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
   });
   py::class_<Simulator>(module, "Simulator", doc.c_str())
       .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
-           py::arg("labelling") = "ever", "Raises ConfigError for unknown names and values.")
+           py::arg("labelling") = "ever",
+           "Raises ConfigError for unknown names, TypeError for other values.")
       .def("__len__", &Simulator::size)
       .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.")
       .def("write", &write, py::arg("folder"),

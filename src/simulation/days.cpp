@@ -7,6 +7,7 @@
 
 #include "dynains/simulation/simulator.hpp"
 #include "simulation/materials.hpp"
+#include "simulation/model_parts.hpp"
 #include "simulation/random.hpp"
 #include "simulation/scenes/layout.hpp"
 #include "simulation/world.hpp"
@@ -29,42 +30,27 @@ constexpr Change kChanges[] = {
     {ChangeKind::kFence, 1, 2},     {ChangeKind::kTree, 1, 3},
 };
 
-Model model_of(ChangeKind kind, const Size& size, Random& random) {
+/// Class, size and shape of a change.
+Object object_of(ChangeKind kind, Random& random) {
+  Object object;
   switch (kind) {
     case ChangeKind::kFence:
-      return fence_model(size.length, size.height, false);
+      object.label = semantic::kFence;
+      object.size = {6.0, 0.1, 1.8};
+      object.model = fence_model(6.0, 1.8, false);
+      break;
     case ChangeKind::kTree:
-      return tree_model(size.height, 1.8, 2.4, random);
+      object.label = semantic::kVegetation;
+      object.size = {0.4, 0.4, 7.0};
+      object.model = tree_model(7.0, 1.8, 2.4, random);
+      break;
     case ChangeKind::kContainer:
+      object.label = semantic::kOtherObject;
+      object.size = {4.0, 1.6, 1.7};
+      object.model = {block(materials::kStreetFurniture, -2.0, 2.0, -0.8, 0.8, 0, 1.7)};
       break;
   }
-  const auto half = [](double edge) { return static_cast<float>(edge / 2); };
-  return {make_primitive(Shape::kBox, materials::kStreetFurniture, {0, 0, half(size.height)},
-                         {half(size.length), half(size.width), half(size.height)}, rotation_z(0))};
-}
-
-Size size_of(ChangeKind kind) {
-  switch (kind) {
-    case ChangeKind::kFence:
-      return {6.0, 0.1, 1.8};
-    case ChangeKind::kTree:
-      return {0.4, 0.4, 7.0};
-    case ChangeKind::kContainer:
-      break;
-  }
-  return {4.0, 1.6, 1.7};
-}
-
-std::uint16_t label_of(ChangeKind kind) {
-  switch (kind) {
-    case ChangeKind::kFence:
-      return semantic::kFence;
-    case ChangeKind::kTree:
-      return semantic::kVegetation;
-    case ChangeKind::kContainer:
-      break;
-  }
-  return semantic::kOtherObject;
+  return object;
 }
 
 /// Puts the changes of all days on the pavements beside the way of the sensor, and those of this
@@ -76,10 +62,10 @@ void add_changes(const World& layout, const Config& config, Traffic& traffic) {
   std::uint32_t instance = kFirstChange;
   const double way = travel(config, 8.5);
   for (const Change& change : kChanges) {
-    const std::uint32_t number = instance++;
-    const Size size = size_of(change.kind);
     Random model_random = random.fork(random.bits());
-    const Model model = model_of(change.kind, size, model_random);
+    Object object = object_of(change.kind, model_random);
+    object.instance = instance++;
+    const Size size = object.size;
     for (int attempt = 0; attempt < 200; ++attempt) {
       const double s = kBefore + random.uniform(0.1, 0.9) * way;
       const int side = random.chance(0.5) ? 1 : -1;
@@ -93,11 +79,6 @@ void add_changes(const World& layout, const Config& config, Traffic& traffic) {
       if (is_on_street || !taken.is_free(place, 0.3)) continue;
       taken.add(place);
       if (config.day < change.first_day || config.day > change.last_day) break;
-      Object object;
-      object.size = size;
-      object.model = model;
-      object.label = label_of(change.kind);
-      object.instance = number;
       traffic.objects.push_back(std::move(object));
       traffic.fixed.add(place);
       traffic.parked.push_back({static_cast<std::uint32_t>(traffic.objects.size() - 1), at, 0, 0});
@@ -112,8 +93,7 @@ World on_day(World layout, World day, const Config& config) {
   Traffic traffic = std::move(day.traffic);
   traffic.fixed = layout.traffic.fixed;
   for (const ObjectPose& pose : traffic.parked) {
-    const Size& size = traffic.objects[pose.object].size;
-    traffic.fixed.add({pose.at.position, pose.at.heading, size.length / 2, size.width / 2});
+    traffic.fixed.add(traffic.footprint_of(pose.object, pose.at));
   }
   add_changes(layout, config, traffic);
   // Nobody starts inside something of the place.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/grid_index.hpp"
+
 namespace dynains::simulation {
 namespace {
 
@@ -33,10 +35,8 @@ bool overlap(const Footprint& a, const Footprint& b) {
 }
 
 std::uint64_t FootprintSet::key(Vec2 p) {
-  const auto x = static_cast<std::int32_t>(std::floor(p.x / kCell));
-  const auto y = static_cast<std::int32_t>(std::floor(p.y / kCell));
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32) |
-         static_cast<std::uint32_t>(y);
+  return cell_key(static_cast<int>(std::floor(p.x / kCell)),
+                  static_cast<int>(std::floor(p.y / kCell)));
 }
 
 void FootprintSet::add(const Footprint& footprint) {

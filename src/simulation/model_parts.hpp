@@ -22,6 +22,19 @@ inline Primitive post(const Material& material, double x, double y, double z0, d
                         vec(radius, radius, (z1 - z0) / 2));
 }
 
+/// A cylinder along `rotation` times z.
+inline Primitive rod(const Material& material, Vec3 centre, double radius, double length,
+                     const Mat3& rotation) {
+  return make_primitive(Shape::kCylinder, material, centre, vec(radius, radius, length / 2),
+                        rotation);
+}
+
+/// A wheel that stands on the ground, across the x axis.
+inline Primitive wheel(const Material& material, double x, double y, double radius,
+                       double half_width) {
+  return rod(material, vec(x, y, radius), radius, 2 * half_width, rotation_x(kPi / 2));
+}
+
 inline Primitive ball(const Material& material, double x, double y, double z, double rx, double ry,
                       double rz, const Mat3& rotation = {}) {
   return make_primitive(Shape::kEllipsoid, material, vec(x, y, z), vec(rx, ry, rz), rotation);

@@ -9,6 +9,25 @@
 namespace dynains::simulation {
 namespace {
 
+/// Classes of a kind at rest and in motion; its smallest size, and how much larger it may be.
+struct Traits {
+  std::uint16_t resting, moving;
+  Size least, more;  // m
+};
+
+const Traits& traits_of(Kind kind) {
+  using namespace semantic;
+  static constexpr Traits kTraits[] = {
+      {kCar, kMovingCar, {3.6, 1.65, 1.4}, {1.2, 0.2, 0.3}},
+      {kCar, kMovingCar, {4.8, 1.9, 2.0}, {1.4, 0.15, 0.6}},  // van
+      {kTruck, kMovingTruck, {7, 2.4, 3.1}, {8, 0.15, 0.7}},
+      {kBus, kMovingBus, {10.5, 2.5, 3.0}, {2, 0, 0.2}},
+      {kPerson, kMovingPerson, {0.5, 0.5, 1.5}, {0, 0.15, 0.4}},
+      {kBicyclist, kMovingBicyclist, {1.75, 0.6, 1.65}, {0, 0, 0.2}},
+  };
+  return kTraits[static_cast<std::size_t>(kind)];
+}
+
 /// A limb that hangs from (x, y, z), turned by `swing` about the y axis.
 Primitive limb(const Material& material, double x, double y, double z, double length, double radius,
                double swing) {
@@ -17,12 +36,9 @@ Primitive limb(const Material& material, double x, double y, double z, double le
 }
 
 void add_wheels(Model& model, double front, double rear, double width, double radius) {
-  const Mat3 axle = rotation_x(kPi / 2);
   for (const double x : {front, rear}) {
     for (const double side : {-1.0, 1.0}) {
-      model.push_back(make_primitive(Shape::kCylinder, materials::kTyre,
-                                     vec(x, side * (width / 2 - 0.12), radius),
-                                     vec(radius, radius, 0.11), axle));
+      model.push_back(wheel(materials::kTyre, x, side * (width / 2 - 0.12), radius, 0.11));
     }
   }
 }
@@ -96,57 +112,15 @@ void add_bus(Model& model, const Size& size, const Material& paint) {
 
 }  // namespace
 
-std::uint16_t resting_label(Kind kind) {
-  switch (kind) {
-    case Kind::kTruck:
-      return semantic::kTruck;
-    case Kind::kBus:
-      return semantic::kBus;
-    case Kind::kPedestrian:
-      return semantic::kPerson;
-    case Kind::kCyclist:
-      return semantic::kBicyclist;
-    case Kind::kCar:
-    case Kind::kVan:
-      break;
-  }
-  return semantic::kCar;
-}
-
-std::uint16_t moving_label(Kind kind) {
-  switch (kind) {
-    case Kind::kTruck:
-      return semantic::kMovingTruck;
-    case Kind::kBus:
-      return semantic::kMovingBus;
-    case Kind::kPedestrian:
-      return semantic::kMovingPerson;
-    case Kind::kCyclist:
-      return semantic::kMovingBicyclist;
-    case Kind::kCar:
-    case Kind::kVan:
-      break;
-  }
-  return semantic::kMovingCar;
-}
+std::uint16_t resting_label(Kind kind) { return traits_of(kind).resting; }
+std::uint16_t moving_label(Kind kind) { return traits_of(kind).moving; }
 
 Size random_size(Kind kind, Random& random) {
+  const Size& least = traits_of(kind).least;
+  const Size& more = traits_of(kind).more;
   const double a = random.unit(), b = random.unit(), c = random.unit();
-  switch (kind) {
-    case Kind::kCar:
-      return {3.6 + 1.2 * a, 1.65 + 0.2 * b, 1.4 + 0.3 * c};
-    case Kind::kVan:
-      return {4.8 + 1.4 * a, 1.9 + 0.15 * b, 2.0 + 0.6 * c};
-    case Kind::kTruck:
-      return {7 + 8 * a, 2.4 + 0.15 * b, 3.1 + 0.7 * c};
-    case Kind::kBus:
-      return {10.5 + 2 * a, 2.5, 3.0 + 0.2 * c};
-    case Kind::kPedestrian:
-      return {0.5, 0.5 + 0.15 * b, 1.5 + 0.4 * c};
-    case Kind::kCyclist:
-      return {1.75, 0.6, 1.65 + 0.2 * c};
-  }
-  return {};
+  return {least.length + more.length * a, least.width + more.width * b,
+          least.height + more.height * c};
 }
 
 Model vehicle_model(Kind kind, const Size& size, Random& random) {
@@ -206,11 +180,9 @@ Model cyclist_model(const Size& size, std::uint64_t seed, double phase) {
   Random random(seed);
   const Material& top = random.chance(0.4) ? materials::kDarkCloth : materials::kBrightCloth;
   const double h = size.height, swing = 0.4 * std::sin(phase);
-  const Mat3 axle = rotation_x(kPi / 2);
   Model model;
   for (const double x : {-0.52, 0.52}) {
-    model.push_back(make_primitive(Shape::kCylinder, materials::kMetal, vec(x, 0, 0.34),
-                                   vec(0.34, 0.34, 0.03), axle));
+    model.push_back(wheel(materials::kMetal, x, 0, 0.34, 0.03));
   }
   model.push_back(block(materials::kDarkCloth, -0.35, 0.45, -0.03, 0.03, 0.5, 0.62));
   model.push_back(block(materials::kDarkCloth, 0.38, 0.46, -0.28, 0.28, 0.95, 1.0));

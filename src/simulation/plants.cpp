@@ -13,8 +13,7 @@ Vec3 add_branch(Model& model, Vec3 from, double heading, double tilt, double len
                 double radius) {
   const Mat3 rotation = rotation_z(heading) * rotation_y(tilt);
   const Vec3 along = rotation * vec(0, 0, length);
-  model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk, from + 0.5F * along,
-                                 vec(radius, radius, length / 2), rotation));
+  model.push_back(rod(materials::kTreeTrunk, from + 0.5F * along, radius, length, rotation));
   return from + along;
 }
 
@@ -38,20 +37,14 @@ Model tree_model(double height, double crown_radius, double clear_height, Random
   Model model;
   const double trunk = 0.08 + 0.018 * height * random.uniform(0.7, 1.3);
   const double lean = random.uniform(-0.04, 0.04);
-  model.push_back(make_primitive(
-      Shape::kCylinder, materials::kTreeTrunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3),
-      vec(trunk, trunk, 0.5 * (clear_height + 1) + 0.3), rotation_y(lean)));
+  model.push_back(rod(materials::kTreeTrunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3), trunk,
+                      2 * (0.5 * (clear_height + 1) + 0.3), rotation_y(lean)));
   const double middle = 0.5 * (clear_height + height);
   const double half = 0.5 * (height - clear_height);
   // Limbs inside the crown.
   for (int i = 0; i < 3; ++i) {
     const double heading = random.uniform(0, 2 * kPi), tilt = random.uniform(0.3, 0.9);
-    const double length = 0.8 * half;
-    const Mat3 rotation = rotation_z(heading) * rotation_y(tilt);
-    const Vec3 along = rotation * vec(0, 0, length / 2);
-    model.push_back(make_primitive(Shape::kCylinder, materials::kTreeTrunk,
-                                   vec(0, 0, clear_height + 0.3) + along,
-                                   vec(0.45 * trunk, 0.45 * trunk, length / 2), rotation));
+    add_branch(model, vec(0, 0, clear_height + 0.3), heading, tilt, 0.8 * half, 0.45 * trunk);
   }
   // One thin ball as the whole, dense ones as boughs.
   const bool thin = random.chance(0.3);

@@ -211,9 +211,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
 }
 
 const Terrain::Tile& Terrain::tile(int ix, int iy) {
-  const std::uint64_t key = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(ix)) << 32) |
-                            static_cast<std::uint32_t>(iy);
-  std::unique_ptr<Tile>& slot = tiles_[key];
+  std::unique_ptr<Tile>& slot = tiles_[cell_key(ix, iy)];
   if (!slot) {
     slot = std::make_unique<Tile>();
     build(ix, iy, *slot);

@@ -7,19 +7,14 @@
 namespace dynains::simulation {
 
 Model bicycle_model() {
-  const Mat3 axle = rotation_x(kPi / 2);
-  Model model;
-  for (const double x : {-0.52, 0.52}) {
-    model.push_back(make_primitive(Shape::kCylinder, materials::kMetal, vec(x, 0, 0.34),
-                                   vec(0.34, 0.34, 0.03), axle));
-  }
   const Material& frame = materials::kBicycleFrame;
-  model.push_back(block(frame, -0.35, 0.4, -0.02, 0.02, 0.58, 0.62));
-  model.push_back(block(frame, -0.02, 0.02, -0.02, 0.02, 0.3, 0.9));
-  model.push_back(block(frame, -0.15, 0.1, -0.08, 0.08, 0.88, 0.95));
-  model.push_back(block(frame, 0.4, 0.44, -0.28, 0.28, 0.98, 1.02));
-  model.push_back(block(frame, 0.4, 0.44, -0.02, 0.02, 0.34, 1.0));
-  return model;
+  return {wheel(materials::kMetal, -0.52, 0, 0.34, 0.03),
+          wheel(materials::kMetal, 0.52, 0, 0.34, 0.03),
+          block(frame, -0.35, 0.4, -0.02, 0.02, 0.58, 0.62),
+          block(frame, -0.02, 0.02, -0.02, 0.02, 0.3, 0.9),
+          block(frame, -0.15, 0.1, -0.08, 0.08, 0.88, 0.95),
+          block(frame, 0.4, 0.44, -0.28, 0.28, 0.98, 1.02),
+          block(frame, 0.4, 0.44, -0.02, 0.02, 0.34, 1.0)};
 }
 
 Model railing_model(double length, double height, Random& random) {
@@ -27,8 +22,7 @@ Model railing_model(double length, double height, Random& random) {
   const Mat3 along = rotation_y(kPi / 2);
   Model model;
   for (const double z : {0.35 * height, 0.67 * height, height}) {
-    model.push_back(make_primitive(Shape::kCylinder, materials::kRailing, vec(0, 0, z),
-                                   vec(radius, radius, length / 2), along));
+    model.push_back(rod(materials::kRailing, vec(0, 0, z), radius, length, along));
   }
   const double gap = random.uniform(1.2, 2.2);
   for (double x = -length / 2; x <= length / 2; x += gap) {
@@ -58,11 +52,10 @@ Model wire_model(double length, double height, Random& random) {
   for (int i = 0; i < kPieces; ++i) {
     const double u0 = static_cast<double>(i) / kPieces, u1 = static_cast<double>(i + 1) / kPieces;
     const double rise = height_at(u1) - height_at(u0), run = length / kPieces;
-    const double half = 0.5 * std::sqrt(rise * rise + run * run);
-    model.push_back(make_primitive(
-        Shape::kCylinder, materials::kWire,
-        vec((0.5 * (u0 + u1) - 0.5) * length, 0, 0.5 * (height_at(u0) + height_at(u1))),
-        vec(radius, radius, half), rotation_y(kPi / 2 - std::atan2(rise, run))));
+    const Vec3 middle =
+        vec((0.5 * (u0 + u1) - 0.5) * length, 0, 0.5 * (height_at(u0) + height_at(u1)));
+    model.push_back(rod(materials::kWire, middle, radius, std::sqrt(rise * rise + run * run),
+                        rotation_y(kPi / 2 - std::atan2(rise, run))));
   }
   return model;
 }
@@ -79,11 +72,10 @@ Model sign_model(Random& random) {
 
 Model trolley_model(Random& random) {
   const double length = random.uniform(0.8, 1.1);
-  Model model{block(materials::kMesh, -length / 2, length / 2, -0.28, 0.28, 0.45, 1.0)};
-  model.push_back(block(materials::kMesh, -length / 2, length / 2, -0.25, 0.25, 0.12, 0.22));
-  model.push_back(
-      block(materials::kStreetFurniture, -length / 2 - 0.08, -length / 2, -0.28, 0.28, 0.98, 1.03));
-  return model;
+  const double l = length / 2;
+  return {block(materials::kMesh, -l, l, -0.28, 0.28, 0.45, 1.0),
+          block(materials::kMesh, -l, l, -0.25, 0.25, 0.12, 0.22),
+          block(materials::kStreetFurniture, -l - 0.08, -l, -0.28, 0.28, 0.98, 1.03)};
 }
 
 }  // namespace dynains::simulation

@@ -67,28 +67,24 @@ Kind Traffic::random_kind(const Flow& flow) {
   return Kind::kCar;
 }
 
+bool Traffic::is_free_of_drivers(const Footprint& footprint) const {
+  for (const Driver& driver : drivers) {
+    if (driver.active && overlap(footprint, footprint_of(driver.object, place_of(driver)))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 void Traffic::enter(Flow& flow, double s) {
   const Kind kind = random_kind(flow);
   const double factor = random_.uniform(0.85, 1.15);
   const double speed = kind == Kind::kCyclist ? 4.5 * factor : flow.speed * factor;
   const std::size_t object = add_object(kind);
-  Footprint footprint;
-  const Waypoint at = lanes[flow.lane].route.at(s);
-  footprint.centre = at.position;
-  footprint.heading = at.heading;
+  Footprint footprint = footprint_of(object, lanes[flow.lane].route.at(s));
   footprint.half_length = objects[object].size.length / 2 + 3 + 0.5 * speed;
-  footprint.half_width = objects[object].size.width / 2;
   // Nobody appears inside somebody else.
-  for (const Driver& driver : drivers) {
-    if (!driver.active) continue;
-    const Waypoint other = lanes[driver.lane].route.at(driver.s);
-    const Size& size = objects[driver.object].size;
-    if (overlap(footprint, {other.position, other.heading, size.length / 2, size.width / 2})) {
-      objects.pop_back();
-      return;
-    }
-  }
-  if (!fixed.is_free(footprint, 0)) {
+  if (!is_free_of_drivers(footprint) || !fixed.is_free(footprint, 0)) {
     objects.pop_back();
     return;
   }
@@ -109,16 +105,12 @@ void Traffic::fill(const Flow& flow) {
 void Traffic::collect_bodies(Vec2 centre, double radius) {
   bodies_.clear();
   auto add = [&](const Waypoint& at, double speed, std::size_t object, std::size_t driver) {
-    const Size& size = objects[object].size;
-    const Kind kind = objects[object].kind;
-    bodies_.push_back({{at.position, at.heading, size.length / 2, size.width / 2},
-                       speed * direction(at.heading),
-                       driver,
-                       kind == Kind::kPedestrian});
+    bodies_.push_back({footprint_of(object, at), speed * direction(at.heading), driver,
+                       objects[object].kind == Kind::kPedestrian});
   };
   for (std::size_t i = 0; i < drivers.size(); ++i) {
     if (!drivers[i].active) continue;
-    const Waypoint at = lanes[drivers[i].lane].route.at(drivers[i].s);
+    const Waypoint at = place_of(drivers[i]);
     if (norm(at.position - centre) < radius) add(at, drivers[i].speed, drivers[i].object, i);
   }
   for (const Walker& walker : walkers) {
@@ -135,7 +127,7 @@ double Traffic::free_distance(const Driver& driver, std::size_t index, double re
   const Lane& lane = lanes[driver.lane];
   const Size& size = objects[driver.object].size;
   const double clearance = size.width / 2 + 0.3;
-  const Vec2 here = lane.route.at(driver.s).position;
+  const Vec2 here = place_of(driver).position;
   std::vector<const Body*> near;
   for (const Body& body : bodies_) {
     if (body.driver == index) continue;
@@ -177,7 +169,7 @@ double Traffic::wanted_speed(const Driver& driver, std::size_t index) const {
     if (time_ >= change.first) cruise = change.second;
   }
   if (driver.waits_for_gap && driver.speed < 0.1 && cruise > 0) {
-    const Waypoint at = lane.route.at(driver.s);
+    const Waypoint at = place_of(driver);
     for (const Body& body : bodies_) {
       if (body.driver == index || norm(body.velocity) < 1) continue;
       const Vec2 towards = at.position - body.footprint.centre;
@@ -329,12 +321,12 @@ void Traffic::walk(Walker& walker, double dt) {
 }
 
 void Traffic::step(double dt) {
-  const Vec2 centre = lanes[drivers[0].lane].route.at(drivers[0].s).position;
+  const Vec2 centre = place_of(drivers[0]).position;
   collect_bodies(centre, kActiveRadius + 40);
   for (std::size_t i = 0; i < drivers.size(); ++i) {
     Driver& driver = drivers[i];
     if (!driver.active) continue;
-    const Vec2 at = lanes[driver.lane].route.at(driver.s).position;
+    const Vec2 at = place_of(driver).position;
     if (norm(at - centre) > kActiveRadius) {
       driver.acceleration = 0;
       continue;
@@ -344,7 +336,7 @@ void Traffic::step(double dt) {
   for (Driver& driver : drivers) {
     const double before = driver.speed;
     if (!driver.active) continue;
-    const Vec2 at = lanes[driver.lane].route.at(driver.s).position;
+    const Vec2 at = place_of(driver).position;
     if (norm(at - centre) > kActiveRadius) continue;
     driver.speed = std::max(0.0, before + dt * driver.acceleration);
     driver.s += 0.5 * dt * (before + driver.speed);
@@ -368,7 +360,7 @@ void Traffic::step(double dt) {
     }
   }
   time_ += dt;
-  const double heading = lanes[drivers[0].lane].route.at(drivers[0].s).heading;
+  const double heading = place_of(drivers[0]).heading;
   if (time_ > 1.5 * dt) {
     // Acceleration of a body with a bounded turn rate.
     turn_rate_ += 0.2 * (wrap(heading - last_heading_) / dt - turn_rate_);
@@ -378,7 +370,7 @@ void Traffic::step(double dt) {
 
 EgoPose Traffic::ego() const {
   const Driver& driver = drivers[0];
-  return {lanes[driver.lane].route.at(driver.s), driver.speed, driver.acceleration, turn_rate_};
+  return {place_of(driver), driver.speed, driver.acceleration, turn_rate_};
 }
 
 std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
@@ -398,8 +390,8 @@ std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
   for (std::size_t i = 1; i < drivers.size(); ++i) {
     const Driver& driver = drivers[i];
     if (!driver.active) continue;
-    add({static_cast<std::uint32_t>(driver.object), lanes[driver.lane].route.at(driver.s),
-         driver.speed, 1.1 * driver.s});
+    add({static_cast<std::uint32_t>(driver.object), place_of(driver), driver.speed,
+         1.1 * driver.s});
   }
   for (const Walker& walker : walkers) {
     add({static_cast<std::uint32_t>(walker.object),

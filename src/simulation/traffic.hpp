@@ -132,6 +132,13 @@ class Traffic {
   /// Vehicles all along the lane at random gaps, except near drivers that are already there.
   void fill(const Flow& flow);
 
+  Waypoint place_of(const Driver& driver) const { return lanes[driver.lane].route.at(driver.s); }
+  Footprint footprint_of(std::size_t object, const Waypoint& at) const {
+    const Size& size = objects[object].size;
+    return {at.position, at.heading, size.length / 2, size.width / 2};
+  }
+  bool is_free_of_drivers(const Footprint& footprint) const;
+
   /// Advances by `dt` seconds.
   void step(double dt);
   double time() const { return time_; }

@@ -400,7 +400,7 @@ int main(int argc, char** argv) {
     std::cout << " | " << count.percent() << " % of " << count.of;
   };
   for (const std::string& sensor : sensors) {
-    config.sensor = simulation::sensor_from_name(sensor);
+    config.sensor = value_of_name<simulation::Sensor>(sensor).value();
     for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
       config.seed = static_cast<std::uint64_t>(seed);
       const fs::path folder =

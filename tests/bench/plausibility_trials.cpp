@@ -398,10 +398,8 @@ int main(int argc, char** argv) {
   for (std::uint64_t seed = from; seed < from + worlds; ++seed) {
     simulation::Config config = simulation::random_world(seed);
     config.scans = static_cast<int>(number(3, 40));
-    const std::string world = std::to_string(seed) + ' ' +
-                              simulation::scene_names()[static_cast<std::size_t>(config.scene)] +
-                              ' ' +
-                              simulation::sensor_names()[static_cast<std::size_t>(config.sensor)];
+    const std::string world =
+        std::to_string(seed) + ' ' + plain_value(config.scene) + ' ' + plain_value(config.sensor);
     const Scans scans = test::simulate(config);
     double usual = 0.0;
     for (const Kind& kind : kinds()) {

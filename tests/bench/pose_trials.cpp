@@ -251,13 +251,13 @@ int main(int argc, char** argv) {
   const fs::path folder = ::mkdtemp(pattern.data());
   fs::create_directory(folder / "velodyne");
   std::size_t number = 0;
-  for (const std::string& scene : simulation::scene_names()) {
+  for (const std::string scene : simulation::kSceneNames) {
     for (const char* const sensor : {"hdl64", "vlp16", "os1-64", "hdl32", "livox"}) {
       if (scene == "static" || number++ % every != 0) continue;
       if (only != "all" && scene != only) continue;
       simulation::Config config;
-      config.scene = simulation::scene_from_name(scene);
-      config.sensor = simulation::sensor_from_name(sensor);
+      config.scene = value_of_name<simulation::Scene>(scene).value();
+      config.sensor = value_of_name<simulation::Sensor>(sensor).value();
       config.scans = static_cast<int>(kScans);
       config.seed = first_seed + number;
       simulation::Simulator simulator(config);

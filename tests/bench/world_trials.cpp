@@ -68,10 +68,9 @@ simulation::Config world_of(std::uint64_t seed, const Options& options) {
 
 std::string name_of(const simulation::Config& config) {
   std::ostringstream text;
-  text << config.seed << ' ' << simulation::scene_names()[static_cast<std::size_t>(config.scene)]
-       << ' ' << simulation::sensor_names()[static_cast<std::size_t>(config.sensor)] << ' '
-       << simulation::kGaitNames[static_cast<std::size_t>(config.gait)] << std::setprecision(2)
-       << ' ' << config.sensor_height << "m " << config.ego_speed << "m/s " << config.rate << "Hz";
+  text << config.seed << ' ' << plain_value(config.scene) << ' ' << plain_value(config.sensor)
+       << ' ' << plain_value(config.gait) << std::setprecision(2) << ' ' << config.sensor_height
+       << "m " << config.ego_speed << "m/s " << config.rate << "Hz";
   return text.str();
 }
 

@@ -223,13 +223,11 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
   };
   const Mount mounts[] = {{1.73, 0, 0},  {0.5, 0, 0},   {1.0, -20, 10}, {1.73, 30, 0},
                           {2.5, 5, -25}, {0.7, 0, -30}, {2.0, -10, 0}};
-  const std::vector<std::string>& scenes = sim::scene_names();
-  const std::vector<std::string>& sensors = sim::sensor_names();
-  for (std::size_t i = 0; i < 2 * scenes.size(); ++i) {
+  for (std::size_t i = 0; i < 2 * sim::kSceneNames.size(); ++i) {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
     sim::Config config;
-    config.scene = sim::scene_from_name(scenes[i % scenes.size()]);
-    config.sensor = sim::sensor_from_name(sensors[i % sensors.size()]);
+    config.scene = static_cast<sim::Scene>(i % sim::kSceneNames.size());
+    config.sensor = static_cast<sim::Sensor>(i % sim::kSensorNames.size());
     config.scans = 1;
     config.seed = 11 + i;
     config.sensor_height = mount.height;
@@ -245,7 +243,7 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     if (config.sensor == sim::Sensor::kPandar64) {
       R_body_sensor = R_body_sensor * Eigen::AngleAxisd(90 * kRadians, Eigen::Vector3d::UnitZ());
     }
-    CAPTURE(scenes[i % scenes.size()], sensors[i % sensors.size()], mount.height, mount.pitch,
+    CAPTURE(plain_value(config.scene), plain_value(config.sensor), mount.height, mount.pitch,
             mount.roll, mounting.height, mounting.up_sensor.transpose());
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - mount.height) < 0.12);

@@ -147,7 +147,8 @@ TEST_CASE("simulate refuses a folder that another run writes to") {
 TEST_CASE("simulate refuses unknown values") {
   TemporaryFolder folder;
   const std::string out = folder / "sim";
-  CHECK_THAT(simulate(out, {"--scene", "moon"}).err, ContainsSubstring("moon not in"));
+  CHECK_THAT(simulate(out, {"--scene", "moon"}).err,
+             ContainsSubstring("--scene = moon: expected urban|"));
   CHECK_THAT(simulate(out, {"--scans", "0"}).err, ContainsSubstring("--scans = 0: expected INT"));
   CHECK(simulate(out, {"--scans", "0"}).code == 2);
   CHECK_FALSE(fs::exists(out));

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "dynains/parameters.hpp"
 
@@ -26,6 +25,10 @@ enum class Scene {
   kGarage,      ///< one storey of a multi-storey car park: low ceiling, columns, walls
   kMixed,       ///< a street whose every part is drawn from the seed
 };
+inline constexpr std::array<const char*, 13> kSceneNames = {
+    "urban",    "highway", "vegetation", "crowd",  "stop-and-go", "canopy", "hill",
+    "car-park", "static",  "hall",       "forest", "garage",      "mixed"};
+constexpr const std::array<const char*, 13>& value_names(Scene) { return kSceneNames; }
 
 /// Beam pattern with a typical mounting height and range.
 enum class Sensor {
@@ -40,6 +43,10 @@ enum class Sensor {
   kRaster,    ///< solid state: 126 rows of 630 beams, 120 by 25 deg forward
   kRings,     ///< 16 to 128 beams around, all numbers drawn from the seed
 };
+inline constexpr std::array<const char*, 10> kSensorNames = {
+    "hdl64",    "vlp16", "hdl32",   "os1-64", "os0-128",
+    "pandar64", "livox", "mid-360", "raster", "rings"};
+constexpr const std::array<const char*, 10>& value_names(Sensor) { return kSensorNames; }
 
 /// Rule for the moving labels of an object.
 enum class Labelling {
@@ -48,6 +55,8 @@ enum class Labelling {
   kEver,
   kInstant,  ///< the points in scans at which the object is faster than 0.5 m/s
 };
+inline constexpr std::array<const char*, 2> kLabellingNames = {"ever", "instant"};
+constexpr const std::array<const char*, 2>& value_names(Labelling) { return kLabellingNames; }
 
 /// How the sensor is carried.
 enum class Gait {
@@ -65,16 +74,6 @@ enum class Foliage {
 };
 inline constexpr std::array<const char*, 2> kFoliageNames = {"solid", "open"};
 constexpr const std::array<const char*, 2>& value_names(Foliage) { return kFoliageNames; }
-
-/// Names of the enum values for files and command lines, for example "urban", "hdl64", "ever".
-const std::vector<std::string>& scene_names();
-const std::vector<std::string>& sensor_names();
-const std::vector<std::string>& labelling_names();
-
-/// Enum values of names. They throw ConfigError with the list of valid names.
-Scene scene_from_name(const std::string& name);
-Sensor sensor_from_name(const std::string& name);
-Labelling labelling_from_name(const std::string& name);
 
 /// Parameters of one sequence. visit() gives their bounds.
 struct Config {
@@ -115,6 +114,11 @@ struct Config {
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
+    visitor(Parameter{"scene", self.scene, Bounds{}, "", "place and traffic"});
+    visitor(Parameter{"sensor", self.sensor, Bounds{}, "", "beams, usual height and range"});
+    visitor(Parameter{"labelling", self.labelling, Bounds{}, "",
+                      "whether objects are labelled moving in all scans if they ever move, or at "
+                      "the instant"});
     visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
     visitor(Parameter{"seed", self.seed, Bounds{}, "",
                       "seed of the layout and the traffic of the scene"});

@@ -66,8 +66,7 @@ Model Builder::hedge(double length, double width, double height, Random& random)
 void Builder::park(const Waypoint& at, Kind kind) {
   Traffic& t = world_.traffic;
   const std::size_t object = t.add_object(kind);
-  const Size& size = t.objects[object].size;
-  const Footprint footprint{at.position, at.heading, size.length / 2, size.width / 2};
+  const Footprint footprint = t.footprint_of(object, at);
   if (!t.fixed.is_free(footprint, 0.25)) {
     t.objects.pop_back();
     return;
@@ -155,14 +154,16 @@ void Builder::park_along(const PlaceBeside& at, const Street& street, const Fron
     const Waypoint p = at(s, lateral, turn + kPi);
     if (!used || kind == Kind::kTruck) continue;
     const Footprint f{p.position, p.heading, 3.5, 1.0};
-    bool crossing = false;
-    for (const Street& other : world_.terrain.streets()) {
-      if (&other == &street) continue;
-      const Waypoint q = other.centre.at(other.centre.nearest(p.position));
-      crossing = crossing || norm(q.position - p.position) < other.half_width + 7;
-    }
-    if (!crossing && clearance(f) < 0.6) park(p, kind);
+    if (!is_near_crossing(street, p.position, 7) && clearance(f) < 0.6) park(p, kind);
   }
+}
+
+bool Builder::is_near_crossing(const Street& street, Vec2 p, double margin) const {
+  for (const Street& other : world_.terrain.streets()) {
+    const Vec2 q = other.centre.at(other.centre.nearest(p)).position;
+    if (&other != &street && norm(q - p) < other.half_width + margin) return true;
+  }
+  return false;
 }
 
 void Builder::garden(const PlaceBeside& at, double s, double front, double back,
@@ -314,7 +315,7 @@ void Builder::leaving_car(const Street& street, double s, double lateral_place, 
     t.objects.pop_back();
     return;
   }
-  t.fixed.add({p.position, p.heading, size.length / 2, size.width / 2});
+  t.fixed.add(t.footprint_of(object, p));
   Route route = street.centre.shifted(s - sign * 3, end, lateral);
   const std::size_t path =
       t.add_lane(std::move(route), lines_from(street, s - sign * 3, lateral_lane < 0));
@@ -353,19 +354,6 @@ std::vector<StopLine> Builder::lines_from(const Street& street, double begin, bo
     if (line.s > 0) result.push_back(line);
   }
   return result;
-}
-
-bool Builder::is_free_of_drivers(const Waypoint& at, double half_length) const {
-  const Traffic& t = world_.traffic;
-  for (const Traffic::Driver& driver : t.drivers) {
-    const Waypoint other = t.lanes[driver.lane].route.at(driver.s);
-    const Size& size = t.objects[driver.object].size;
-    if (overlap({at.position, at.heading, half_length, 1.2},
-                {other.position, other.heading, size.length / 2, size.width / 2})) {
-      return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace dynains::simulation

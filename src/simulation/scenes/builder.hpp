@@ -61,6 +61,9 @@ class Builder {
 
   Kind parked_kind();
 
+  /// Whether another street than `street` is nearer to `p` than `margin` (m).
+  bool is_near_crossing(const Street& street, Vec2 p, double margin) const;
+
   /// Buildings, gardens, trees, poles and parked cars on one side (+1 left, -1 right).
   void furnish(const Street& street, int side, const Frontage& look);
 
@@ -104,7 +107,9 @@ class Builder {
   /// As above, for a route that begins at arc length `begin` (m) of the main street.
   std::vector<StopLine> lines_from(const Street& street, double begin, bool with) const;
 
-  bool is_free_of_drivers(const Waypoint& at, double half_length) const;
+  bool is_free_of_drivers(const Waypoint& at, double half_length) const {
+    return world_.traffic.is_free_of_drivers({at.position, at.heading, half_length, 1.2});
+  }
 
  private:
   static std::uint64_t seed_of(const Config& config) {

@@ -76,13 +76,7 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
     const std::vector<StopLine> lines{{middle - main.half_width - 3, i, 1}};
     for (const double lateral : {-kLaneHalf, kLaneHalf}) {
       const std::size_t lane = builder.lane(side, lateral, lines);
-      Traffic::Flow flow;
-      flow.lane = lane;
-      flow.spacing = random.uniform(30, 60) / builder.traffic_scale();
-      flow.speed = speed * 0.8;
-      flow.cyclists = 0.1;
-      flow.trucks = 0.05;
-      traffic.fill(flow);
+      fill_lane(builder, lane, random.uniform(30, 60), speed * 0.8, 0.05, 0.05, 0.1);
     }
     add_turning_car(builder, side, crossings[i].main_s, i, speed);
   }

@@ -51,15 +51,9 @@ void park_angled(Builder& builder, Random& random, const Street& street, int sid
     const bool used = random.chance(occupied), odd = random.chance(0.1);
     Waypoint at = street.centre.beside(s, side * (street.half_width - deep));
     at.heading += (side > 0 ? angle : -angle) + (nose_in != odd ? 0 : kPi) + 0.04 * random.normal();
-    // Not on a side street.
-    bool crossing = false;
-    for (const Street& other : builder.terrain().streets()) {
-      if (&other == &street) continue;
-      const Waypoint q = other.centre.at(other.centre.nearest(at.position));
-      crossing = crossing || norm(q.position - at.position) < other.half_width + 6;
-    }
+    const bool is_crossing = builder.is_near_crossing(street, at.position, 6);
     const Kind kind = builder.parked_kind();
-    if (used && !crossing && kind != Kind::kTruck) builder.park(at, kind);
+    if (used && !is_crossing && kind != Kind::kTruck) builder.park(at, kind);
   }
 }
 
