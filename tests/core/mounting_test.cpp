@@ -243,8 +243,8 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     if (config.sensor == sim::Sensor::kPandar64) {
       R_body_sensor = R_body_sensor * Eigen::AngleAxisd(90 * kRadians, Eigen::Vector3d::UnitZ());
     }
-    CAPTURE(plain_value(config.scene), plain_value(config.sensor), mount.height, mount.pitch,
-            mount.roll, mounting.height, mounting.up_sensor.transpose());
+    CAPTURE(dynains::plain_value(config.scene), dynains::plain_value(config.sensor), mount.height,
+            mount.pitch, mount.roll, mounting.height, mounting.up_sensor.transpose());
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - mount.height) < 0.12);
     // The vehicle is not parallel to the ground around it: crowned roads, unevenness.
