@@ -98,6 +98,11 @@ TEST_CASE("Damaged trajectories are refused with their line") {
   }
   CHECK_THAT(message_of<IoError>([] { read_trajectory("/nonexistent/poses.txt"); }),
              ContainsSubstring("/nonexistent/poses.txt: cannot be read"));
+  const TemporaryFolder folder;
+  write_text(folder / "transformations.pcd",
+             "VERSION 0.7\nFIELDS x y z intensity roll pitch yaw\n");
+  CHECK_THAT(message_of<IoError>([&] { read_trajectory(folder / "transformations.pcd"); }),
+             ContainsSubstring("is a cloud") && ContainsSubstring("expected 12 numbers"));
 }
 
 TEST_CASE("Times are matched by interpolation, near the ends and in short gaps only") {

@@ -208,6 +208,32 @@ TEST_CASE("check and run tell clouds that were recorded twice") {
   }
 }
 
+TEST_CASE("check tells clouds that are parts of a turn") {
+  constexpr std::size_t kParts = 6;
+  const Drive drive;
+  const TemporaryFolder parts;
+  fs::create_directories(parts / "velodyne");
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    const std::vector<float>& xyzi = drive.scan(i).xyzi;
+    std::vector<std::vector<float>> clouds(kParts);
+    for (std::size_t k = 0; k < xyzi.size(); k += 4) {
+      const double turn = 0.5 + std::atan2(xyzi[k + 1], xyzi[k]) / (2.0 * M_PI);
+      const auto part = static_cast<std::size_t>(turn * static_cast<double>(kParts)) % kParts;
+      clouds[part].insert(clouds[part].end(), &xyzi[k], &xyzi[k] + 4);
+    }
+    for (const std::vector<float>& cloud : clouds) {
+      const std::string name = simulation::scan_name(poses.size());
+      write_scan(parts / ("velodyne/" + name + ".bin"), cloud);
+      poses.push_back(drive.pose(i));
+    }
+  }
+  write_poses(parts / "poses.txt", poses);
+  CHECK_THAT(start({"check", parts.path()}).out,
+             ContainsSubstring("Scans 6 apart agree better than neighbours") &&
+                 ContainsSubstring("parts of a turn"));
+}
+
 TEST_CASE("one scan alone is told") {
   const Drive drive;
   const Outcome outcome = drive.run({"--start", "3", "--end", "3"});
