@@ -6,7 +6,6 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
-#include "dynains/recording/instance_numbers.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "labelled_sequence.hpp"
 #include "output_folder.hpp"
@@ -14,7 +13,7 @@
 namespace dynains::program {
 namespace {
 
-constexpr std::uint32_t kMostIds = 65535;
+constexpr std::uint32_t kMostIds = 65535;  // 16 bits; ids beyond start again at 1
 
 constexpr std::uint32_t mos_class(PointLabel label) {
   if (label == PointLabel::kDynamic) return kRunMoving;
@@ -51,7 +50,8 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
 }  // namespace
 
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
-  return mos_class(label) | short_instance(instance) << 16U;
+  const std::uint32_t id = instance == kNoInstance ? 0 : (instance - 1) % kMostIds + 1;
+  return mos_class(label) | id << 16U;
 }
 
 LabelFiles::LabelFiles(std::filesystem::path labels, std::filesystem::path causes,

@@ -20,9 +20,6 @@ struct ScanSpan {
   std::uint32_t first = 0, last = UINT32_MAX;
 };
 
-/// The first pass compares scans that are closer in time.
-inline constexpr std::uint32_t kIndependentScans = 30;
-
 /// Scans in which something was in a place: 64 slices of time, which double when the recording
 /// gets longer.
 class Presence {
@@ -67,7 +64,6 @@ struct FirstVerdicts {
   bool removed_first = false;                   ///< the first epoch removed all points
   bool removed_last = false;                    ///< the last one did
   bool kept_first = false, kept_last = false;   ///< the first, the last epoch kept most points
-  bool all_first = false, all_last = false;     ///< the first, the last epoch kept all points
   std::uint32_t sum_kept = 0, sum_removed = 0;  ///< points in the closed epochs
   std::uint32_t first_scan = 0, last_scan = 0;  ///< that measured the place
 
@@ -85,11 +81,9 @@ struct FirstVerdicts {
   void end_epoch() {
     if (kept + removed == 0) return;
     kept_last = is_mostly_kept(kept, removed);
-    all_last = removed == 0;
     removed_last = kept == 0;
     if (!any_kept() && !any_removed()) {
       kept_first = kept_last;
-      all_first = all_last;
       removed_first = removed_last;
     }
     sum_kept += kept;
@@ -104,11 +98,8 @@ struct FirstVerdicts {
   static bool is_mostly_kept(std::uint32_t kept, std::uint32_t removed) {
     return kept >= 2 * removed;
   }
-  /// Whether all points were kept at first and at last, or most there and in all.
-  bool are_kept() const {
-    return kept_first && kept_last &&
-           ((all_first && all_last) || is_mostly_kept(sum_kept, sum_removed));
-  }
+  /// Whether most points were kept at first, at last and in all.
+  bool are_kept() const { return kept_first && kept_last && is_mostly_kept(sum_kept, sum_removed); }
 };
 
 /// A cube of 0.4 m. What a scan of the first pass changes lies in one line of the cache.
@@ -133,18 +124,12 @@ struct alignas(64) RecordingPlace {
   bool came() const { return first.any_kept() && first.removed_first && free_before; }
   /// Whether looks passed it after the first pass saw something move out of it.
   bool left() const { return first.any_kept() && first.removed_last && free_after; }
-  /// Scans before it was filled for the first time if something came, after the last time if
-  /// something left, or all scans if it was empty in between.
-  ScanSpan absence() const {
-    if (came()) return {0, first.first_scan - 1};
-    if (left()) return {first.last_scan + 1, UINT32_MAX};
-    return {};
-  }
   /// Whether what a scan measured in it is there in the end of the recording: no later look passed
   /// it.
   bool stands_since(std::uint32_t scan) const { return !first.removed_last && scan > last_free; }
-  /// Whether the first pass removed points of something that stands: it kept most of them or all at
-  /// both ends, and some looks hit the place, and none passed it. Gaps pass in a queue that moves.
+  /// Whether the first pass removed points of something that stands: it kept most of them at
+  /// both ends and in all, and some looks hit the place, and none passed it. Gaps pass in a queue
+  /// that moves.
   bool stands() const {
     constexpr int kFewestHits = 2;
     return first.any_removed() && first.are_kept() && hits >= kFewestHits && !was_passed();

@@ -13,7 +13,6 @@
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
 #include "dynains/recording/ground.hpp"
-#include "dynains/recording/instance_numbers.hpp"
 #include "dynains/recording/places.hpp"
 #include "dynains/recording/references.hpp"
 #include "dynains/recording/static_policy.hpp"
@@ -47,8 +46,8 @@ struct SecondPassConfig {
 
 /// Scans whose poses fit to each other. All of them test the places of their points above the
 /// ground. What came or went is removed, and what stands comes back (see
-/// RecordingPlaces), as does the ground. An instance of the first pass leaves as a whole if enough
-/// of its places have changed. Scans of the visit are numbered from 0. Functions throw what the
+/// RecordingPlaces), as does the ground. An instance of the first pass leaves a scan as a whole if
+/// half of its points leave. Scans of the visit are numbered from 0. Functions throw what the
 /// store throws.
 class Visit {
  public:
@@ -92,52 +91,17 @@ class Visit {
     std::size_t size;      // bytes
   };
   using Place = RecordingPlaces::Place;
-  /// An instance of the first pass in one scan. Its faces near the sensor have most of the points:
-  /// it is counted in places.
-  struct Instance {
-    std::uint32_t known = 0;                       // with a state
-    std::uint32_t changed = 0;                     // came or went
-    std::uint32_t stays = 0;                       // were there when the instance was not
-    std::uint32_t low_changed = 0, low_stays = 0;  // in the lower half of the instance
-    Eigen::Vector3f lowest = Eigen::Vector3f::Constant(1e9F);
-    Eigen::Vector3f highest = Eigen::Vector3f::Constant(-1e9F);  // m, z up
-    bool is_leaving = false;  // leaves(), when all of its places are counted
-
-    bool leaves() const;
-  };
-  /// An instance in one place.
-  struct Seen {
-    std::uint32_t instance;  // number
-    const Place* place;
-    bool is_low;  // any of its points
-
-    bool is_same(const Seen& other) const {
-      return instance == other.instance && place == other.place;
-    }
-  };
-
   void find_up(PointsView points, const Pose& T_world_sensor);
   void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
   const Place* changed_at_ground(const WorldCell& cell);
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
-  void restore(std::size_t point, VerdictArrays& verdict);
-  void restore_ground(const Pose& T_level_sensor, VerdictArrays& verdict);
+  void restore_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict);
+  void restore_ground(PointsView points, const Pose& T_level_sensor, VerdictArrays& verdict);
+  void remove_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict);
+  void remove_instances(VerdictArrays& verdict);
   void remove(std::size_t point, VerdictArrays& verdict);
-  void put(std::size_t point, const Place& place) {
-    place_of_[point] = &place;
-    placed_.push_back(point);
-  }
-  void find_places(std::uint32_t number, const Pose& T_level_sensor, VerdictArrays& verdict);
-  void find_other_places(const Pose& T_level_sensor, const VerdictArrays& verdict);
-  void remove_objects(std::uint32_t number, const Pose& T_level_sensor, VerdictArrays& verdict);
-  void choose_instances(std::uint32_t number, const VerdictArrays& verdict);
-  void find_instances(std::uint32_t number, const Pose& T_level_sensor,
-                      const VerdictArrays& verdict);
-  void list_seen(const VerdictArrays& verdict);
-  ScanSpan absence(std::uint32_t number, const Seen* begin, const Seen* end) const;
-  void judge(std::uint32_t number, const Seen* begin, const Seen* end);
 
   SecondPassConfig config_;
   ByteStore& store_;
@@ -149,15 +113,8 @@ class Visit {
   std::vector<std::uint32_t> numbers_of_scans_;  // in the recording
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
-  PointsView points_;                      // of the scan that is revised
-  std::vector<const Place*> place_of_;     // by point; null: none, or it does not matter
-  std::vector<std::size_t> placed_;        // points with a place
-  std::vector<std::uint8_t> is_near_;      // what has changed; by point
-  std::vector<std::uint8_t> is_restored_;  // by point
-  InstanceNumbers numbers_;                // of instances in the scan that may leave
-  std::vector<Instance> instances_;        // by number
-  std::vector<Seen> seen_;                 // sorted by instance
-  std::vector<Eigen::Vector3f> level_;     // m, from the sensor, z up; by point
+  std::vector<std::uint8_t> is_near_;   // what has changed; by point
+  std::vector<std::int32_t> majority_;  // by instance: points that left, less those that stay
   std::vector<Object> objects_;
   std::uint64_t removed_ = 0, restored_ = 0;
 };
