@@ -2,11 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <vector>
 
-#include "dynains/ground/lowest_mean.hpp"
-#include "dynains/ground/patch_sort.hpp"
+#include "dynains/ground/ground_plane.hpp"
 #include "dynains/pipeline/ingest.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -14,80 +12,14 @@
 namespace dynains::test {
 namespace {
 
-TEST_CASE("PatchSort is a stable sort by patch for all numbers of points") {
-  constexpr std::size_t kPatches = 5;
-  Random random(1);
-  detail::PatchSort<kPatches> sort;
-  for (const std::size_t count : {0U, 1U, 3U, 15U, 16U, 17U, 31U, 64U, 1000U, 10U}) {
-    PointBuffer points;
-    std::vector<std::uint32_t> input(count);
-    std::vector<std::int32_t> patch_of(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      points.push_back(static_cast<float>(i), -static_cast<float>(i), 0.5F * static_cast<float>(i));
-      input[i] = static_cast<std::uint32_t>(3 * i);
-      patch_of[i] = static_cast<std::int32_t>(random.index(kPatches));
-    }
-    sort.sort(points, input.data(), patch_of.data());
-
-    std::vector<std::size_t> expected(count);
-    std::iota(expected.begin(), expected.end(), std::size_t{0});
-    std::stable_sort(expected.begin(), expected.end(),
-                     [&](std::size_t a, std::size_t b) { return patch_of[a] < patch_of[b]; });
-    REQUIRE(sort.begin(0) == 0);
-    REQUIRE(sort.end(kPatches - 1) == count);
-    for (std::size_t patch = 0; patch < kPatches; ++patch) {
-      for (std::size_t at = sort.begin(patch); at < sort.end(patch); ++at) {
-        const std::size_t i = expected[at];
-        const detail::PointRecord& record = sort.records()[at];
-        REQUIRE(patch_of[i] == static_cast<std::int32_t>(patch));
-        REQUIRE((record.x == points.x[i] && record.y == points.y[i] && record.z == points.z[i]));
-        REQUIRE(record.input == input[i]);
-      }
-    }
-  }
-}
-
-float mean_by_sorting(std::vector<float> values, std::size_t wanted, float floor) {
-  values.erase(std::remove_if(values.begin(), values.end(), [&](float v) { return v < floor; }),
-               values.end());
-  std::sort(values.begin(), values.end());
-  values.resize(std::min(values.size(), wanted));
-  if (values.empty()) return floor;
-  float total = 0.0F;
-  for (const float value : values) total += value;
-  return total / static_cast<float>(values.size());
-}
-
-TEST_CASE("LowestMean gives the bits of sorting for few values, ties, rising and falling values") {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  Random random(2);
-  for (const std::size_t count : {1U, 7U, 8U, 9U, 40U, 129U, 3000U}) {
-    for (const std::size_t wanted : {1U, 8U, 10U, 64U}) {
-      for (int kind = 0; kind < 5; ++kind) {
-        std::vector<float> values(count);
-        for (std::size_t i = 0; i < count; ++i) {
-          const auto at = static_cast<float>(i);
-          const float any = random.uniform_float(-2.0, 3.0);
-          values[i] = std::array<float, 5>{any, 0.25F, std::floor(any), at,
-                                           -at}[static_cast<std::size_t>(kind)];
-        }
-        std::vector<float> padded = values;
-        padded.resize(count + detail::kPackWidth, kInfinity);
-        for (const float floor : {-kInfinity, -1.0F, 5000.0F}) {
-          const float expected = mean_by_sorting(values, wanted, floor);
-          CAPTURE(count, wanted, kind, floor);
-          float found = 0.0F;
-          detail::with_packs([&](auto packs) {
-            detail::LowestMean<64, decltype(packs)> lowest(wanted);
-            found = lowest.of(padded.data(), count, floor);
-          });
-          REQUIRE(found == expected);
-          detail::LowestMean<64, detail::BaselinePacks> lowest(wanted);
-          REQUIRE(lowest.of(padded.data(), count, floor) == expected);
-        }
-      }
-    }
-  }
+TEST_CASE("the mean of the lowest values takes those above a floor, or all if they are few") {
+  std::vector<float> kept;
+  const std::vector<float> values = {4.0F, -9.0F, 2.0F, 1.0F, 2.0F, -3.0F};
+  CHECK(detail::mean_of_lowest(values, 3, -4.0F, kept) == 0.0F);
+  CHECK(detail::mean_of_lowest(values, 3, -3.0F, kept) == 0.0F);
+  CHECK(detail::mean_of_lowest(values, 9, 2.0F, kept) == 8.0F / 3.0F);
+  CHECK(detail::mean_of_lowest(values, 1, -100.0F, kept) == -9.0F);
+  CHECK(detail::mean_of_lowest(values, 1, 5.0F, kept) == 5.0F);
 }
 
 TEST_CASE("Ingest takes good points in order and marks the others, in any mixture") {

@@ -92,21 +92,7 @@ TEST_CASE("ground equals that of Patchwork in double precision") {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) compare(rough_terrain(seed, 60000));
 }
 
-TEST_CASE("planes are fitted to some points of a patch that has many") {
-  GroundConfig config = GroundConfig::paper();
-  const PointBuffer scan = rough_terrain(7, 400000);
-  config.ground_fit_points = 1000000;
-  const std::vector<bool> by_all = ground_of(config, scan);
-  for (const int most : {64, 100, 512}) {
-    config.ground_fit_points = most;
-    const std::vector<bool> expected = reference_ground(config, scan);
-    const std::vector<bool> by_some = ground_of(config, scan);
-    CHECK(share_of_differences(by_some, expected) < kOnBorders);
-    CHECK(share_of_differences(by_some, by_all) > 5 * kOnBorders);  // otherwise nothing is tested
-  }
-}
-
-// All points are below the first plane, but it was fitted to some of them only.
+// All points are below the first plane, which was fitted to the seeds only.
 TEST_CASE("a slope that flattens within its patch is fitted again") {
   GroundConfig config = GroundConfig::paper();
   const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
@@ -214,24 +200,6 @@ TEST_CASE("points are ground up to ground_distance over the plane") {
 TEST_CASE("a patch needs ground_min_points") {
   CHECK_FALSE(ground_of(GroundConfig(), patch_of_plane(0.0, 10))[0]);
   CHECK(ground_of(GroundConfig(), patch_of_plane(0.0, 11))[0]);
-}
-
-TEST_CASE("a plane is fitted to all points of a patch up to ground_fit_points") {
-  // Only the last point seeds the plane. It is too low for any other point to be near it.
-  GroundConfig config;
-  config.ground_fit_points = 64;
-  config.ground_lowest_points = 1;
-  config.ground_below = 10.0;
-  const auto is_ground = [&](std::size_t count) -> bool {
-    PointBuffer points = patch_of_plane(0.0, count - 1);
-    points.push_back(10.3F, 0.6F, -3.0F);
-    return ground_of(config, points)[0];
-  };
-  CHECK_FALSE(is_ground(64));
-  CHECK(is_ground(65));  // the last run ends with the 64th point
-  config.ground_fit_points = 71;
-  CHECK_FALSE(is_ground(71));
-  CHECK(is_ground(72));
 }
 
 TEST_CASE("a plane steeper than ground_uprightness is not ground") {

@@ -7,7 +7,6 @@
 
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/simd/point_record.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
@@ -201,63 +200,6 @@ TEST_CASE("put_indices and find_changes agree with loops over single numbers") {
         changes |= std::uint64_t{values[i + 1] != values[i]} << i;
       }
       CHECK(detail::find_changes<Packs>(count, values.data() + 1) == changes);
-    }
-  };
-  check(detail::BaselinePacks());
-  with_larger_registers(check);
-}
-
-TEST_CASE("load_columns, pick and move_some_to_front give equal results with all kinds of packs") {
-  Random random(22);
-  const auto check = [&](auto packs) {
-    using Packs = decltype(packs);
-    constexpr std::size_t kCount = Packs::kCount;
-    for (int round = 0; round < 200; ++round) {
-      const std::size_t count =
-          round % 2 == 0 ? kCount : 1 + static_cast<std::size_t>(random.uniform(0.0, kCount - 1.0));
-      const unsigned all = (1U << count) - 1U;
-      const unsigned bits = static_cast<unsigned>(random.uniform(0.0, Packs::kAll + 0.999)) & all;
-      const std::size_t gap = static_cast<std::size_t>(random.uniform(0.0, 5.0));
-      // Records move to the front, over the gap. Records after the moved ones must not change.
-      std::vector<detail::PointRecord> records(gap + 2 * kCount);
-      for (std::uint32_t i = 0; i < records.size(); ++i) {
-        const auto number = static_cast<float>(i);
-        records[i] = {number, number + 0.25F, -number, 1000 + i};
-      }
-      const auto before = records;
-      const auto numbers = [](const std::vector<detail::PointRecord>& of, std::size_t n) {
-        std::vector<std::uint32_t> inputs;
-        for (std::size_t i = 0; i < n; ++i) inputs.push_back(of[i].input);
-        return inputs;
-      };
-      std::vector<detail::PointRecord> some;
-      for (std::size_t k = 0; k < count; ++k) {
-        if ((bits >> k & 1U) != 0) some.push_back(records[gap + k]);
-      }
-
-      const auto columns = detail::load_columns<Packs>(&records[gap]);
-      for (std::size_t axis = 0; axis < 4; ++axis) {
-        float values[kCount], picked[kCount];
-        columns[axis].store(values);
-        detail::pick<Packs>(&records[gap], bits, columns)[axis].store(picked);
-        for (std::size_t k = 0; k < kCount; ++k) {
-          float expected[4];
-          std::memcpy(expected, &before[gap + k], sizeof(expected));
-          CHECK(std::memcmp(&values[k], &expected[axis], sizeof(float)) == 0);
-        }
-        for (std::size_t k = 0; k < some.size(); ++k) {
-          float expected[4];
-          std::memcpy(expected, &some[k], sizeof(expected));
-          CHECK(std::memcmp(&picked[k], &expected[axis], sizeof(float)) == 0);
-        }
-      }
-
-      CHECK(detail::move_some_to_front<Packs>(&records[gap], count, bits, records.data()) ==
-            some.size());
-      CHECK(numbers(records, some.size()) == numbers(some, some.size()));
-      for (std::size_t i = gap + count; i < records.size(); ++i) {
-        CHECK(records[i].input == before[i].input);
-      }
     }
   };
   check(detail::BaselinePacks());

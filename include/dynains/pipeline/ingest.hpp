@@ -13,7 +13,6 @@
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
-#include "dynains/simd/point_record.hpp"
 
 namespace dynains::detail {
 
@@ -76,30 +75,18 @@ class Ingest {
     }
   }
 
-  // Transposes four interleaved points at a time. Prefetching helps because the input is usually
-  // not in the cache.
+  // Prefetching helps because the input is usually not in the cache.
   void copy(const RawPoints<float>& cloud, std::size_t begin, std::size_t length) {
     constexpr std::size_t kAhead = 128;  // points
     float* const x = points_.x.data() + count_;
     float* const y = points_.y.data() + count_;
     float* const z = points_.z.data() + count_;
-    const auto point = [&cloud](std::size_t i) { return cloud.data + i * cloud.stride; };
-    std::size_t i = 0;
-    // Four floats are read per point, so the last point of the cloud must not be read here: memory
-    // may end after its coordinates.
-    for (; cloud.stride >= 4 && i + 4 <= length && begin + i + 4 < cloud.count; i += 4) {
-      const std::size_t at = begin + i;
-      __builtin_prefetch(point(std::min(at + kAhead, cloud.count - 1)));
-      const auto columns = transposed({load_four(point(at)), load_four(point(at + 1)),
-                                       load_four(point(at + 2)), load_four(point(at + 3))});
-      detail::store(columns[0], x + i);
-      detail::store(columns[1], y + i);
-      detail::store(columns[2], z + i);
-    }
-    for (; i < length; ++i) {
-      x[i] = point(begin + i)[0];
-      y[i] = point(begin + i)[1];
-      z[i] = point(begin + i)[2];
+    for (std::size_t i = 0; i < length; ++i) {
+      const float* const point = cloud.data + (begin + i) * cloud.stride;
+      __builtin_prefetch(cloud.data + std::min(begin + i + kAhead, cloud.count - 1) * cloud.stride);
+      x[i] = point[0];
+      y[i] = point[1];
+      z[i] = point[2];
     }
   }
 
