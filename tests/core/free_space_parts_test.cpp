@@ -125,50 +125,13 @@ TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
   }
 }
 
-TEST_CASE("a hull fills the ground between the seen sides of an object") {
-  // An L of points along the lower and the left side of a 2 m square, and its far corner.
-  PointBuffer points;
-  for (float t = 0.1F; t < 2.0F; t += 0.2F) {
-    points.push_back(t, 0.1F, 0.0F);
-    points.push_back(0.1F, t, 0.0F);
-  }
-  points.push_back(1.9F, 1.9F, 0.0F);
-  InstanceHull hull(0.4);
-  std::set<std::pair<int, int>> cells;
-  hull.visit(points, [&](float x, float y) {
-    CHECK(cells
-              .insert(
-                  {static_cast<int>(std::floor(x / 0.4F)), static_cast<int>(std::floor(y / 0.4F))})
-              .second);
-  });
-  // 5 x 5 cells of 0.4 m. The lowest row reaches from side to side: 5 cells, because each column
-  // begins there. The rows above it have only the left column: 3 cells. The top row reaches from
-  // side to side again, but the columns in between end at the bottom: 2 cells.
-  CHECK(cells.size() == 5 + 3 + 2);
-  CHECK(cells.count({4, 4}) == 1);
-  CHECK(cells.count({2, 0}) == 1);
-  CHECK(cells.count({4, 2}) == 0);
-
-  // With the right side seen as well, the whole square is covered.
-  for (float t = 0.1F; t < 2.0F; t += 0.2F) points.push_back(1.9F, t, 0.0F);
-  for (float t = 0.1F; t < 2.0F; t += 0.2F) points.push_back(t, 1.9F, 0.0F);
-  cells.clear();
-  hull.visit(points, [&](float x, float y) {
-    cells.insert({static_cast<int>(std::floor(x / 0.4F)), static_cast<int>(std::floor(y / 0.4F))});
-  });
-  CHECK(cells.size() == 25);
-}
-
 // Indices of the points that a footprint finds under removed points.
 std::vector<std::size_t> find_under(const GroundFootprint& footprint, const PointBuffer& ground,
                                     const Clearance& clearance) {
-  std::vector<GroundBox> boxes;
-  footprint.bound(ground, boxes);
   std::vector<std::size_t> found;
-  for (std::size_t block = 0; block < boxes.size(); ++block) {
-    const std::size_t begin = block * GroundFootprint::kBlock;
+  for (std::size_t begin = 0; begin < ground.size(); begin += GroundFootprint::kBlock) {
     const std::uint64_t under =
-        footprint.find_under(GroundFootprint::block_of(ground, begin), boxes[block], clearance);
+        footprint.find_under(GroundFootprint::block_of(ground, begin), clearance);
     for (std::size_t i = 0; i < GroundFootprint::kBlock; ++i) {
       if ((under >> i & 1U) != 0) found.push_back(begin + i);
     }
@@ -183,12 +146,17 @@ bool is_under(const GroundFootprint& footprint, float x, float y, float z) {
   return !find_under(footprint, point, {0.0F, 0.0F}).empty();
 }
 
+void add(GroundFootprint& footprint, float x, float y, float z) {
+  PointBuffer point;
+  point.push_back(x, y, z);
+  footprint.add(point, 1);
+}
+
 TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, until cleared") {
   GroundFootprint footprint(0.2, 50.0);
   CHECK(footprint.empty());
-  footprint.add(10.05F, -3.05F, 0.7F);
-  footprint.add(10.05F, -3.05F, 0.4F);
-  footprint.spread();
+  add(footprint, 10.05F, -3.05F, 0.7F);
+  add(footprint, 10.05F, -3.05F, 0.4F);
   CHECK_FALSE(footprint.empty());
   CHECK_FALSE(is_under(footprint, 10.05F, -3.05F, 0.4F));
   CHECK(is_under(footprint, 10.05F, -3.05F, 0.41F));
@@ -199,10 +167,9 @@ TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, u
   CHECK(footprint.empty());
   CHECK_FALSE(is_under(footprint, 10.05F, -3.05F, 1e6F));
   // Points out of reach and NaN are neither kept nor found.
-  footprint.add(60.0F, 0.0F, 0.0F);
-  footprint.add(std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
-  footprint.add(-1e30F, 1e30F, 0.0F);
-  footprint.spread();
+  add(footprint, 60.0F, 0.0F, 0.0F);
+  add(footprint, std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
+  add(footprint, -1e30F, 1e30F, 0.0F);
   CHECK(footprint.empty());
   CHECK_FALSE(is_under(footprint, 60.0F, 0.0F, 1e6F));
   CHECK_FALSE(is_under(footprint, std::numeric_limits<float>::infinity(), 0.0F, 1e6F));
@@ -233,13 +200,12 @@ TEST_CASE("a footprint gives the points that a search over all removed points gi
       const float x = random.uniform_float(-39, 39), y = random.uniform_float(-39, 39);
       const float z = random.uniform_float(0, 2);
       const std::size_t way = block.size() < 64 ? random.index(3) : 0;
-      if (way == 0) footprint.add(x, y, z);
+      if (way == 0) add(footprint, x, y, z);
       if (way == 1) which |= std::uint64_t{1} << block.size();
       if (way <= 1) removed.push_back(x, y, z);
       if (way >= 1) block.push_back(x, y, z);
     }
     footprint.add(block, which);
-    footprint.spread();
     const Clearance clearance = {0.4F, round == 0 ? 0.0F : 0.02F};
     const std::vector<std::size_t> found = find_under(footprint, ground, clearance);
     std::vector<std::size_t> expected;

@@ -200,11 +200,8 @@ std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const Po
   MovedGround moved(config);
   const RemovedBox box;
   moved.add(box.points, box.group_of, box.groups);
-  std::vector<GroundBox> boxes;
-  moved.bound(ground, boxes);
   std::set<std::uint32_t> found;
-  for (const EvidenceVerdict::GroundPoint& point :
-       moved.find(ground, boxes, samples_of(config, ground))) {
+  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, samples_of(config, ground))) {
     CHECK(point.verdict.cause == Cause::kUnderInstance);
     CHECK(found.insert(point.point).second);
   }
@@ -248,9 +245,7 @@ TEST_CASE("an object on the ground may begin higher above it where beams are far
     moved.adapt(sensor);
     const RemovedBox box(0.85F);
     moved.add(box.points, box.group_of, box.groups);
-    std::vector<GroundBox> boxes;
-    moved.bound(ground, boxes);
-    const auto found = moved.find(ground, boxes, samples_of(config, ground));
+    const auto found = moved.find(ground, samples_of(config, ground));
     CAPTURE(gap);
     CHECK(found.empty() == (gap < 2.5));
   }
@@ -265,8 +260,6 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   MovedGround moved{FreeSpaceConfig()};
   const RemovedBox box;
   moved.add(box.points, box.group_of, box.groups);
-  std::vector<GroundBox> boxes;
-  moved.bound(ground, boxes);
   GroundSamples samples = samples_of(FreeSpaceConfig(), ground);
   for (const Reference& reference : references) {
     std::vector<BeamResult> seen;
@@ -276,7 +269,7 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
     samples.add(visibility_of(seen));
   }
   std::set<std::uint32_t> found;
-  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, boxes, samples)) {
+  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, samples)) {
     CHECK(point.verdict.cause == Cause::kFreeSpace);
     CHECK(found.insert(point.point).second);
   }

@@ -98,7 +98,6 @@ class FreeSpaceEvidence {
     }
     for (Judged* judged : {&provisional_, &final_}) {
       detail::ensure_capacity(judged->supervoxels, roomy.evidence.samples.supervoxel_count());
-      detail::ensure_capacity(judged->removed, roomy.evidence.samples.instance_count());
     }
   }
 
@@ -132,7 +131,6 @@ class FreeSpaceEvidence {
     run_both(
         phase != 0 ? other_ : nullptr,
         [&] {
-          moved_ground_.bound(split.ground(), record.ground_boxes);
           ground_sampler_.sample(split.ground(), record.ground);
           begin_evidence(split.non_ground(), instance_of, instance_count, record);
           link_to_previous(scan, record);
@@ -165,11 +163,9 @@ class FreeSpaceEvidence {
     for (std::size_t i = 1; i < groups_.size(); ++i) {
       groups_[i] = judged.supervoxels[samples.supervoxel_of_number[i]];
     }
-    for (const std::size_t instance : judged.removed) add_hull(record.evidence, instance);
     record.number_of_point.copy_to(group_of_);
     moved_ground_.add(split.non_ground(), group_of_, groups_);
-    return {groups_, group_of_,
-            moved_ground_.find(split.ground(), record.ground_boxes, record.ground)};
+    return {groups_, group_of_, moved_ground_.find(split.ground(), record.ground)};
   }
 
   /// Makes the range image of the newest scan, if it is a reference, without what surely moves.
@@ -233,13 +229,11 @@ class FreeSpaceEvidence {
     detail::InstanceEvidence evidence;
     detail::ShortNumbers number_of_point;  // by non-ground point: number of its supervoxel
     std::vector<detail::DynamicOccupancyGrid::Count> counted;  // by supervoxel
-    std::vector<detail::GroundBox> ground_boxes;               // by block of 64 ground points
     detail::GroundSamples ground;
   };
   struct Judged {
     std::uint64_t scan = 0;
     std::vector<Verdict> supervoxels;
-    std::vector<std::size_t> removed;  // instances, as a whole
   };
   // Working memory of a thread that tests samples.
   struct Tester {
@@ -306,7 +300,7 @@ class FreeSpaceEvidence {
       const detail::ReferenceScan* const reference = references_.find(scan - back, record.epoch);
       if (reference != nullptr) test(newest_tester_, record, *reference, -lag);
     }
-    updater().begin_later_references(record.evidence.samples, record.evidence.beliefs);
+    updater().begin_later_references(record.evidence.beliefs);
     update_own_log_odds(record);
   }
 
@@ -365,10 +359,7 @@ class FreeSpaceEvidence {
   void update_own_log_odds(Record& record) const {
     if (!config_.use_tracks) return;
     detail::InstanceEvidence& evidence = record.evidence;
-    std::vector<std::uint8_t>& changed = evidence.beliefs.changed;
-    for (std::size_t instance = 0; instance < changed.size(); ++instance) {
-      if (changed[instance] == 0) continue;
-      changed[instance] = 0;
+    for (std::size_t instance = 0; instance < evidence.tracked.instances.size(); ++instance) {
       Instance& tracked = evidence.tracked.instances[instance];
       const detail::InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
       tracked.own = judge_.own_log_odds(evidence, updater(), instance);
@@ -402,21 +393,7 @@ class FreeSpaceEvidence {
     // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
     constexpr std::uint64_t kFirstScans = 5;
     const bool may_presume = !is_final && record.since_begin >= kFirstScans;
-    judged.removed.clear();
-    judge_.judge(record.evidence, updater(), may_presume, judged.supervoxels,
-                 [&](std::size_t instance) { judged.removed.push_back(instance); });
-  }
-
-  // Adds the ground below a compact instance that is removed as a whole.
-  void add_hull(const detail::InstanceEvidence& evidence, std::size_t instance) {
-    constexpr float kLeastHeight = 0.3F;  // m
-    if (!config_.use_tracks) return;
-    const detail::TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
-    if (!shape.carried || shape.height < kLeastHeight) return;
-    const detail::InstanceSamples& samples = evidence.samples;
-    const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
-    const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[instance + 1]];
-    moved_ground_.add_hull(PointsView(samples.points).subview(begin, end - begin));
+    judge_.judge(record.evidence, updater(), may_presume, judged.supervoxels);
   }
 
   void judge_by_dynamic_grid(Judged& judged) {

@@ -39,7 +39,7 @@ class GroundSampler {
   /// tested. `ground`: m, sensor frame.
   void sample(PointsView ground, GroundSamples& out) {
     constexpr std::size_t kBlock = GroundFootprint::kBlock;
-    const std::size_t blocks = (ground.size() + kBlock - 1) / kBlock;
+    const std::size_t blocks = GroundFootprint::block_count(ground.size());
     ensure_capacity(out.run_begins, blocks);
     out.run_begins.assign(blocks, 0);
     if (!is_active_) return;

@@ -12,7 +12,6 @@
 #include "dynains/evidence/instance_views.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
@@ -47,9 +46,7 @@ struct InstanceBeliefs {
   std::vector<Belief> supervoxels;
   std::vector<Counts> counts;  ///< by instance
   InstanceViews views;
-  std::vector<std::uint8_t> merged;   ///< by instance: 1 if larger than one object; the caller's
-  std::vector<std::uint64_t> open;    ///< bit by sample: a hit may change its supervoxel's belief
-  std::vector<std::uint8_t> changed;  ///< by instance: 1 if a belief changed; the caller resets it
+  std::vector<std::uint8_t> merged;  ///< by instance: 1 if larger than one object; the caller's
 };
 
 /// Updates beliefs by the visibility of samples from reference scans, and evaluates them.
@@ -74,21 +71,17 @@ class InstanceBeliefUpdater {
   void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
     const std::size_t instances = samples.instance_count();
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
-    out.changed.assign(instances, 1);
     out.merged.assign(instances, 0);
     out.counts.resize(instances);
     for (std::size_t instance = 0; instance < instances; ++instance) {
       out.counts[instance] = {samples.count(instance), 0, 0};
     }
     out.views.begin(samples);
-    out.open.assign(samples.size() / 64 + 1, ~std::uint64_t{0});
   }
 
   /// Restarts the sums for the references on the other side of time; keeps the peaks.
-  void begin_later_references(const InstanceSamples& samples, InstanceBeliefs& beliefs) const {
-    for (std::uint32_t s = 0; s < beliefs.supervoxels.size(); ++s) {
-      Belief& belief = beliefs.supervoxels[s];
-      if (belief.occupied != 0 && belief.level > 0.0F) flip_open(samples, s, beliefs);
+  void begin_later_references(InstanceBeliefs& beliefs) const {
+    for (Belief& belief : beliefs.supervoxels) {
       belief.peak = belief.highest();
       belief.level = 0.0F;
       belief.turns &= static_cast<std::uint8_t>(~1U);
@@ -100,12 +93,18 @@ class InstanceBeliefUpdater {
   /// enough visible samples of which nearly all are hit.
   template <class OnHit>
   void update(const InstanceSamples& samples, const Visibility& visibility,
-              const InstanceViews::Position& reference, InstanceBeliefs& beliefs, OnHit&& on_hit) {
+              const InstanceViews::Position& reference, InstanceBeliefs& beliefs,
+              OnHit&& on_hit) const {
     beliefs.views.look_from(reference);
-    // AVX2 processors have instructions that find and count bits.
+    // AVX2 processors have an instruction that counts bits.
     with_packs([&](auto) {
-      update_instances(samples, visibility, beliefs, on_hit);
-      update_supervoxels(samples, visibility, beliefs);
+      for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+        const float weight = update_instance(samples, visibility, instance, beliefs, on_hit);
+        for (std::uint32_t s = samples.supervoxel_begin[instance];
+             s < samples.supervoxel_begin[instance + 1]; ++s) {
+          update_supervoxel(samples, visibility, s, weight, beliefs);
+        }
+      }
     });
   }
 
@@ -130,8 +129,6 @@ class InstanceBeliefUpdater {
   static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
   static constexpr std::uint8_t kTurnsByChance = 4;   // hit, free, hit, free, hit
   static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
-  // A supervoxel is occupied if at least two of its samples and one of kSamplesPerHit are hit.
-  static constexpr std::uint32_t kSamplesPerHit = 4;
 
   // Counts of one supervoxel with `samples` samples.
   Counts counts_of(const Belief& belief, std::uint32_t samples) const {
@@ -139,103 +136,44 @@ class InstanceBeliefUpdater {
     return {samples, free ? samples : 0, free || belief.occupied != 0 ? samples : 0};
   }
 
-  // Only supervoxels with a free sample, or with a hit while they are open, can change. Their
-  // number is small after the first references. The beliefs of all of them are prefetched before
-  // the first update, since beliefs of older scans are not in the cache.
-  void update_supervoxels(const InstanceSamples& samples, const Visibility& visibility,
-                          InstanceBeliefs& beliefs) {
-    const std::size_t count = find_touched(samples, visibility, beliefs);
-    for (std::size_t i = 0; i < count; ++i) {
-      update_supervoxel(samples, visibility, touched_[i], beliefs);
-    }
-  }
-
-  // Writes the supervoxels that can change to `touched_`, in ascending order; returns their number.
-  std::size_t find_touched(const InstanceSamples& samples, const Visibility& visibility,
-                           const InstanceBeliefs& beliefs) {
-    constexpr std::size_t kBits = InstanceSamples::kWord;
-    grow(touched_, samples.supervoxel_count() + 1);
-    std::size_t count = 0;
-    std::uint32_t last = kNoCluster;
-    for (std::size_t begin = 0; begin < samples.size(); begin += kBits) {
-      std::uint64_t touched =
-          visibility.free_word(begin) | (visibility.hit_word(begin) & beliefs.open[begin / kBits]);
-      const std::size_t left = samples.size() - begin;
-      if (left < kBits) touched &= (std::uint64_t{1} << left) - 1;
-      const std::uint64_t begins = samples.begins[begin / kBits];
-      while (touched != 0) {
-        const std::uint64_t above = ~std::uint64_t{1} << __builtin_ctzll(touched);
-        const std::uint32_t s =
-            samples.supervoxels_before[begin / kBits] + count_ones(begins & ~above) - 1;
-        touched_[count] = s;
-        count += s != last ? 1 : 0;
-        last = s;
-        __builtin_prefetch(&beliefs.supervoxels[s]);
-        __builtin_prefetch(&samples.sample_begin[s]);
-        __builtin_prefetch(&samples.instance_of[s]);
-        const std::uint64_t next = begins & above & (~(begins & above) + 1);  // begin after s, or 0
-        touched &= ~next + 1;
-      }
-    }
-    return count;
-  }
-
+  // `weight`: of free samples, see update().
   void update_supervoxel(const InstanceSamples& samples, const Visibility& visibility,
-                         std::uint32_t s, InstanceBeliefs& beliefs) const {
+                         std::uint32_t s, float weight, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
-    const std::uint32_t end = samples.sample_begin[s + 1];
+    const std::uint32_t size = samples.sample_begin[s + 1] - begin;
+    const Visibility::Count visible = visibility.count(begin, begin + size);
+    if (visible.free + visible.hit == 0) return;
     Belief& belief = beliefs.supervoxels[s];
-    const bool was_open = is_open(belief);
-    const Counts before = counts_of(belief, end - begin);
-    const std::uint32_t instance = samples.instance_of[s];
-    const bool changed =
-        update(belief, visibility.count(begin, end), end - begin, weight_of_free_[instance]);
-    if (is_open(belief) != was_open) flip_open(samples, s, beliefs);
-    if (!changed) return;
-    Counts& counts = beliefs.counts[instance];
-    const Counts now = counts_of(belief, end - begin);
+    const Counts before = counts_of(belief, size);
+    update(belief, visible, size, weight);
+    Counts& counts = beliefs.counts[samples.instance_of[s]];
+    const Counts now = counts_of(belief, size);
     counts.moved += now.moved - before.moved;
     counts.decided += now.decided - before.decided;
-    beliefs.changed[instance] = 1;
   }
 
-  // Whether hits can change the belief.
-  static bool is_open(const Belief& belief) { return belief.occupied == 0 || belief.level > 0.0F; }
-  static void flip_open(const InstanceSamples& samples, std::uint32_t s, InstanceBeliefs& beliefs) {
-    std::uint32_t begin = samples.sample_begin[s];
-    const std::uint32_t end = samples.sample_begin[s + 1];
-    while (begin < end) {
-      const std::uint32_t last = std::min(end - 1, begin | 63U);  // last bit in this word
-      beliefs.open[begin / 64] ^= ~std::uint64_t{0} >> (63 - (last - begin)) << begin % 64;
-      begin = last + 1;
-    }
-  }
-
-  // Updates what is known of whole instances.
+  // Updates what is known of an instance as a whole. Returns the weight of its free samples.
   template <class OnHit>
-  void update_instances(const InstanceSamples& samples, const Visibility& visibility,
-                        InstanceBeliefs& beliefs, OnHit&& on_hit) {
-    grow(weight_of_free_, samples.instance_count());
-    std::uint32_t end = 0;
-    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-      const std::uint32_t begin = end;
-      end += beliefs.counts[instance].total;
-      const Visibility::Count all = visibility.count(begin, end);
-      const auto count = static_cast<float>(end - begin);
-      const auto visible = static_cast<float>(all.free + all.hit);
-      const float least = kLeastVisible * count;
-      const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
-      const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
-      weight_of_free_[instance] = beliefs.views.is_contradicted(instance)   ? 0.0F
-                                  : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
-                                                                            : 1.0F;
-      if (visible < std::max(2.0F, least)) continue;
-      beliefs.views.add(instance, free_ratio);
-      const auto hits = static_cast<float>(all.hit);
-      if (free_ratio <= 1.0F - kContradictingHits && hits >= InstanceBeliefs::kLeastKnown * count) {
-        on_hit(instance);
-      }
+  float update_instance(const InstanceSamples& samples, const Visibility& visibility,
+                        std::size_t instance, InstanceBeliefs& beliefs, OnHit&& on_hit) const {
+    const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
+    const std::uint32_t end = begin + beliefs.counts[instance].total;
+    const Visibility::Count all = visibility.count(begin, end);
+    const auto count = static_cast<float>(end - begin);
+    const auto visible = static_cast<float>(all.free + all.hit);
+    const float least = kLeastVisible * count;
+    const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
+    const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
+    const float weight = beliefs.views.is_contradicted(instance)   ? 0.0F
+                         : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
+                                                                   : 1.0F;
+    if (visible < std::max(2.0F, least)) return weight;
+    beliefs.views.add(instance, free_ratio);
+    const auto hits = static_cast<float>(all.hit);
+    if (free_ratio <= 1.0F - kContradictingHits && hits >= InstanceBeliefs::kLeastKnown * count) {
+      on_hit(instance);
     }
+    return weight;
   }
 
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
@@ -243,27 +181,23 @@ class InstanceBeliefUpdater {
   // limits of FreeSpaceSum. `weight`: of free samples. Those of a reference that mostly hits an
   // instance, or sees little of it, may lie at an edge of a standing object, if the instance is not
   // larger than one object: they count half, and later hits take them back. A single hit sets
-  // `contested`, but not `occupied`. Returns whether a verdict may change.
-  bool update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
+  // `contested`, but not `occupied`.
+  void update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free_ratio >= FreeSpaceSum::kFreeRatio) {
-      if (weight <= 0.0F) return false;
+      if (weight <= 0.0F) return;
       belief.turns |= 1U;
       sum_.raise(belief.level, free_ratio, weight);
       if (weight >= 1.0F) belief.peak = std::max(belief.peak, belief.level);
-      return true;
+      return;
     }
-    if (visible.hit == 0 || free_ratio > FreeSpaceSum::kHitRatio) return false;
-    const Belief before = belief;
+    if (free_ratio > FreeSpaceSum::kHitRatio) return;
     belief.contested = 1;
     sum_.lower(belief.level);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
-    const std::uint32_t least_hits = (samples + kSamplesPerHit - 1) / kSamplesPerHit;
-    if (visible.hit >= std::max(std::min(2U, samples), least_hits)) belief.occupied = 1;
-    return belief.contested != before.contested || belief.occupied != before.occupied ||
-           belief.level != before.level || belief.turns != before.turns;
+    if (visible.hit >= std::min(2U, samples)) belief.occupied = 1;
   }
 
   float removal_ratio_;
@@ -271,8 +205,6 @@ class InstanceBeliefUpdater {
   FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;
-  std::vector<float> weight_of_free_;   // by instance: of free samples of the current reference
-  std::vector<std::uint32_t> touched_;  // supervoxels that the current reference can change
 };
 
 }  // namespace dynains::detail

@@ -110,10 +110,8 @@ class InstanceJudge {
   }
 
   /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed.
-  /// Calls `on_removed(instance)` for each instance that is removed as a whole.
-  template <class OnRemoved>
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
-             bool may_presume, std::vector<Verdict>& verdicts, OnRemoved&& on_removed) {
+             bool may_presume, std::vector<Verdict>& verdicts) {
     const InstanceSamples& samples = evidence.samples;
     verdicts.resize(samples.supervoxel_count());
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
@@ -124,7 +122,6 @@ class InstanceJudge {
       if (is_dynamic(whole)) {
         const Verdict verdict = {whole, as_probability(std::max(level, updater.free_level()))};
         std::fill(verdicts.begin() + first, verdicts.begin() + last, verdict);
-        on_removed(instance);
       } else {
         // Only a part of the instance is dynamic; small groups of free samples may be noise.
         groups_.keep_large(samples, kLeastGroup, free_);

@@ -8,10 +8,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/evidence/smallest_k.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -21,17 +19,12 @@ namespace dynains::detail {
 /// The samples of one scan, ordered by instance, then by supervoxel: each instance and each
 /// supervoxel is one range of samples.
 struct InstanceSamples {
-  static constexpr std::size_t kWord = 64;  ///< samples
-
   PointBuffer points;                           ///< samples, m, sensor frame; padded for packs
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel: first sample, and the end
   std::vector<VoxelKey> place;                  ///< by supervoxel: its voxel in the sensor frame
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
-  /// By 64 samples: bits of the first sample of each supervoxel, and number of supervoxels before.
-  std::vector<std::uint64_t> begins;
-  std::vector<std::uint32_t> supervoxels_before;
-  std::vector<std::uint32_t> instance_of;      ///< by supervoxel
-  std::vector<std::uint32_t> number_of_point;  ///< by point: number of its supervoxel; 0: none
+  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
+  std::vector<std::uint32_t> number_of_point;   ///< by point: number of its supervoxel; 0: none
   /// By number, which follows the points: index of the supervoxel; [0]: kNoCluster.
   std::vector<std::uint32_t> supervoxel_of_number;
 
@@ -41,27 +34,6 @@ struct InstanceSamples {
   }
   std::size_t instance_count() const {
     return supervoxel_begin.empty() ? 0 : supervoxel_begin.size() - 1;
-  }
-  /// Supervoxel of a sample.
-  std::uint32_t supervoxel_of(std::size_t sample) const {
-    const std::uint64_t up_to_sample = ~std::uint64_t{0} >> (kWord - 1 - sample % kWord);
-    return supervoxels_before[sample / kWord] + count_ones(begins[sample / kWord] & up_to_sample) -
-           1;
-  }
-  /// Sets `begins` and `supervoxels_before`.
-  void mark_begins() {
-    const std::size_t words = size() / kWord + 1;
-    ensure_capacity(begins, words);
-    begins.assign(words, 0);
-    resize_with_margin(supervoxels_before, words);
-    for (std::size_t s = 0; s < supervoxel_count(); ++s) {
-      begins[sample_begin[s] / kWord] |= std::uint64_t{1} << sample_begin[s] % kWord;
-    }
-    std::uint32_t before = 0;
-    for (std::size_t word = 0; word < words; ++word) {
-      supervoxels_before[word] = before;
-      before += count_ones(begins[word]);
-    }
   }
   /// Number of samples of an instance.
   std::uint32_t count(std::size_t instance) const {
@@ -99,7 +71,7 @@ class InstanceSampler {
   InstanceSampler(double supervoxel_size, double max_range, std::uint32_t most_samples)
       : supervoxels_per_metre_(static_cast<float>(1.0 / supervoxel_size)),
         max_range_(static_cast<float>(max_range)),
-        samples_(most_samples) {}
+        most_(most_samples) {}
 
   /// Bits of the points, of up to 64 `points`, that lie in another voxel than their predecessor.
   /// The first bit is always set.
@@ -159,11 +131,13 @@ class InstanceSampler {
   // Ranks are hashes of rounded coordinates. The rounding removes the last bits, which depend on
   // the rotation of the sensor frame.
   static constexpr float kPlacesPerMetre = 64.0F;
+  static constexpr int kIgnoredBits = 3;  // of a rank
+  static constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
 
   void begin_scan() {
     table_.clear();
     table_.insert(Supervoxel::none());  // number 0
-    samples_.clear();
+    std::fill(keys_.begin(), keys_.end(), kNoKey);
   }
 
   // Computes the supervoxel and the rank of each point of a block.
@@ -212,22 +186,19 @@ class InstanceSampler {
     return number;
   }
 
-  // Adds the points of a block to the rows of their supervoxels. Consecutive points mostly share a
-  // row, and an insertion depends on the result of the preceding insertion into the row. The loop
-  // alternates between four parts of the block, so that their insertions can overlap in time.
+  // Adds the points of a block to the rows of their supervoxels. A row keeps the keys of the
+  // smallest ranks, then numbers, in ascending order.
   void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* number_of_point) {
-    constexpr std::size_t kParts = 4, kLength = kBlock / kParts;
-    samples_.make_rows(table_.size());
-    const auto rank = [&](std::size_t i) {
-      samples_.add(number_of_point[i], static_cast<std::uint32_t>(rank_[i]),
-                   static_cast<std::uint32_t>(begin + i));
-    };
-    if (count < kBlock) {
-      for (std::size_t i = 0; i < count; ++i) rank(i);
-      return;
-    }
-    for (std::size_t i = 0; i < kLength; ++i) {
-      for (std::size_t k = 0; k < kParts; ++k) rank(i + k * kLength);
+    const std::size_t keys = table_.size() * most_;
+    if (keys_.size() < keys) keys_.resize(keys + keys / 8, kNoKey);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint64_t key =
+          std::uint64_t{static_cast<std::uint32_t>(rank_[i]) >> kIgnoredBits} << 32 | (begin + i);
+      std::uint64_t* const row = &keys_[number_of_point[i] * most_];
+      if (key >= row[most_ - 1]) continue;
+      std::size_t k = most_ - 1;
+      for (; k > 0 && key < row[k - 1]; --k) row[k] = row[k - 1];
+      row[k] = key;
     }
   }
 
@@ -263,33 +234,21 @@ class InstanceSampler {
     copy_samples(points, supervoxel_count, out);
   }
 
-  // Gathers the maximum number of samples of each supervoxel, without a branch. The next supervoxel
-  // overwrites the excess.
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
-    const std::size_t most = samples_.most();
-    gathered_.grow(supervoxel_count * most + kMaxPackWidth);
+    out.points.grow(supervoxel_count * most_ + kMaxPackWidth);
     out.sample_begin.resize(supervoxel_count + 1);
-    float* const x = gathered_.x.data();
-    float* const y = gathered_.y.data();
-    float* const z = gathered_.z.data();
-    std::size_t to = 0;
+    std::uint32_t to = 0;
     for (std::size_t s = 0; s < supervoxel_count; ++s) {
-      out.sample_begin[s] = static_cast<std::uint32_t>(to);
-      const std::uint32_t number = ordered_[s];
-      for (std::size_t k = 0; k < most; ++k) {
-        const std::size_t i = samples_.number(number, k);
-        x[to + k] = points.x[i];
-        y[to + k] = points.y[i];
-        z[to + k] = points.z[i];
+      out.sample_begin[s] = to;
+      const std::uint64_t* const row = &keys_[ordered_[s] * most_];
+      for (std::size_t k = 0; k < most_ && row[k] != kNoKey; ++k, ++to) {
+        const auto i = static_cast<std::uint32_t>(row[k]);
+        out.points.x[to] = points.x[i];
+        out.points.y[to] = points.y[i];
+        out.points.z[to] = points.z[i];
       }
-      to += samples_.count(number);
     }
-    out.sample_begin[supervoxel_count] = static_cast<std::uint32_t>(to);
-    out.points.grow(to + kMaxPackWidth);
-    std::copy_n(x, to, out.points.x.data());
-    std::copy_n(y, to, out.points.y.data());
-    std::copy_n(z, to, out.points.z.data());
-    out.mark_begins();
+    out.sample_begin[supervoxel_count] = to;
   }
 
   float supervoxels_per_metre_;
@@ -297,11 +256,11 @@ class InstanceSampler {
   SupervoxelTable table_{4096};  // numbers of supervoxels
   // By point of a block.
   std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
-  SmallestK samples_;                    // by number in the table: indices of points
+  std::size_t most_;                 // samples of a supervoxel
+  std::vector<std::uint64_t> keys_;  // by number in the table: most_ ranks and indices of points
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end
   std::vector<std::uint32_t> next_;      // by instance: position of its next supervoxel
   std::vector<std::uint32_t> ordered_;   // by supervoxel: number in the table
-  PointBuffer gathered_;                 // samples
 };
 
 }  // namespace dynains::detail

@@ -11,7 +11,6 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/ground_samples.hpp"
-#include "dynains/evidence/instance_hull.hpp"
 #include "dynains/evidence/surrounding_ground.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -21,8 +20,8 @@
 namespace dynains::detail {
 
 /// Finds the moved ground points of one scan: those under removed points, and those in voxels that
-/// are free in reference scans. Call add() and add_hull() for the removed points, then find(). All
-/// points are in the sensor frame (m).
+/// are free in reference scans. Call add() for the removed points, then find(). All points are in
+/// the sensor frame (m).
 class MovedGround {
  public:
   using Verdict = EvidenceVerdict::Group;
@@ -31,27 +30,13 @@ class MovedGround {
       : removes_footprint_(config.footprint > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
-        footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kDefaultCell,
+        footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kUnusedCell,
                    config.evidence_range),
-        around_(config.evidence_range),
-        hull_(2.0 * std::max(config.footprint, kLeastCell)) {}
+        around_(config.evidence_range) {}
 
   void adapt(const SensorModel& sensor) {
     // The lowest return of an object may lie one gap between two beams above its foot.
     clearance_.slope = static_cast<float>(std::tan(sensor.elevation_gap_wide * M_PI / 180.0));
-  }
-
-  /// Computes the box of each block of 64 ground points. The boxes are valid for all verdicts on a
-  /// scan.
-  void bound(PointsView ground, std::vector<GroundBox>& boxes) const {
-    footprint_.bound(ground, boxes);
-  }
-
-  /// Adds the area below a compact instance. `points`: its samples, at least one.
-  void add_hull(PointsView points) {
-    if (!removes_footprint_) return;
-    const float lowest = *std::min_element(points.z.begin(), points.z.end());
-    hull_.visit(points, [&](float x, float y) { footprint_.add(x, y, lowest); });
   }
 
   /// Adds the points of dynamic groups. `group_of`: by point, index in `groups`.
@@ -76,31 +61,29 @@ class MovedGround {
     }
   }
 
-  /// Returns the ground points to remove, and clears the added points. `boxes`: result of bound()
-  /// for `ground`. `samples`: of `ground`. The span is valid until the next call.
-  Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, Span<const GroundBox> boxes,
-                                                const GroundSamples& samples) {
+  /// Returns the ground points to remove, and clears the added points. `samples`: of `ground`. The
+  /// span is valid until the next call.
+  Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, const GroundSamples& samples) {
     found_.clear();
-    under_.assign(boxes.size(), 0);
-    if (!footprint_.empty() && removes_footprint_) find_under(ground, boxes, samples);
+    under_.assign(GroundFootprint::block_count(ground.size()), 0);
+    if (!footprint_.empty() && removes_footprint_) find_under(ground, samples);
     if (find_free_voxels(samples)) remove_free_runs(ground, samples);
     footprint_.clear();
     return found_;
   }
 
  private:
-  static constexpr double kLeastCell = 0.05;      // m, smallest cell of the footprint
-  static constexpr double kDefaultCell = 0.2;     // m, cell for a footprint of 0
+  static constexpr double kLeastCell = 0.1;       // m, smallest cell of the footprint
+  static constexpr double kUnusedCell = 1.0;      // m, cell for a footprint of 0
   static constexpr std::uint32_t kLeastFree = 2;  // "free" references of a moved voxel
   static constexpr float kLeastRatio = 0.3F;      // "free" to "hit" references of a moved voxel
 
   // Removes the ground points under removed points that rise above the surrounding ground (the foot
   // of an object), or whose surrounding ground is unknown.
-  void find_under(PointsView ground, Span<const GroundBox> boxes, const GroundSamples& samples) {
-    footprint_.spread();
+  void find_under(PointsView ground, const GroundSamples& samples) {
     bool any = false;
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-      under_[i] = footprint_.find_under(block_of(ground, i), boxes[i], clearance_);
+    for (std::size_t i = 0; i < under_.size(); ++i) {
+      under_[i] = footprint_.find_under(block_of(ground, i), clearance_);
       any |= under_[i] != 0;
     }
     if (!any) return;
@@ -196,8 +179,7 @@ class MovedGround {
   GroundFootprint footprint_;
   SurroundingGround around_;
   PointBuffer around_points_;
-  std::vector<std::uint64_t> under_;  // by block of the ground: points under removed points
-  InstanceHull hull_;
+  std::vector<std::uint64_t> under_;    // by block of the ground: points under removed points
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
   std::vector<std::uint8_t> moved_;  // by group, then by number of the voxel

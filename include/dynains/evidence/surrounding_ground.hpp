@@ -30,30 +30,34 @@ class SurroundingGround {
     forget();
   }
 
-  /// Replaces the ground points (m), which must stay valid for height(). The planes exclude points
-  /// that lie `rise` (m) or more above the plane of all points, since these may belong to an
-  /// object, and points of cells without a plane.
+  /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
+  /// the plane of all points, since these may belong to an object, and points of cells without a
+  /// plane.
   void assign(PointsView points, float rise) {
     forget();
-    points_ = points;
-    rise_ = rise;
-    grow(next_, points.size());
-    for (std::size_t i = points.size(); i-- > 0;) {
-      Cell& cell = cell_at(index_of(points.x[i], points.y[i]));
-      next_[i] = cell.first;
-      cell.first = static_cast<std::uint32_t>(i);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float x = points.x[i], y = points.y[i], z = points.z[i];
+      add(x, y, z, 1.0, cell_at(index_of(x, y)).all);
+    }
+    for (const std::size_t index : used_) {
+      Cell& cell = cells_[number_of_[index]];
+      cell.plane = plane_around(index, &Cell::all);
+      cell.kept = cell.all;
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const float x = points.x[i], y = points.y[i], z = points.z[i];
+      Cell& cell = cell_at(index_of(x, y));
+      if (cell.plane.height(x, y, z) >= rise) add(x, y, z, -1.0, cell.kept);
     }
   }
 
-  /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown. Only the cells
-  /// around the asked points are computed.
+  /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
   float height(float x, float y, float z) {
     const std::size_t index = index_of(x, y);
     Cell& cell = cell_at(index);
-    if (!cell.has_plane) {
-      cell.has_plane = true;
-      cell.plane = plane_around(
-          index, [this](std::size_t place) { find_kept(place); }, &Cell::kept);
+    if (!cell.has_final_plane) {
+      cell.has_final_plane = true;
+      cell.plane = plane_around(index, &Cell::kept);
     }
     return cell.plane.height(x, y, z);
   }
@@ -64,8 +68,6 @@ class SurroundingGround {
   static constexpr double kLeastPoints = 8.0;
   static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
 
-  static constexpr std::uint32_t kNoPoint = 0xFFFFFFFFU;
-
   // Plane z = slope_x * x + slope_y * y + offset.
   struct Plane {
     float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
@@ -75,10 +77,9 @@ class SurroundingGround {
     }
   };
   struct Cell {
-    std::uint32_t first = kNoPoint;  // its points are a list, see next_
-    PlaneMoments all, kept;          // of all its points, and of those that do not rise
-    Plane plane;                     // through the kept points around
-    bool has_all = false, has_kept = false, has_plane = false;
+    PlaneMoments all, kept;  // of all its points, and of those that do not rise
+    Plane plane;             // through all points around; if it is final, through the kept ones
+    bool has_final_plane = false;
   };
 
   // Cell 0 is the empty cell of all unused places.
@@ -110,44 +111,15 @@ class SurroundingGround {
     return cells_[number];
   }
 
-  template <class Visit>
-  void for_points(const Cell& cell, Visit&& visit) const {
-    for (std::uint32_t i = cell.first; i != kNoPoint; i = next_[i]) {
-      visit(points_.x[i], points_.y[i], points_.z[i]);
-    }
-  }
   static void add(float x, float y, float z, double weight, PlaneMoments& moments) {
     moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z), weight);
   }
 
-  void find_all(std::size_t index) {
-    Cell& cell = cells_[number_of_[index]];
-    if (cell.has_all) return;
-    cell.has_all = true;
-    for_points(cell, [&](float x, float y, float z) { add(x, y, z, 1.0, cell.all); });
-  }
-
-  void find_kept(std::size_t index) {
-    Cell& cell = cells_[number_of_[index]];
-    if (cell.has_kept) return;
-    cell.has_kept = true;
-    if (cell.first == kNoPoint) return;
-    const Plane plane = plane_around(
-        index, [this](std::size_t place) { find_all(place); }, &Cell::all);
-    cell.kept = cell.all;
-    for_points(cell, [&](float x, float y, float z) {
-      if (plane.height(x, y, z) >= rise_) add(x, y, z, -1.0, cell.kept);
-    });
-  }
-
-  // Plane through the points of a cell and of the cells around it. Their `moments` are valid after
-  // `find(place)`.
-  template <class Find>
-  Plane plane_around(std::size_t index, Find&& find, PlaneMoments Cell::*moments) {
+  // Plane through the points of a cell and of the cells around it.
+  Plane plane_around(std::size_t index, PlaneMoments Cell::*moments) const {
     PlaneMoments sum;
     for (const std::size_t row : {index - width_, index, index + width_}) {
       for (const std::size_t place : {row - 1, row, row + 1}) {
-        find(place);
         sum += cells_[number_of_[place]].*moments;
       }
     }
@@ -182,9 +154,6 @@ class SurroundingGround {
   std::vector<std::uint32_t> number_of_;  // row-major: index in cells_
   std::vector<std::size_t> used_;         // indices of the non-zero entries of number_of_
   std::vector<Cell> cells_;
-  PointsView points_;
-  std::vector<std::uint32_t> next_;  // by point: next point of its cell, in ascending order
-  float rise_ = 0.0F;
 };
 
 }  // namespace dynains::detail

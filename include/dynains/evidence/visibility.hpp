@@ -78,22 +78,14 @@ class Visibility {
     }
   }
 
-  /// Bits of the 64 samples from `first` on; `first` is a multiple of 64. Bits behind the last
-  /// sample are arbitrary.
-  std::uint64_t free_word(std::size_t first) const { return word_at(free_, first); }
-  std::uint64_t hit_word(std::size_t first) const { return word_at(hit_, first); }
   bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
   bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
-  // The word that begins with the byte of the first bit.
-  static std::uint64_t word_at(const std::vector<std::uint8_t>& bits, std::size_t first) {
+  static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
     std::uint64_t word;
     std::memcpy(&word, &bits[first / 8], sizeof(word));
-    return word;
-  }
-  static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
-    return word_at(bits, first) >> first % 8;
+    return word >> first % 8;
   }
   std::vector<std::uint8_t> free_, hit_;
 };
