@@ -1,5 +1,6 @@
 // Parts of ingest and ground segmentation compared with simple implementations.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>

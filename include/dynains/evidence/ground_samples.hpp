@@ -1,7 +1,6 @@
 // Samples of the ground of one scan, with their visibility from reference scans.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
