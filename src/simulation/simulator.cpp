@@ -67,12 +67,8 @@ Rigid to_rigid(const Pose& t) {
 
 Pose isometry(const Eigen::Matrix3d& r, double x, double y, double z) {
   Pose result = Pose::Identity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) result(i, j) = r(i, j);
-  }
-  result(0, 3) = x;
-  result(1, 3) = y;
-  result(2, 3) = z;
+  result.linear() = r;
+  result.translation() << x, y, z;
   return result;
 }
 
@@ -334,8 +330,7 @@ class Simulator::Implementation {
       const Object& object = world_.traffic.objects[pose.object];
       const bool person = object.kind == Kind::kPedestrian;
       const Pose T_world_object =
-          person ? isometry(rotation(pose.at.heading, 0, 0), pose.at.position.x, pose.at.position.y,
-                            world_.terrain.height(pose.at.position))
+          person ? upright(pose.at)
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
       const std::uint32_t instance = object.instance == 0 ? pose.object + 1 : object.instance;
       states.push_back({instance, label_of(pose), T_world_object, pose.speed, object.size.length,

@@ -61,32 +61,18 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
   return result;
 }
 
-/// Corridors that can have the nearest edge or the widest pavement for a point within `radius` of
-/// `centre`, with the segments that can be nearest to it.
-std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
-                                     double radius) {
-  double edge = kFar;   // m; no point has a farther one
-  double pavement = 0;  // m; no point has a narrower one
-  for (const Corridor& corridor : corridors) {
-    const double farthest = corridor.distance(centre) + radius - corridor.street->half_width;
-    edge = std::min(edge, farthest);
-    pavement = std::max(pavement, corridor.street->pavement - farthest);
+/// The corridors, with the segments that can be nearest to a point within `radius` of `centre`.
+std::vector<Corridor> nearest_within(std::vector<Corridor> corridors, Vec2 centre, double radius) {
+  for (Corridor& corridor : corridors) {
+    const double reach = corridor.distance(centre) + 2 * radius;
+    auto& segments = corridor.segments;
+    segments.erase(std::remove_if(segments.begin(), segments.end(),
+                                  [&](const Segment& segment) {
+                                    return std::sqrt(segment.squared_distance(centre)) > reach;
+                                  }),
+                   segments.end());
   }
-  std::vector<Corridor> result;
-  for (const Corridor& corridor : corridors) {
-    const Street& street = *corridor.street;
-    const double distance = corridor.distance(centre);
-    const double nearest = distance - radius - street.half_width;
-    if (nearest > edge && street.pavement - nearest <= pavement) continue;
-    Corridor kept{&street, {}};
-    for (const Segment& segment : corridor.segments) {
-      if (std::sqrt(segment.squared_distance(centre)) <= distance + 2 * radius) {
-        kept.segments.push_back(segment);
-      }
-    }
-    result.push_back(std::move(kept));
-  }
-  return result;
+  return corridors;
 }
 
 struct Ground {
@@ -146,23 +132,17 @@ void Terrain::add_hills(Vec2 corner, std::vector<double>& heights) const {
   }
 }
 
-double Terrain::bumps(Vec2 p, Lattice& lattice) const {
-  const double u = p.x / lattice.wavelength, v = p.y / lattice.wavelength;
+double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
+  const double u = p.x / wavelength, v = p.y / wavelength;
   const double iu = std::floor(u), iv = std::floor(v);
-  if (iu != lattice.column || iv != lattice.row) {
-    const auto corner = [&](double du, double dv) {
-      const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(iu + du));
-      const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(iv + dv));
-      return 2 * static_cast<double>(unit_float(mix(mix(salt_ + lattice.salt, a), b))) - 1;
-    };
-    lattice.column = iu;
-    lattice.row = iv;
-    lattice.corners = {corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)};
-  }
-  const auto& corners = lattice.corners;
+  const auto corner = [&](double du, double dv) {
+    const auto a = static_cast<std::uint64_t>(static_cast<std::int64_t>(iu + du));
+    const auto b = static_cast<std::uint64_t>(static_cast<std::int64_t>(iv + dv));
+    return 2 * static_cast<double>(unit_float(mix(mix(salt_ + salt, a), b))) - 1;
+  };
   const double fu = smooth_step(u - iu), fv = smooth_step(v - iv);
-  const double low = corners[0] * (1 - fu) + corners[1] * fu;
-  const double high = corners[2] * (1 - fu) + corners[3] * fu;
+  const double low = corner(0, 0) * (1 - fu) + corner(1, 0) * fu;
+  const double high = corner(0, 1) * (1 - fu) + corner(1, 1) * fu;
   return low * (1 - fv) + high * fv;
 }
 
@@ -183,7 +163,6 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   }
   std::vector<double> hills(grid_index(kCells + 1, 0, kCells + 1), 0.0);
   add_hills(corner, hills);
-  Lattice coarse{4.0, 1}, fine{1.1, 2};
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
       const Vec2 p = corner + Vec2{column * kCell, row * kCell};
@@ -196,7 +175,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       const double uneven = config_.roughness * (0.3 + 0.7 * wild);
       const auto sample = grid_index(row, column, kCells + 1);
       double height = hills[sample];
-      height += uneven * (0.6 * bumps(p, coarse) + 0.4 * bumps(p, fine));
+      height += uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
       height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
       tile.heights[sample] = static_cast<float>(height);

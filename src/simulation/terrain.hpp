@@ -54,19 +54,12 @@ class Terrain {
     std::array<std::uint8_t, grid_index(kCells, 0, kCells)> labels;
   };
 
-  /// Random heights, and those of the cell that was asked for last.
-  struct Lattice {
-    double wavelength;  ///< m
-    std::uint64_t salt;
-    double column = 0.5, row = 0.5;  ///< of that cell; whole numbers after the first question
-    std::array<double, 4> corners{};
-  };
-
   const Tile& tile(int ix, int iy);
   void build(int ix, int iy, Tile& tile) const;
   /// Adds the hills at the samples of the tile whose lowest corner is `corner`.
   void add_hills(Vec2 corner, std::vector<double>& heights) const;
-  double bumps(Vec2 p, Lattice& lattice) const;
+  /// Random heights in [-1, 1] with this wavelength (m).
+  double bumps(Vec2 p, double wavelength, std::uint64_t salt) const;
   float height_near(float x, float y) const;
 
   TerrainConfig config_;

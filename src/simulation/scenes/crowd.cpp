@@ -13,13 +13,6 @@ namespace {
 constexpr double kWalkingSpeed = 1.2;  // m/s
 constexpr double kStartOnSquare = 80;  // m along the street
 
-/// The ego vehicle is a robot, which keeps less distance than a car.
-void make_robot(Traffic& traffic) {
-  traffic.objects[0].size = {0.8, 0.6, 0.9};
-  traffic.drivers[0].rest_gap = 0.3;
-  traffic.drivers[0].foresight = 0.2;
-}
-
 /// Trees, street furniture and stalls between the walkers.
 void furnish_square(Builder& builder, Random& random, const Street& street, double length,
                     double side_of_ego) {

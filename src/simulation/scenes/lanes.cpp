@@ -83,6 +83,12 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
   return lanes;
 }
 
+void make_robot(Traffic& traffic) {
+  traffic.objects[0].size = {0.8, 0.6, 0.9};
+  traffic.drivers[0].rest_gap = 0.3;
+  traffic.drivers[0].foresight = 0.2;
+}
+
 void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed, double trucks,
                double buses, double cyclists) {
   if (!builder.lively()) return;

@@ -16,6 +16,9 @@ struct StreetLanes {
 StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& crossings,
                                  double speed, double ego_s);
 
+/// Makes the ego vehicle a robot, which keeps less distance than a car.
+void make_robot(Traffic& traffic);
+
 /// Vehicles all along a lane, `spacing` metres apart on average; shares of kinds.
 void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed, double trucks,
                double buses, double cyclists);

@@ -66,10 +66,7 @@ void add_sensor(Builder& builder, const StreetLanes& lanes, double speed) {
   const Street& street = builder.street(0);
   const std::size_t way = builder.lane(street, -(street.half_width + 0.6 * street.pavement));
   builder.ego(way, kBefore, speed);
-  Traffic& traffic = builder.traffic();
-  traffic.objects[0].size = {0.8, 0.6, 0.9};
-  traffic.drivers[0].rest_gap = 0.3;
-  traffic.drivers[0].foresight = 0.2;
+  make_robot(builder.traffic());
 }
 
 /// Events of long recordings: deliveries and buses at stops against the way, which wait and go, and
