@@ -139,7 +139,7 @@ def test_the_script_for_slurm_gives_the_results_of_single_runs(slurm, tmp_path):
     for seed in range(2):
         dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(drives / f"drive{seed}")
         dynains.run(drives / f"drive{seed}", tmp_path / "expected" / f"drive{seed}")
-    job = [str(SCRIPT), str(drives), "--out", str(tmp_path / "out")]
+    job = [str(SCRIPT), *map(str, sorted(drives.iterdir())), "--out", str(tmp_path / "out")]
     command = ["sbatch", "--parsable", "--nodes=1", "--ntasks-per-node=2", "--output=job.log", *job]
     if os.cpu_count() < 2:
         command[3] = "--ntasks-per-node=1"
