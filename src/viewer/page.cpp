@@ -55,13 +55,9 @@ Json describe(const ViewData& data, const Json& packing) {
           {"causes", causes},
           {"counts",
            {{"points", counts.points},
-            {"map", counts.map},
             {"moving", counts.moving},
             {"missed", counts.missed},
             {"lost", counts.lost}}},
-          {"map_cell", data.map_cell},
-          {"moving_cell", data.moving_cell},
-          {"references", {{"step", data.reference_step}, {"lookback", data.reference_lookback}}},
           {"has_truth", data.has_truth},
           {"has_beliefs", data.has_beliefs},
           {"packing", packing}};

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <new>
-#include <numeric>
 #include <vector>
 
 namespace dynains::viewer {
@@ -63,27 +62,11 @@ class Column16 {
   std::string high_;
 };
 
-/// Values of a 64 bit column, byte by byte.
-class Column64 {
- public:
-  void add(std::uint64_t value) {
-    for (std::size_t byte = 0; byte < bytes_.size(); ++byte) {
-      bytes_[byte] += static_cast<char>(value >> 8 * byte & 0xFFU);
-    }
-  }
-  std::string bytes() const { return std::accumulate(bytes_.begin(), bytes_.end(), std::string()); }
-
- private:
-  std::array<std::string, 8> bytes_;
-};
-
 class Packer {
  public:
   explicit Packer(double full_intensity) : full_intensity_(full_intensity) {}
 
-  /// `sightings`: by point, or empty.
-  void add_layer(int layer, const std::vector<ViewPoint>& points,
-                 const std::vector<Sightings>& sightings) {
+  void add_layer(int layer, const std::vector<ViewPoint>& points) {
     std::vector<PackedPoint> sorted;
     sorted.reserve(points.size());
     for (const ViewPoint& point : points) sorted.push_back(packed(point));
@@ -93,11 +76,6 @@ class Packer {
     for (std::size_t i = 0; i < sorted.size(); ++i) {
       if (i == 0 || sorted[i].chunk != sorted[i - 1].chunk) begin_chunk(layer, sorted[i].chunk);
       add(sorted[i]);
-      if (sightings.empty()) continue;
-      const auto& [passed, returned] =
-          sightings[static_cast<std::size_t>(sorted[i].point - points.data())];
-      passed_.add(passed);
-      returned_.add(returned);
     }
   }
 
@@ -108,7 +86,7 @@ class Packer {
     for (const Column16* column : {&steps_[0], &steps_[1], &steps_[2], &scan_, &instance_}) {
       bytes += column->bytes();
     }
-    return bytes + intensity_ + belief_ + cause_ + flags_ + passed_.bytes() + returned_.bytes();
+    return bytes + intensity_ + belief_ + cause_ + flags_;
   }
 
  private:
@@ -143,7 +121,6 @@ class Packer {
   std::array<Column16, 3> steps_;
   Column16 scan_, instance_;
   std::string intensity_, belief_, cause_, flags_;
-  Column64 passed_, returned_;
 };
 
 /// The 99th percentile of the intensities; 1 if it is not positive.
@@ -177,8 +154,8 @@ std::string compressed(const std::string& bytes) {
 PackedPoints pack(const ViewData& data) {
   const double intensity = full_intensity(data);
   Packer packer(intensity);
-  packer.add_layer(0, data.map, {});
-  packer.add_layer(1, data.moving, data.sightings);
+  packer.add_layer(0, data.map);
+  packer.add_layer(1, data.moving);
   return {compressed(packer.columns()),
           {{"unit", kUnit}, {"intensity", intensity}, {"chunks", packer.chunks()}}};
 }

@@ -11,8 +11,7 @@ namespace dynains::viewer {
 struct PackedPoints {
   /// zlib stream of columns, each with one value per point: x, y, z, scan, instance (differences
   /// to the point before in its chunk, modulo 65536; first all low bytes, then all high bytes),
-  /// intensity, belief, cause, and flags (label + 4 * truth), one byte each. Then, for moving
-  /// points alone, Sightings::passed and Sightings::returned: first all low bytes.
+  /// intensity, belief, cause, and flags (label + 4 * truth), one byte each.
   std::string bytes;
   /// `unit`: step of x, y, z, m. `intensity`: value of 255. `chunks`: `layer` (0 map, 1 moving),
   /// `count` of points, `origin` of x, y, z in m.

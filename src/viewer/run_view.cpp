@@ -1,7 +1,6 @@
 #include "run_view.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,8 +8,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
-#include "dynains/io/point_file.hpp"
-#include "map_index.hpp"
 #include "thinning.hpp"
 
 namespace dynains::viewer {
@@ -18,8 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSmallestMapCell = 0.05;     // m, if the map has to be thinned
-constexpr double kSmallestMovingCell = 0.05;  // m
+constexpr double kSmallestCell = 0.05;  // m
 // Classes in label files of a run.
 constexpr std::uint32_t kStatic = 9;
 constexpr std::uint32_t kMoving = 251;
@@ -36,52 +32,33 @@ struct Scan {
 class Collector {
  public:
   Collector(const Recording& recording, const RunFiles& files, std::size_t max_points)
-      : recording_(recording), files_(files) {
-    if (files.last - files.first >= ViewPoint::kNoScan) {
+      : recording_(recording),
+        files_(files),
+        max_points_(max_points),
+        // A third is left for the moving points.
+        static_(max_points - max_points / 3, std::max(files.map_voxel, kSmallestCell),
+                ThinnedPoints::Time::kAllScans),
+        moving_(max_points, kSmallestCell, ThinnedPoints::Time::kSeparateScans) {
+    if (files.last - files.first >= ViewPoint::kMostScans) {
       throw ConfigError("a page shows at most 65535 scans, not " +
                         std::to_string(files.last - files.first + 1));
     }
     data_.origin = recording.T_world_sensor(files.first).translation();
     data_.title = recording.folder().filename().string();
     data_.has_truth = recording.has_labels();
-    if (!files.map.empty()) read_map(max_points);
-    const std::size_t budget = max_points - data_.map.size();
-    moving_.emplace(budget, kSmallestMovingCell, ThinnedPoints::Time::kSeparateScans);
   }
 
   ViewData collect() {
-    const MapIndex map(data_.map);
     for (std::size_t i = files_.first; i <= files_.last; ++i) {
       read_scan(i);
-      add_scan(i, map);
+      add_scan(i);
     }
-    data_.moving = moving_->take();
-    data_.moving_cell = moving_->cell();
-    find_sightings();
+    data_.map = static_.take(max_points_ - max_points_ / 3);
+    data_.moving = moving_.take(max_points_ - data_.map.size());
     return std::move(data_);
   }
 
  private:
-  void read_map(std::size_t max_points) {
-    const PointFile file = read_points(files_.map);
-    data_.counts.map = file.positions.size();
-    const auto local = [&](const Eigen::Vector3d& position) {
-      ViewPoint point;
-      point.local = (position - data_.origin).cast<float>();
-      point.label = ViewLabel::kStatic;
-      return point;
-    };
-    const std::size_t budget = max_points - max_points / 3;
-    if (file.positions.size() <= budget) {
-      for (const auto& position : file.positions) data_.map.push_back(local(position));
-      return;
-    }
-    ThinnedPoints thinned(budget, kSmallestMapCell, ThinnedPoints::Time::kAllScans);
-    for (const auto& position : file.positions) thinned.add(local(position));
-    data_.map = thinned.take();
-    data_.map_cell = thinned.cell();
-  }
-
   void read_scan(std::size_t i) {
     const std::string& name = recording_.name(i);
     recording_.read_scan(i, scan_.points);
@@ -133,7 +110,7 @@ class Collector {
         point.label == ViewLabel::kStatic && point.truth == ViewTruth::kMoving ? 1U : 0U;
   }
 
-  void add_scan(std::size_t i, const MapIndex& map) {
+  void add_scan(std::size_t i) {
     Pose T_local_sensor = recording_.T_world_sensor(i);
     T_local_sensor.translation() -= data_.origin;
     for (std::size_t k = 0; k < scan_.labels.size(); ++k) {
@@ -141,36 +118,16 @@ class Collector {
       count(point);
       if (point.label == ViewLabel::kNotJudged) continue;
       point.local = (T_local_sensor * scan_.points.point(k).position).cast<float>();
-      if (point.label == ViewLabel::kMoving) {
-        moving_->add(point);
-        continue;
-      }
-      const std::uint32_t found = map.find(point.local);
-      if (found == MapIndex::kNone || data_.map[found].scan != ViewPoint::kNoScan) continue;
-      point.local = data_.map[found].local;
-      data_.map[found] = point;
+      (point.label == ViewLabel::kMoving ? moving_ : static_).add(point);
     }
-  }
-
-  void find_sightings() {
-    data_.reference_step = files_.references.step();
-    data_.reference_lookback = files_.references.lookback();
-    SightingFinder finder(data_.moving, files_.references);
-    for (std::size_t i = files_.first; i <= files_.last; ++i) {
-      if (!files_.references.is_reference(i - files_.first)) continue;
-      recording_.read_scan(i, scan_.points);
-      Pose T_local_sensor = recording_.T_world_sensor(i);
-      T_local_sensor.translation() -= data_.origin;
-      finder.compare(i - files_.first, T_local_sensor.inverse(), scan_.points.xyzi);
-    }
-    data_.sightings = finder.take();
   }
 
   const Recording& recording_;
   const RunFiles& files_;
+  std::size_t max_points_;
+  ThinnedPoints static_, moving_;
   const evaluation::TruthClasses truth_;
   ViewData data_;
-  std::optional<ThinnedPoints> moving_;
   Scan scan_;
 };
 

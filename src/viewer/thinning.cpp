@@ -30,8 +30,8 @@ void ThinnedPoints::add(const ViewPoint& point) {
   if (points_.size() > 2 * budget_ + 1000) thin();
 }
 
-std::vector<ViewPoint> ThinnedPoints::take() {
-  while (points_.size() > budget_) thin();
+std::vector<ViewPoint> ThinnedPoints::take(std::size_t most) {
+  while (points_.size() > most) thin();
   occupied_.clear();
   return std::move(points_);
 }
@@ -51,7 +51,7 @@ void ThinnedPoints::thin() {
     cell_ *= kGrowth;
   } else {
     scans_per_cell_ *= 2;
-    if (scans_per_cell_ > ViewPoint::kNoScan) time_ = Time::kAllScans;
+    if (scans_per_cell_ > ViewPoint::kMostScans) time_ = Time::kAllScans;
   }
   occupied_.clear();
   std::size_t kept = 0;

@@ -21,10 +21,8 @@ class ThinnedPoints {
 
   void add(const ViewPoint& point);
 
-  /// Edge of the cells, m.
-  double cell() const { return cell_; }
-  /// At most `budget` points. Call it after the last point.
-  std::vector<ViewPoint> take();
+  /// At most `most` points, which is at most `budget`. Call it after the last point.
+  std::vector<ViewPoint> take(std::size_t most);
 
  private:
   bool is_first(const ViewPoint& point);

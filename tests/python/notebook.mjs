@@ -23,7 +23,7 @@ await withPage(`file://${folder}/notebook.html`, {width: 600, height: 500}, asyn
   const frame = await node.contentFrame();
   const shown = await frame.evaluate(async () => {
     const {points, description} = await window.dynainsViewer;
-    return [points.total, description.counts.map, description.scans.length];
+    return [points.total, description.counts.moving, description.scans.length];
   });
   assert.ok(shown[0] > 1000 && shown[0] >= shown[1], shown);
   assert.equal(shown[2], 5);

@@ -42,8 +42,8 @@ function summaryOf(description, points) {
     .reduce((sum, chunk) => sum + chunk.count, 0));
   const {counts} = description;
   let text = `${count(description.scans.length)} scans, ${count(counts.points)} points. ` +
-    `This page has ${count(shown[0])} of ${count(counts.map)} map points and ` +
-    `${count(shown[1])} of ${count(counts.moving)} removed points.`;
+    `This page has ${count(shown[0])} static points and ${count(shown[1])} of ` +
+    `${count(counts.moving)} removed points.`;
   if (description.has_truth) {
     text += ` By ground truth, ${count(counts.missed)} moving points were missed and ` +
       `${count(counts.lost)} static points were lost.`;
@@ -59,37 +59,18 @@ function errorOf(point) {
   return truth + (point.label === 2 ? ': lost static point' : ': missed moving point');
 }
 
-// "4 of 6 later scans: 000012, ...; 0 of 2 earlier scans": whose beams passed through a place, of
-// those whose beams came as far as it.
-function passagesOf(description, points, index) {
-  const own = pointAt(points, index).scan;
-  const {passed, returned} = sightingsAt(points, description.references, index);
-  const part = (name, isPart) => {
-    const through = passed.filter(isPart);
-    const all = through.length + returned.filter(isPart).length;
-    if (all === 0) return [];
-    const names = through.map((scan) => description.scans[scan].name).join(', ');
-    return [`${through.length} of ${all} ${name} scans` + (names ? `: ${names}` : '')];
-  };
-  const parts = [...part('later', (scan) => scan > own), ...part('earlier', (scan) => scan < own)];
-  return parts.length ? parts.join('; ') : 'no other scan looked there';
-}
-
 function factsOf(description, points, index) {
   const point = pointAt(points, index);
-  const scan = point.scan === NO_SCAN ? null : description.scans[point.scan];
+  const scan = description.scans[point.scan];
   const world = point.local.map((value, axis) => (value + description.origin[axis]).toFixed(2));
   const facts = [
-    ['scan', scan ? `${scan.name} (${scan.time.toFixed(2)} s)` : 'not found'],
+    ['scan', `${scan.name} (${scan.time.toFixed(2)} s)`],
     ['instance', point.instance === 0 ? 'none' : String(point.instance)],
     ['label', LABELS[point.label]],
     ['belief', description.has_beliefs ? point.belief.toFixed(2)
       : 'not in the files (dynains run --write-beliefs)'],
     ['cause', CAUSE_SENTENCES[point.cause] ?? CAUSE_SENTENCES[0]],
   ];
-  if (index >= points.sightings.first) {
-    facts.push(['seen through by', passagesOf(description, points, index)]);
-  }
   if (description.has_truth) facts.push(['ground truth', errorOf(point)]);
   facts.push(['position', world.join(', ') + ' m']);
   return facts;

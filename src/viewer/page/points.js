@@ -1,7 +1,6 @@
 // Decodes the points of the page. Columns: see point_packer.hpp.
 
 const VERTEX_BYTES = 16;
-const NO_SCAN = 65535;
 
 async function inflated(base64) {
   const text = atob(base64);
@@ -15,8 +14,7 @@ async function inflated(base64) {
 async function decodePoints(base64, packing) {
   const bytes = await inflated(base64);
   const total = packing.chunks.reduce((sum, chunk) => sum + chunk.count, 0);
-  const moving = packing.chunks.reduce((sum, c) => sum + (c.layer === 1 ? c.count : 0), 0);
-  if (bytes.length !== 14 * total + 16 * moving) throw new Error('the points of this page are damaged');
+  if (bytes.length !== 14 * total) throw new Error('the points of this page are damaged');
   const vertices = new ArrayBuffer(VERTEX_BYTES * total);
   const words = new Uint16Array(vertices);
   const octets = new Uint8Array(vertices);
@@ -42,26 +40,7 @@ async function decodePoints(base64, packing) {
     first += chunk.count;
     return placed;
   });
-  // The map comes before the moving points.
-  const sightings = {first: total - moving, count: moving, bytes: bytes.subarray(14 * total)};
-  return {total, vertices, words, octets, chunks, sightings, unit: packing.unit};
-}
-
-// Indices of the scans whose beams passed through the place of a moving point, or were returned
-// there.
-function sightingsAt(points, references, i) {
-  const {first, count, bytes} = points.sightings;
-  const {step, lookback} = references;
-  const begin = Math.ceil(Math.max(pointAt(points, i).scan - lookback, 0) / step) * step;
-  const scansOf = (column) => {
-    const scans = [];
-    for (let bit = 0; bit < 64; ++bit) {
-      const byte = bytes[(8 * column + (bit >> 3)) * count + i - first];
-      if (byte >> (bit & 7) & 1) scans.push(begin + bit * step);
-    }
-    return scans;
-  };
-  return {passed: scansOf(0), returned: scansOf(1)};
+  return {total, vertices, words, octets, chunks, unit: packing.unit};
 }
 
 // The values of point i.

@@ -51,7 +51,7 @@ bool is_hidden() {
   if ((causes >> min(bytes.z, 31u) & 1u) == 0u) return true;
   if (current_scan < 0) return false;
   // The map grows; moving points are shown at their scan.
-  return is_moving_layer ? int(scan) != current_scan : scan != 65535u && int(scan) > current_scan;
+  return is_moving_layer ? int(scan) != current_scan : int(scan) > current_scan;
 }
 
 void main() {
