@@ -43,10 +43,6 @@ endforeach()
 if(TARGET dynains_program)
   install(TARGETS dynains_program
     RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT dynains_program)
-  if(NOT CMAKE_CROSSCOMPILING)
-    install(FILES ${PROJECT_BINARY_DIR}/dynains.bash RENAME dynains
-      DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT dynains_program)
-  endif()
 endif()
 
 # Programs and shared libraries find the shared libraries after the tree was moved.

@@ -17,7 +17,6 @@ void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
 void add_view_command(CLI::App& app);
-void add_completion_command(CLI::App& app);
 
 /// Exit codes; an interrupted run exits with 128 + the number of the signal.
 inline constexpr int kExitFailure = 1;

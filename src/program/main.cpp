@@ -17,7 +17,6 @@
 #include "odometry_command.hpp"
 #include "run/interrupt.hpp"
 #include "run/printable.hpp"
-#include "unknown_command.hpp"
 
 namespace {
 
@@ -98,7 +97,6 @@ int main(int argc, char** argv) {
   add_eval_command(app);
   add_experiment_command(app);
   add_view_command(app);
-  add_completion_command(app);
 
   try {
     app.parse(argc, argv);
@@ -109,8 +107,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return print_help(app, success);
   } catch (const CLI::ParseError& error) {
-    const std::string what = remark_on_unknown_word(app).value_or(error.what());
-    return fail(kExitUsage, what + " (see dynains --help)");
+    return fail(kExitUsage, error.what() + std::string(" (see dynains --help)"));
   } catch (const dynains::ConfigError& error) {
     return fail(kExitUsage, error.what());
   } catch (const dynains::UsageError& error) {

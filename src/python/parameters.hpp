@@ -9,11 +9,9 @@
 #include <string>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
-#include "run/nearest_name.hpp"
 
 namespace dynains::python {
 
@@ -78,27 +76,18 @@ void assign(const Parameter<T>& parameter, const py::handle& value) {
   parameter.value = wanted;
 }
 
-/// Throws ConfigError with the nearest of `names`.
-[[noreturn]] inline void refuse(const std::string& name, const std::vector<std::string>& names) {
-  const std::string like = program::nearest_name(name, names);
-  throw ConfigError("unknown parameter " + name +
-                    (like.empty() ? "" : "; did you mean " + like + "?"));
-}
-
 /// Sets the parameters that `values` names. Throws ConfigError for unknown names.
 template <class Config>
 void assign_all(Config& config, const py::dict& values) {
   for (const std::pair<py::handle, py::handle> item : values) {
     const std::string name = py::str(item.first);
     bool found = false;
-    std::vector<std::string> names;
     Config::visit(config, [&](const auto& parameter) {
-      names.emplace_back(parameter.name);
       if (parameter.name != name) return;
       assign(parameter, item.second);
       found = true;
     });
-    if (!found) refuse(name, names);
+    if (!found) throw ConfigError("unknown parameter " + name);
   }
 }
 

@@ -74,16 +74,12 @@ constexpr const char* kObjects =
 /// Takes the arguments of a run out of `values`, which keeps the options of the recording.
 RunArguments take_arguments(py::dict& values) {
   RunArguments run;
-  const std::vector<std::string> options = setting_names<program::RecordingSettings>();
   py::dict rest;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
     if (take_object(run, name, value) || assign_setting(run.settings, name, value)) continue;
-    if (std::find(options.begin(), options.end(), name) == options.end()) {
-      std::vector<std::string> names = setting_names<RunSettings>();
-      names.insert(names.end(), options.begin(), options.end());
-      names.insert(names.end(), {"preset", "config", "progress"});
-      refuse(name, names);
+    if (!has_setting<program::RecordingSettings>(name)) {
+      throw ConfigError("unknown parameter " + name);
     }
     rest[key] = value;
   }

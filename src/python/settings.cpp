@@ -42,7 +42,7 @@ RecordingOptions to_recording_options(const py::dict& values) {
   RecordingSettings settings;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (!assign_setting(settings, name, value)) refuse(name, setting_names<RecordingSettings>());
+    if (!assign_setting(settings, name, value)) throw ConfigError("unknown parameter " + name);
   }
   return settings.checked();
 }

@@ -5,7 +5,6 @@
 #include <pybind11/pybind11.h>
 
 #include <string>
-#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "parameters.hpp"
@@ -31,11 +30,11 @@ bool assign_setting(Settings& settings, const std::string& name, const py::handl
 }
 
 template <class Settings>
-std::vector<std::string> setting_names() {
-  std::vector<std::string> names;
+bool has_setting(const std::string& name) {
+  bool is_known = false;
   const Settings defaults;
-  Settings::visit(defaults, [&](const auto& setting) { names.emplace_back(setting.name); });
-  return names;
+  Settings::visit(defaults, [&](const auto& setting) { is_known |= name == setting.name; });
+  return is_known;
 }
 
 /// Name, meaning and values of each setting, one a line, for docstrings.

@@ -8,7 +8,6 @@
 #include <sstream>
 
 #include "dynains/parameters.hpp"
-#include "nearest_name.hpp"
 #include "read_text_file.hpp"
 
 namespace dynains::program {
@@ -114,13 +113,6 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
     values.set(name, value, where + name);
   }
   return values;
-}
-
-void ParameterValues::refuse(const std::string& name, const std::string& where,
-                             const std::vector<std::string>& names) {
-  const std::string like = nearest_name(name, names);
-  throw ConfigError(where + ": unknown parameter" +
-                    (like.empty() ? "" : "; did you mean " + like + "?") + ", see dynains config");
 }
 
 }  // namespace dynains::program

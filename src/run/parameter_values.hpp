@@ -8,7 +8,6 @@
 #include <optional>
 #include <string>
 #include <type_traits>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
@@ -106,28 +105,21 @@ class ParameterValues {
   /// Whether a value has this flag name.
   bool has(const std::string& name) const { return values_.count(name) > 0; }
 
-  /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown and for
-  /// former names.
+  /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown names.
   template <class Config>
   void apply(Config& config) const {
     std::map<std::string, Value> left = values_;
-    std::vector<std::string> names;
     Config::visit(config, [&](const auto& parameter) {
-      names.push_back(flag_name(parameter.name));
       const auto found = left.find(flag_name(parameter.name));
       if (found == left.end()) return;
       assign_parameter(parameter, found->second.text, found->second.where);
       left.erase(found);
     });
     if (left.empty()) return;
-    refuse(left.begin()->first, left.begin()->second.where, names);
+    throw ConfigError(left.begin()->second.where + ": unknown parameter, see dynains config");
   }
 
  private:
-  /// Throws ConfigError with the present name of a former one, or the nearest of `names`.
-  [[noreturn]] static void refuse(const std::string& name, const std::string& where,
-                                  const std::vector<std::string>& names);
-
   struct Value {
     std::string text;
     std::string where;

@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
 #include <string>
 
@@ -46,10 +45,11 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
     std::string expected;
   };
   const std::vector<Case> cases = {
-      {{}, "expected a command"},         {{"walk"}, "walk"},
-      {{"run"}, "SEQ is required"},       {{"run", "seq"}, "--out is required"},
-      {{"run", "seq", "--out"}, "--out"}, {{"config", "--preset", "best"}, "best not in"},
-      {{"simulate"}, "OUT is required"},  {{"eval"}, "required"},
+      {{}, "expected a command"},           {{"walk"}, "walk"},
+      {{"run"}, "SEQ is required"},         {{"run", "seq"}, "--out is required"},
+      {{"run", "seq", "--out"}, "--out"},   {{"config", "--preset", "best"}, "best not in"},
+      {{"simulate"}, "OUT is required"},    {{"eval"}, "required"},
+      {{"config", "--preste"}, "--preste"},
   };
   for (const Case& wrong : cases) {
     const Outcome outcome = start(wrong.arguments);
@@ -59,38 +59,6 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
     CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
     CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
   }
-}
-
-TEST_CASE("An unknown command or option gives the nearest one") {
-  struct Case {
-    std::vector<std::string> arguments;
-    std::string expected;
-  };
-  const std::string all =
-      "xpected one of run, remap, clean, map, fleet, check, odometry, config, simulate, "
-      "eval, experiment, view, completion (";
-  const std::vector<Case> cases = {
-      {{"runn", "seq", "--out", "out"}, "\"runn\" is no command; did you mean run? E" + all},
-      {{"sim", "out"}, "\"sim\" is no command; did you mean simulate? E" + all},
-      {{"chekc", "seq"}, "did you mean check?"},
-      {{"remove", "seq"}, "\"remove\" is no command; e" + all},
-      {{""}, "\"\" is no command; e" + all},
-      {{"run", "seq", "--otu", "out"}, "--otu is no option of run; did you mean --out?"},
-      {{"run", "seq", "--out", "out", "--tau_s=1"},
-       "--tau_s is no option of run; did you mean --tau-s?"},
-      {{"run", "--nothing-like-it"}, "--nothing-like-it is no option of run (see"},
-      {{"experiment", "tabel1"}, "\"tabel1\" is no command; did you mean table1? Expected one of "},
-  };
-  for (const Case& wrong : cases) {
-    const Outcome outcome = start(wrong.arguments);
-    CAPTURE(wrong.expected);
-    CHECK(outcome.code == 2);
-    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
-    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
-  }
-  // For a word that is not in the place of a command, no command is proposed.
-  CHECK_THAT(start({"config", "runn"}).err, !ContainsSubstring("no command"));
-  CHECK_THAT(start({"--runn"}).err, !ContainsSubstring("no command"));
 }
 
 TEST_CASE("A failed write to standard output is an error, a closed pipe is none") {
@@ -144,24 +112,4 @@ TEST_CASE("A NUL byte in a config file is named with its line") {
   CHECK(outcome.code == 2);
   CHECK(outcome.err == "dynains: error: " + (folder / "config").string() +
                            ":2: expected a line of text, found a NUL byte\n");
-}
-
-TEST_CASE("The completion has every command and option") {
-  const std::string completion = start({"completion"}).out;
-  for (const char* command : {"run", "view", "experiment table1"}) {
-    CHECK_THAT(completion, ContainsSubstring(std::string("    \"") + command + "\") options="));
-  }
-
-  // Bash completes the words of a command line by the function.
-  const TemporaryFolder folder;
-  const std::string script = folder / "complete.sh";
-  write_text(script, completion + R"(
-reply() { COMP_WORDS=(dynains "$@"); COMP_CWORD=$#; _dynains; echo "${COMPREPLY[*]}"; }
-reply ru; reply run seq --tau-tr; reply experiment tab; reply view --max
-)");
-  FILE* const bash = ::popen(("bash '" + script + "'").c_str(), "r");
-  std::string shown;
-  for (int c = std::fgetc(bash); c != EOF; c = std::fgetc(bash)) shown += static_cast<char>(c);
-  CHECK(::pclose(bash) == 0);
-  CHECK(shown == "run\n--tau-track\ntable1\n--max-points\n");
 }

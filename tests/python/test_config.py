@@ -60,7 +60,7 @@ def test_the_configuration_of_a_remover_is_a_copy():
         ({"tau_s": "high"}, TypeError, "expected float"),
         ({"level": None}, TypeError, "level = None: expected bool"),
         ({"level": 0.5}, TypeError, "level = 0.5: expected bool"),
-        ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau; did you mean tau_s\\?"),
+        ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau$"),
         ({"decision": "paper"}, TypeError, "expected str, one of window|free_space"),
         ({"decision": 1}, TypeError, "decision = 1: expected str"),
     ],

@@ -102,7 +102,6 @@ def test_what_the_files_mean_is_told_by_name(drive):
 @pytest.mark.parametrize(
     "options, error, text",
     [
-        ({"invert_pose": True}, dynains.ConfigError, "did you mean invert_poses"),
         ({"nonsense": 1}, dynains.ConfigError, "unknown parameter nonsense$"),
         ({"pose_units": "km"}, dynains.ConfigError, "pose_units: km: expected m, cm or mm"),
         ({"invert_poses": "yes"}, dynains.ConfigError, "expected true.false"),

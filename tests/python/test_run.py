@@ -79,8 +79,8 @@ def test_arguments_by_name(drive, tmp_path):
 @pytest.mark.parametrize(
     "arguments, error, text",
     [
-        ({"forse": True}, dynains.ConfigError, "did you mean force"),
-        ({"pose_unit": "mm"}, dynains.ConfigError, "did you mean pose_units"),
+        ({"forse": True}, dynains.ConfigError, "unknown parameter forse$"),
+        ({"pose_unit": "mm"}, dynains.ConfigError, "unknown parameter pose_unit$"),
         (
             {"preset": "fast"},
             TypeError,
