@@ -27,7 +27,7 @@
 #include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
-#include "run/range_check.hpp"
+#include "run/cloud_remarks.hpp"
 #include "run/start_check.hpp"
 #include "support/simulated_runs.hpp"
 

@@ -72,7 +72,7 @@ struct JudgedStreet {
 
 }  // namespace
 
-TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
+TEST_CASE("eval refuses an incomplete run") {
   const TemporaryFolder folder;
   const std::string sequence = (folder.path() / "street").string();
   const auto scans = write_street(sequence, 2);
@@ -88,9 +88,7 @@ TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
   CHECK_NOTHROW(call({"eval", sequence, run.string()}));
   report(unfinished);
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("run/report.json: /complete: expected true, found false") &&
-                        ContainsSubstring("--unfinished"));
-  CHECK_NOTHROW(call({"eval", sequence, run.string(), "--unfinished"}));
+                    ContainsSubstring("run/report.json: /complete: expected true, found false"));
 
   PointFileWriter map(run / "map.ply");
   map.add({});
@@ -431,16 +429,6 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(!has(read_text(online), scores("0.6")));
     CHECK(has(message_of({"experiment", "sweep", street, "--values", "2"}), "tau-s = 2"));
     CHECK(has(message_of({"experiment", "sweep", street, "--parameter", "tau-x"}), "tau-x"));
-  }
-  SECTION("runtime") {
-    const std::string csv_path = (folder.path() / "runtime.csv").string();
-    const std::string text =
-        call({"experiment", "runtime", street, "--repeat", "2", "--csv", csv_path});
-    CHECK(has(read_text(csv_path), "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms\n"));
-    CHECK(has(read_text(csv_path), "\ntotal,"));
-    CHECK(has(text, "12 frames (2 times 6)"));
-    CHECK(has(text, "evidence"));
-    CHECK(has(text, "total"));
   }
 }
 
