@@ -100,14 +100,14 @@ TEST_CASE("eval refuses an incomplete run") {
 
   report(R"({"program": "dynains", "complete": "no"})");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("/complete: expected true or false, found string"));
+                    ContainsSubstring("/complete: type must be boolean, but is string"));
   report("{");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("report.json:1: column 2: expected JSON"));
+                    ContainsSubstring("report.json: expected JSON: "));
   fs::remove(run / "report.json");
   fs::create_directory(run / "report.json");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("report.json: is a folder; expected a JSON file"));
+                    ContainsSubstring("report.json: is not a regular file; expected a JSON file"));
 }
 
 TEST_CASE("eval scores a run beside identity and oracle") {
@@ -209,14 +209,14 @@ TEST_CASE("A file that cannot be written is detected before the evaluation") {
   const std::string broken = (folder.path() / "no run").string();
   for (const char* flag : {"--json", "--csv"}) {
     CHECK(has(message_of({"eval", sequence.string(), broken, flag, file}),
-              missing + ": cannot be opened"));
+              file + ": cannot be created"));
   }
   fs::remove(sequence / "labels" / "000001.label");
   CHECK(has(message_of({"experiment", "sweep", sequence.string(), "--quiet", "--csv", file}),
-            missing + ": cannot be opened"));
+            file + ": cannot be created"));
   for (const char* flag : {"--csv", "--json"}) {
     CHECK(has(message_of({"experiment", "table1", sequence.string(), "--quiet", flag, file}),
-              missing + ": cannot be opened"));
+              file + ": cannot be created"));
   }
 }
 

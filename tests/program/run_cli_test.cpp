@@ -612,7 +612,7 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   }
   SECTION("a map that cannot be written") {
     flags.insert(flags.end(), {"--map", "/no/such/map.ply"});
-    expected = "/no/such: cannot be opened: No such file or directory";
+    expected = "/no/such/map.ply: cannot be created: No such file or directory";
   }
   const Outcome outcome = fixture.run(flags);
   CHECK(outcome.code == 1);
