@@ -196,8 +196,7 @@ class CurvedVoxelClusterer {
   }
 
   // Sets the bits of occupied cells. The grid covers only the occurring elevations, and is zero
-  // between calls. Neighbouring points usually set bits of one word, and each store delays the next
-  // load of that word. Alternation between six stretches of points hides this latency.
+  // between calls.
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
     first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * columns()) << row_shift_;
@@ -207,19 +206,10 @@ class CurvedVoxelClusterer {
       starts_.resize(blocks);
       run_before_.resize(blocks);
     }
-    const std::uint32_t* const cell_of = cell_or_cluster_.data();
-    std::uint64_t* const occupied = occupied_.data();
-    const std::size_t first_cell = first_cell_;
-    const auto mark = [&](std::size_t i) {
-      const std::size_t cell = cell_of[i] - first_cell;
-      occupied[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
-    };
-    constexpr std::size_t kStretches = 6;
-    const std::size_t length = count / kStretches;
-    for (std::size_t i = 0; i < length; ++i) {
-      for (std::size_t k = 0; k < kStretches; ++k) mark(i + k * length);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t cell = cell_or_cluster_[i] - first_cell_;
+      occupied_[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
     }
-    for (std::size_t i = kStretches * length; i < count; ++i) mark(i);
   }
 
   // Rows per elevation: one per range, and one for points beyond cluster_range.
@@ -231,26 +221,13 @@ class CurvedVoxelClusterer {
     return static_cast<std::size_t>(elevations) * columns();
   }
 
-  // First block in [block, end) with an occupied cell, or `end`. Most blocks are empty, so eight
-  // are tested at a time.
-  std::size_t next_occupied(std::size_t block, std::size_t end) const {
-    constexpr std::size_t kAtOnce = 8;
-    for (; block + kAtOnce <= end; block += kAtOnce) {
-      std::uint64_t any = 0;
-      for (std::size_t i = 0; i < kAtOnce; ++i) any |= occupied_[block + i];
-      if (any != 0) break;
-    }
-    while (block < end && occupied_[block] == 0) ++block;
-    return block;
-  }
-
   // Finds the runs of all rows, numbered in the order of their cells.
   void find_runs() {
     occupied_blocks_.clear();
     const std::size_t blocks = row_count() * row_blocks();
     std::uint32_t runs = 0;
-    for (std::size_t block = next_occupied(0, blocks); block < blocks;
-         block = next_occupied(block + 1, blocks)) {
+    for (std::size_t block = 0; block < blocks; ++block) {
+      if (occupied_[block] == 0) continue;
       occupied_blocks_.push_back(static_cast<std::uint32_t>(block));
       starts_[block] = occupied_[block] & ~occupied_before(block);
       run_before_[block] = runs - 1;

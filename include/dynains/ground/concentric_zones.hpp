@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"
@@ -59,12 +58,8 @@ class ConcentricZones {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
-      // Local copies: the compiler must assume that a store changes members.
-      const ZoneTable inner_edge(zones_.inner_edge), rings_per_metre(zones_.rings_per_metre),
-          sectors_per_radian(zones_.sectors_per_radian), first_patch(zones_.first_patch),
-          last_ring(zones_.last_ring), sector_count(zones_.sectors);
-      const std::array<PackConstant, kZones - 1> edges = {
-          zones_.inner_edge[1], zones_.inner_edge[2], zones_.inner_edge[3]};
+      // A local copy: the compiler must assume that a store changes members.
+      const Zones zones = zones_;
       const PackConstant min_range(min_range_), max_range(max_range_), pi(kPi), one(1.0F);
       const float* const xs = points.x.data();
       const float* const ys = points.y.data();
@@ -74,15 +69,23 @@ class ConcentricZones {
         const Float y = at.load(ys);
         const Float range = sqrt(x * x + y * y);
         const Float azimuth = azimuth_of(y, x, range) + pi;
-        const BeyondEdges<typename Packs::Mask> beyond = {range >= edges[0], range >= edges[1],
-                                                          range >= edges[2]};
-        const auto here = [&](const ZoneTable& table) { return table.at(beyond); };
+        const std::array<typename Packs::Mask, kZones> is_in_or_beyond = {
+            range >= Float(zones.inner_edge[0]), range >= Float(zones.inner_edge[1]),
+            range >= Float(zones.inner_edge[2]), range >= Float(zones.inner_edge[3])};
+        // A constant of the zone of each point.
+        const auto here = [&](const ByZone& values) {
+          Float result(values[0]);
+          for (std::size_t i = 1; i < kZones; ++i) {
+            result = select(is_in_or_beyond[i], Float(values[i]), result);
+          }
+          return result;
+        };
         const auto whole = [](const Float& value) { return to_float(truncate(value)); };
-        const Float depth = min(range, max_range) - here(inner_edge);
-        const Float ring = whole(min(depth * here(rings_per_metre), here(last_ring)));
-        const Float sectors = here(sector_count);
-        const Float sector = whole(min(azimuth * here(sectors_per_radian), sectors - one));
-        const Float patch = here(first_patch) + ring * sectors + sector;
+        const Float depth = min(range, max_range) - here(zones.inner_edge);
+        const Float ring = whole(min(depth * here(zones.rings_per_metre), here(zones.last_ring)));
+        const Float sectors = here(zones.sectors);
+        const Float sector = whole(min(azimuth * here(zones.sectors_per_radian), sectors - one));
+        const Float patch = here(zones.first_patch) + ring * sectors + sector;
         const auto inside = (range >= min_range) & (range <= max_range);
         select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
             .store(patches + at.begin);
@@ -99,51 +102,6 @@ class ConcentricZones {
     ByZone first_patch;
     ByZone last_ring;
     ByZone sectors;
-  };
-
-  /// Masks: whether points are beyond the inner edges of the second, third and fourth zone.
-  template <class Mask>
-  using BeyondEdges = std::array<Mask, kZones - 1>;
-
-  // Looks up a constant of the zone of each point.
-  class ZoneTable {
-   public:
-    explicit ZoneTable(const ByZone& values)
-        : first_(values[0]), changes_{values[0], values[0], values[0]}, from_end_(values[0]) {
-      for (std::size_t i = 1; i < kZones; ++i) {
-        changes_[i - 1] = changed_bits(values[i - 1], values[i]);
-        for (const std::size_t width : {kPackWidth, kMaxPackWidth}) {
-          from_end_.values[width - i] = values[i];
-        }
-      }
-    }
-
-    template <int kWidth, int kParts>
-    FloatPack<kWidth, kParts> at(const BeyondEdges<IntPack<kWidth, kParts>>& beyond) const {
-      using Float = FloatPack<kWidth, kParts>;
-      if constexpr (kParts == 1) {
-        // Masks count as -1, and indices count modulo the width.
-        return permuted(Float(from_end_), beyond[0] + beyond[1] + beyond[2]);
-      } else {
-        const auto change = [&](std::size_t i) { return beyond[i] & bits_of(Float(changes_[i])); };
-        return float_of(bits_of(Float(first_)) ^ change(0) ^ change(1) ^ change(2));
-      }
-    }
-
-   private:
-    static float changed_bits(float from, float to) {
-      std::uint32_t a, b;
-      std::memcpy(&a, &from, sizeof(a));
-      std::memcpy(&b, &to, sizeof(b));
-      a ^= b;
-      float bits;
-      std::memcpy(&bits, &a, sizeof(bits));
-      return bits;
-    }
-
-    PackConstant first_;
-    std::array<PackConstant, kZones - 1> changes_;  // bits that differ from the zone before
-    PackConstant from_end_;  // the first zone at index 0, the others from the last index downwards
   };
 
   struct Ring {

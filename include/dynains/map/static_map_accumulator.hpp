@@ -16,7 +16,6 @@
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/block_table.hpp"
@@ -84,8 +83,7 @@ class StaticMapAccumulator {
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
       locate(points, begin, count, to_corner, first, batch);
-      choose(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
-      insert_chosen(batch);
+      insert(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
     }
   }
 
@@ -165,18 +163,13 @@ class StaticMapAccumulator {
   // voxels of 0.2 m, these bits repeat every 51.2 m, and every 6.4 m in height.
   static constexpr std::size_t kRecent = std::size_t{32} * 64 * 16;
 
-  // Consecutive points of a scan. `block` and `voxel` begin at index kFirst, so that each point has
-  // a predecessor.
+  // Consecutive points of a scan.
   static constexpr std::size_t kBatch = 512;
   struct Batch {
-    static constexpr std::size_t kFirst = detail::kMaxPackWidth;
-    static constexpr std::size_t kCapacity = kFirst + kBatch;
-    alignas(64) float point[3][kBatch];            // m, relative to the corner of the block
-    alignas(64) std::int32_t block[3][kCapacity];  // indices in the world
-    alignas(64) std::int32_t voxel[kCapacity];     // index in the block
-    alignas(64) std::int32_t recent[kBatch];       // place of the block in recent_
-    std::uint32_t chosen[kCapacity];               // indices of the points to add
-    std::size_t chosen_count;
+    alignas(64) float point[3][kBatch];         // m, relative to the corner of the block
+    alignas(64) std::int32_t block[3][kBatch];  // indices in the world
+    alignas(64) std::int32_t voxel[kBatch];     // index in the block
+    alignas(64) std::int32_t recent[kBatch];    // place of the block in recent_
   };
 
   template <int kValue>
@@ -246,62 +239,32 @@ class StaticMapAccumulator {
         const Int block = voxel >> voxel_bits;
         const Int block_in_world = block + Int::load(first[axis]);
         (value - to_float(block) * size[axis]).store(&batch.point[axis][at.begin]);
-        block_in_world.store(&batch.block[axis][Batch::kFirst + at.begin]);
+        block_in_world.store(&batch.block[axis][at.begin]);
         voxel_in_block = (voxel_in_block << voxel_bits) + (voxel & Int((1 << voxel_bits) - 1));
         recent = (recent << recent_bits) + (block_in_world & Int((1 << recent_bits) - 1));
       };
       add_axis(Constant<2>(), Constant<1>(), Constant<4>());
       add_axis(Constant<1>(), Constant<2>(), Constant<6>());
       add_axis(Constant<0>(), Constant<3>(), Constant<5>());
-      voxel_in_block.store(&batch.voxel[Batch::kFirst + at.begin]);
+      voxel_in_block.store(&batch.voxel[at.begin]);
       recent.store(&batch.recent[at.begin]);
     });
   }
 
-  // Chooses the points with a `keep` flag, except points in the voxel of a kept predecessor. No
-  // branch depends on a single point.
-  void choose(std::size_t count, Span<const std::uint8_t> keep, Batch& batch) const {
-    constexpr std::size_t kBefore = Batch::kFirst - 1;
-    batch.voxel[kBefore] = 0;
-    for (auto& block : batch.block) block[kBefore] = 0;
-    std::size_t chosen = 0;
-    detail::with_largest_packs([&](auto packs) {
-      using Packs = decltype(packs);
-      constexpr std::size_t kWord = 64;
-      std::uint64_t was_kept = 0;
-      for (std::size_t begin = 0; begin < count; begin += kWord) {
-        const std::size_t size = std::min(kWord, count - begin);
-        const std::uint64_t kept = keep.empty() ? ~std::uint64_t{0} >> (kWord - size)
-                                                : detail::nonzero_bytes(keep.data() + begin, size);
-        const std::size_t at = Batch::kFirst + begin;
-        const std::uint64_t changes = detail::find_changes<Packs>(
-            size, &batch.block[0][at], &batch.block[1][at], &batch.block[2][at], &batch.voxel[at]);
-        const std::uint64_t repeats = keep_all_ ? 0 : ~changes & (kept << 1U | was_kept);
-        was_kept = kept >> (kWord - 1);
-        for (std::size_t i = 0; i < size; i += Packs::kCount) {
-          const auto which = static_cast<unsigned>((kept & ~repeats) >> i & Packs::kAll);
-          chosen += detail::put_indices<Packs>(which, begin + i, &batch.chosen[chosen]);
-        }
-      }
-    });
-    batch.chosen_count = chosen;
-  }
-
-  void insert_chosen(const Batch& batch) {
-    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
-      __builtin_prefetch(recent_[static_cast<std::size_t>(batch.recent[batch.chosen[k]])]);
+  // Inserts the points with a `keep` flag.
+  void insert(std::size_t count, Span<const std::uint8_t> keep, const Batch& batch) {
+    for (std::size_t i = 0; i < count; ++i) {
+      __builtin_prefetch(recent_[static_cast<std::size_t>(batch.recent[i])]);
     }
-    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
-      const std::size_t i = batch.chosen[k];
-      const BlockIndex index = {batch.block[0][Batch::kFirst + i],
-                                batch.block[1][Batch::kFirst + i],
-                                batch.block[2][Batch::kFirst + i]};
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!keep.empty() && keep[i] == 0) continue;
+      const BlockIndex index = {batch.block[0][i], batch.block[1][i], batch.block[2][i]};
       Block*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
       if (known == nullptr || !(known->index == index)) {
         known = &blocks_[blocks_.find_or_add(index, {0, kNone})];
       }
       BlockContent& block = known->data;
-      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[Batch::kFirst + i];
+      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.first =
           points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});

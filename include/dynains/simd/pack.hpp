@@ -220,20 +220,6 @@ IntPack<W, P> multiply(const IntPack<W, P>& a, std::int32_t factor) {
   return by_parts<IntPack<W, P>>([f](auto& r, auto& x) { r.v = decltype(r.v)(Unsigned(x.v) * f); },
                                  a);
 }
-/// Number i of the result is number `from[i]` of `a`, modulo the width.
-template <int W>
-FloatPack<W, 1> permuted(const FloatPack<W, 1>& a, const IntPack<W, 1>& from) {
-  return by_parts<FloatPack<W, 1>>(
-      [](auto& r, auto& x, auto& indices) {
-#if defined(__clang__)
-        r.v = __builtin_shufflevector(x.v, indices.v);
-#else
-        r.v = __builtin_shuffle(x.v, indices.v);
-#endif
-      },
-      a, from);
-}
-
 /// Sum of eight numbers in a fixed order.
 template <int P>
 float sum(const FloatPack<8, P>& a) {

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack.hpp"
 
 namespace dynains::detail {
@@ -89,24 +88,6 @@ Int pack_indices() {
   alignas(64) static constexpr std::int32_t kIndices[kMaxPackWidth] = {
       0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   return Int::load(kIndices);
-}
-
-/// Writes `first + k` for each set bit k, in ascending order. Returns the number of set bits. `to`
-/// must have room for a whole pack; the numbers after the last index are undefined.
-template <class Packs>
-std::size_t put_indices(unsigned bits, std::size_t first, std::uint32_t* to) {
-  using Int = typename Packs::Int;
-  if constexpr (Packs::kCount == 16) {
-    Int indices = pack_indices<Int>() + Int(static_cast<std::int32_t>(first));
-    compress(bits, indices.part[0]);
-    indices.store(reinterpret_cast<std::int32_t*>(to));
-    return count_ones(bits);
-  } else {
-    for (std::size_t k = 0; k < Packs::kCount; ++k) {
-      to[k] = static_cast<std::uint32_t>(first + kIndicesOfBits[bits][k]);
-    }
-    return count_ones(bits);
-  }
 }
 
 /// Bit i is set if values[i] differs from values[i - 1] in any of the arrays, i < `count` <= 64.

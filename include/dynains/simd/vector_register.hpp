@@ -133,9 +133,6 @@ void take_greater(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
                   Register<T, kWidth>& result) {
   result.v = a.v > b.v ? a.v : b.v;
 }
-/// Moves the numbers whose bits are set to the front; the others are undefined. AVX-512 only.
-template <class T>
-void compress(unsigned bits, Register<T, 16>& numbers);
 
 #if defined(__SSE2__)
 inline void take_lesser(const Floats4& a, const Floats4& b, Floats4& result) {
@@ -248,14 +245,6 @@ inline void take_root(const Floats16& a, Floats16& root) {
 }
 inline unsigned sign_bits(const Ints16& a) {
   return static_cast<unsigned>(__builtin_ia32_cvtd2mask512(a.v));
-}
-inline void compress(unsigned bits, Floats16& numbers) {
-  numbers.v =
-      __builtin_ia32_compresssf512_mask(numbers.v, numbers.v, static_cast<std::uint16_t>(bits));
-}
-inline void compress(unsigned bits, Ints16& numbers) {
-  numbers.v =
-      __builtin_ia32_compresssi512_mask(numbers.v, numbers.v, static_cast<std::uint16_t>(bits));
 }
 #pragma GCC pop_options
 #else
