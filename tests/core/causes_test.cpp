@@ -164,6 +164,7 @@ TEST_CASE("evidence: seen free, but below the thresholds") {
   config.evidence.use_tracks = false;
   config.evidence.tau_free = 0.999999;
   config.evidence.tau_contested = 0.999999;
+  config.evidence.test_ground = false;  // the free ground has thresholds of its own
   const Causes moving(scans, run(config, scans).final, kAddedBox);
   CHECK(moving.share(Cause::kTooLittleFree) > 0.7);
   CHECK(moving[Cause::kFreeSpace] == 0);
