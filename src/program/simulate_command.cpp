@@ -6,9 +6,7 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_log.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"

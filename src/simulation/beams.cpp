@@ -12,8 +12,31 @@ namespace {
 constexpr double kDegree = kPi / 180;
 
 /// `count` elevations from `top` downwards, degrees.
-void append_rings(std::vector<double>& elevations, double top, double step, int count) {
-  for (int i = 0; i < count; ++i) elevations.push_back((top - step * i) * kDegree);
+struct Rings {
+  double top = 0, step = 0;
+  int count = 0;
+};
+
+struct KnownSensor {
+  SensorTraits traits;
+  Rings rings[6];
+};
+
+/// Sensors in the order of their names, but the last.
+const KnownSensor& known_sensor(Sensor sensor) {
+  static constexpr KnownSensor sensors[] = {
+      {{2083, 1.73, 120, 0.9, 50}, {{2.0, 1.0 / 3.0, 32}, {-8.83, 0.5, 32}}},
+      {{1800, 1.2, 100, 0.5, 40}, {{15, 2, 16}}},
+      {{2083, 1.85, 100, 0.9, 45}, {{10.67, 4.0 / 3.0, 32}}},
+      {{1024, 1.5, 100, 0.5, 45}, {{22.5, 45.0 / 63, 64}}},
+      {{1024, 1.5, 50, 0.3, 20}, {{45, 90.0 / 127, 128}}},
+      {{1800, 1.85, 150, 0.9, 80, kPi / 2},
+       {{15, 4, 2}, {8, 3, 2}, {3, 0, 1}, {2, 1.0 / 6.0, 48}, {-6, 1, 9}, {-19, 6, 2}}},
+      {{30000, 1.2, 100, 0.5, 60, 0, 2 * kPi, false, 6}, {}},
+      {{20000, 0.6, 70, 0.3, 40, 0, 2 * kPi, true, 4}, {}},
+      {{630, 1.6, 150, 0.5, 70, 0, 120 * kDegree}, {{12.5, 0.2, 126}}},
+  };
+  return sensors[static_cast<std::size_t>(sensor)];
 }
 
 /// A sensor with rings as it may be built: number of beams, field of view, spacing, range.
@@ -49,61 +72,15 @@ void draw_rings(SensorModel& model, Random random) {
 
 SensorModel sensor_model(Sensor sensor, std::uint64_t seed) {
   SensorModel model;
-  auto set = [&model](int columns, double height, double max_range, double min_range,
-                      double dark_range) {
-    model.columns = columns;
-    model.height = height;
-    model.max_range = max_range;
-    model.min_range = min_range;
-    model.dark_range = dark_range;
-  };
-  switch (sensor) {
-    case Sensor::kHdl64:
-      append_rings(model.elevations, 2.0, 1.0 / 3.0, 32);
-      append_rings(model.elevations, -8.83, 0.5, 32);
-      set(2083, 1.73, 120, 0.9, 50);
-      break;
-    case Sensor::kVlp16:
-      append_rings(model.elevations, 15, 2, 16);
-      set(1800, 1.2, 100, 0.5, 40);
-      break;
-    case Sensor::kHdl32:
-      append_rings(model.elevations, 10.67, 4.0 / 3.0, 32);
-      set(2083, 1.85, 100, 0.9, 45);
-      break;
-    case Sensor::kOs1_64:
-      append_rings(model.elevations, 22.5, 45.0 / 63, 64);
-      set(1024, 1.5, 100, 0.5, 45);
-      break;
-    case Sensor::kOs0_128:
-      append_rings(model.elevations, 45, 90.0 / 127, 128);
-      set(1024, 1.5, 50, 0.3, 20);
-      break;
-    case Sensor::kPandar64:
-      for (const double e : {15.0, 11.0, 8.0, 5.0, 3.0}) model.elevations.push_back(e * kDegree);
-      append_rings(model.elevations, 2, 1.0 / 6.0, 48);
-      append_rings(model.elevations, -6, 1, 9);
-      for (const double e : {-19.0, -25.0}) model.elevations.push_back(e * kDegree);
-      set(1800, 1.85, 150, 0.9, 80);
-      model.yaw = kPi / 2;
-      break;
-    case Sensor::kLivox:
-      set(30000, 1.2, 100, 0.5, 60);
-      model.lasers = 6;
-      break;
-    case Sensor::kMid360:
-      set(20000, 0.6, 70, 0.3, 40);
-      model.dome = true;
-      model.lasers = 4;
-      break;
-    case Sensor::kRaster:
-      append_rings(model.elevations, 12.5, 0.2, 126);
-      set(630, 1.6, 150, 0.5, 70);
-      model.width = 120 * kDegree;
-      break;
-    case Sensor::kRings:
-      draw_rings(model, Random(mix(seed, 14)));
-      break;
+  if (sensor == Sensor::kRings) {
+    draw_rings(model, Random(mix(seed, 14)));
+    return model;
+  }
+  static_cast<SensorTraits&>(model) = known_sensor(sensor).traits;
+  for (const Rings& rings : known_sensor(sensor).rings) {
+    for (int i = 0; i < rings.count; ++i) {
+      model.elevations.push_back((rings.top - rings.step * i) * kDegree);
+    }
   }
   return model;
 }

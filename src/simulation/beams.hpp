@@ -12,17 +12,20 @@
 namespace dynains::simulation {
 
 /// Constants of a sensor type; angles in radians.
-struct SensorModel {
+struct SensorTraits {
+  int columns = 0;         ///< per turn; beams per scan for the rosette
+  double height = 0;       ///< m, usual height over ground
+  double max_range = 0;    ///< m
+  double min_range = 0;    ///< m
+  double dark_range = 0;   ///< m, where 10 % reflectivity is found nine times out of ten
+  double yaw = 0;          ///< sensor x axis from the vehicle's forward direction
+  double width = 2 * kPi;  ///< of the rings, around the x axis
+  bool dome = false;       ///< without rings: all around instead of a rosette
+  int lasers = 0;          ///< in turn, for beams without rings
+};
+
+struct SensorModel : SensorTraits {
   std::vector<double> elevations;  ///< of the rings, from the top; empty for the rosette
-  int columns = 0;                 ///< per turn; beams per scan for the rosette
-  double height = 0;               ///< m, usual height over ground
-  double max_range = 0;            ///< m
-  double min_range = 0;            ///< m
-  double dark_range = 0;           ///< m, where 10 % reflectivity is found nine times out of ten
-  double yaw = 0;                  ///< sensor x axis from the vehicle's forward direction
-  double width = 2 * kPi;          ///< of the rings, around the x axis
-  bool dome = false;               ///< without rings: all around instead of a rosette
-  int lasers = 0;                  ///< in turn, for beams without rings
 
   /// Laser of the beam that is measured as number `i` of `columns` columns.
   int laser_of(std::size_t i, std::size_t measured_columns) const {

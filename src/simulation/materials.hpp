@@ -6,10 +6,9 @@
 namespace dynains::simulation {
 
 namespace semantic {
-inline constexpr std::uint16_t kUnlabeled = 0, kOutlier = 1, kCar = 10, kBicycle = 11, kBus = 13,
-                               kTruck = 18, kPerson = 30, kBicyclist = 31, kRoad = 40,
-                               kParking = 44, kSidewalk = 48, kBuilding = 50, kFence = 51,
-                               kOtherStructure = 52, kLaneMarking = 60, kVegetation = 70,
+inline constexpr std::uint16_t kOutlier = 1, kCar = 10, kBicycle = 11, kBus = 13, kTruck = 18,
+                               kPerson = 30, kBicyclist = 31, kParking = 44, kSidewalk = 48,
+                               kBuilding = 50, kFence = 51, kOtherStructure = 52, kVegetation = 70,
                                kTrunk = 71, kTerrain = 72, kPole = 80, kSign = 81,
                                kOtherObject = 99, kMovingCar = 252, kMovingBicyclist = 253,
                                kMovingPerson = 254, kMovingBus = 257, kMovingTruck = 258;
@@ -26,7 +25,6 @@ inline constexpr Material kLeaves{semantic::kVegetation, 0.35F, 0.10F, 1.6F, 0.4
 inline constexpr Material kThinLeaves{semantic::kVegetation, 0.35F, 0.15F, 0.6F, 0.6F, 0, 0};
 inline constexpr Material kBush{semantic::kVegetation, 0.35F, 0.08F, 5.0F, 0.2F, 0, 0};
 inline constexpr Material kHedge{semantic::kVegetation, 0.35F, 0.06F, 9.0F, 0.15F, 0, 0};
-inline constexpr Material kGrass{semantic::kVegetation, 0.3F, 0.15F, 2.5F, 0.12F, 0, 0};
 inline constexpr Material kLeafClump{semantic::kVegetation, 0.35F, 0.10F, 3.0F, 0.12F, 0, 0};
 inline constexpr Material kBareTwigs{semantic::kVegetation, 0.25F, 0.15F, 0.5F, 0.15F, 0, 0};
 inline constexpr Material kOpenHedge{semantic::kVegetation, 0.35F, 0.08F, 3.5F, 0.15F, 0, 0};

@@ -1,8 +1,7 @@
-#include "dynains/simulation/random_world.hpp"
-
 #include <cstddef>
 #include <iterator>
 
+#include "dynains/simulation/config.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/materials.hpp"
+
 namespace dynains::simulation {
 namespace {
 
 constexpr double kFar = 30.0;
-constexpr std::uint16_t kPavementLabel = 48;
 
 double smooth_step(double u) {
   u = std::clamp(u, 0.0, 1.0);
@@ -181,7 +182,7 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       tile.heights[sample] = static_cast<float>(height);
       if (row < kCells && column < kCells) {
         const std::uint16_t label = ground.edge < 0       ? config_.street_label
-                                    : ground.pavement > 0 ? kPavementLabel
+                                    : ground.pavement > 0 ? semantic::kSidewalk
                                                           : config_.open_label;
         tile.labels[grid_index(row, column, kCells)] = static_cast<std::uint8_t>(label);
       }
@@ -216,13 +217,6 @@ double Terrain::height(Vec2 p) {
          fv * ((1 - fu) * sample(row + 1, column) + fu * sample(row + 1, column + 1));
 }
 
-std::uint16_t Terrain::label(Vec2 p) {
-  const int ix = tile_index(p.x, kTile), iy = tile_index(p.y, kTile);
-  const int column = std::clamp(static_cast<int>((p.x - ix * kTile) / kCell), 0, kCells - 1);
-  const int row = std::clamp(static_cast<int>((p.y - iy * kTile) / kCell), 0, kCells - 1);
-  return tile(ix, iy).labels[grid_index(row, column, kCells)];
-}
-
 void Terrain::prepare(Vec2 centre, double radius) {
   near_x_ = tile_index(centre.x, kTile) - kSide / 2;
   near_y_ = tile_index(centre.y, kTile) - kSide / 2;
@@ -254,14 +248,16 @@ void Terrain::prepare(Vec2 centre, double radius) {
   }
 }
 
+const Terrain::Tile* Terrain::near_tile(float u, float v) const {
+  if (u <= -1 || v <= -1 || u >= kSide * kCells || v >= kSide * kCells) return nullptr;
+  return near_[grid_index(static_cast<int>(v) / kCells, static_cast<int>(u) / kCells, kSide)];
+}
+
 float Terrain::height_near(float x, float y) const {
-  constexpr auto kInverse = static_cast<float>(1 / kCell);
-  const float u = x * kInverse - static_cast<float>(near_x_ * kCells);
-  const float v = y * kInverse - static_cast<float>(near_y_ * kCells);
-  const int column = static_cast<int>(u), row = static_cast<int>(v);
-  if (u < 0 || v < 0 || column >= kSide * kCells || row >= kSide * kCells) return -1e9F;
-  const Tile* t = near_[grid_index(row / kCells, column / kCells, kSide)];
+  const float u = samples(x, near_x_), v = samples(y, near_y_);
+  const Tile* t = u < 0 || v < 0 ? nullptr : near_tile(u, v);
   if (t == nullptr) return -1e9F;
+  const int column = static_cast<int>(u), row = static_cast<int>(v);
   const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row);
   const float* s = &t->heights[grid_index(row % kCells, column % kCells, kCells + 1)];
   const float low = s[0] + fu * (s[1] - s[0]);
@@ -270,13 +266,10 @@ float Terrain::height_near(float x, float y) const {
 }
 
 std::uint16_t Terrain::label_near(float x, float y) const {
-  constexpr auto kInverse = static_cast<float>(1 / kCell);
-  const int column = static_cast<int>(x * kInverse - static_cast<float>(near_x_ * kCells));
-  const int row = static_cast<int>(y * kInverse - static_cast<float>(near_y_ * kCells));
-  if (column < 0 || row < 0 || column >= kSide * kCells || row >= kSide * kCells) return 0;
-  const Tile* t = near_[grid_index(row / kCells, column / kCells, kSide)];
+  const float u = samples(x, near_x_), v = samples(y, near_y_);
+  const Tile* t = near_tile(u, v);
   if (t == nullptr) return 0;
-  return t->labels[grid_index(row % kCells, column % kCells, kCells)];
+  return t->labels[grid_index(static_cast<int>(v) % kCells, static_cast<int>(u) % kCells, kCells)];
 }
 
 Vec3 Terrain::normal_near(float x, float y) const {

@@ -32,7 +32,6 @@ class Terrain {
   /// Distance to the edge of the nearest carriageway, negative on it. At most 30 m.
   double distance_to_street(Vec2 p) const;
   double height(Vec2 p);
-  std::uint16_t label(Vec2 p);
 
   /// Prepares rays from around `centre`.
   void prepare(Vec2 centre, double radius);
@@ -60,6 +59,12 @@ class Terrain {
   void add_hills(Vec2 corner, std::vector<double>& heights) const;
   /// Random heights in [-1, 1] with this wavelength (m).
   double bumps(Vec2 p, double wavelength, std::uint64_t salt) const;
+  /// Samples from the first prepared tile, which has this index, to coordinate `v` (m).
+  static float samples(float v, int first_tile) {
+    return v * static_cast<float>(1 / kCell) - static_cast<float>(first_tile * kCells);
+  }
+  /// The prepared tile at these samples, or null.
+  const Tile* near_tile(float u, float v) const;
   float height_near(float x, float y) const;
 
   TerrainConfig config_;

@@ -1,9 +1,8 @@
-#include "dynains/simulation/write_log.hpp"
-
 #include <cmath>
 #include <cstdint>
 #include <string>
 
+#include "dynains/simulation/write_sequence.hpp"
 #include "io/log/mcap_writer.hpp"
 #include "io/log/message_types.hpp"
 #include "io/log/message_writer.hpp"

@@ -24,7 +24,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "run/cloud_remarks.hpp"

@@ -21,7 +21,6 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/simulation/random_world.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "program/parameter_flags.hpp"
 #include "support/simulated_runs.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
-#include "dynains/simulation/random_world.hpp"
+#include "dynains/simulation/config.hpp"
 #include "poses/in_two_threads.hpp"
 #include "poses/scan_registration.hpp"
 #include "support/catch.hpp"

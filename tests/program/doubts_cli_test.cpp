@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "dynains/simulation/random_world.hpp"
+#include "dynains/simulation/config.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

@@ -149,9 +149,10 @@ TEST_CASE("rays end where they cross the ground") {
 
 TEST_CASE("streets, pavements and open ground have different classes") {
   Terrain terrain({}, {{Route({{-100, 0}, {0, 0}, {100, 0}}), 4, 2}}, Random(5));
-  CHECK(terrain.label({0, 3.5}) == 40);
-  CHECK(terrain.label({0, 4.6}) == 48);
-  CHECK(terrain.label({0, -7}) == 72);
+  terrain.prepare({0, 0}, 10);
+  CHECK(terrain.label_near(0, 3.5F) == 40);
+  CHECK(terrain.label_near(0, 4.6F) == 48);
+  CHECK(terrain.label_near(0, -7) == 72);
   CHECK(terrain.distance_to_street({3, 6}) == Approx(2).epsilon(1e-6));
   // The pavement is higher than the edge of the street by a kerb.
   CHECK(terrain.height({0.6, 4.8}) - terrain.height({0.6, 3.9}) > 0.08);

@@ -1,10 +1,9 @@
-#include "dynains/simulation/random_world.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
 
+#include "dynains/simulation/config.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
 

@@ -1,7 +1,6 @@
 #include "simulation/scenes/builder.hpp"
 
 #include "simulation/materials.hpp"
-#include "simulation/scenes/clutter.hpp"
 
 namespace dynains::simulation {
 

@@ -40,7 +40,6 @@ class Builder {
   World finish();
   const Config& config() const { return config_; }
   bool lively() const { return config_.scene != Scene::kStatic && config_.traffic > 0; }
-  double traffic_scale() const { return std::max(config_.traffic, 1e-3); }
   int count(double usual) const;
 
   /// Puts a model on the ground unless its footprint is taken.
@@ -131,5 +130,9 @@ class Builder {
   Random random_;
   World world_;
 };
+
+/// Signs, bicycles, railings, palings, wires and trolleys beside street 0, people who linger, and
+/// groups with prams. `amount` is the ratio to the usual number.
+void add_clutter(Builder& builder, double amount);
 
 }  // namespace dynains::simulation

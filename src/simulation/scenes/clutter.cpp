@@ -1,9 +1,9 @@
-#include "simulation/scenes/clutter.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
+
+#include "simulation/scenes/builder.hpp"
 
 namespace dynains::simulation {
 namespace {

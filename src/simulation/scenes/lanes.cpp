@@ -94,7 +94,7 @@ void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed,
   if (!builder.lively()) return;
   Traffic::Flow flow;
   flow.lane = lane;
-  flow.spacing = spacing / builder.traffic_scale();
+  flow.spacing = spacing / std::max(builder.config().traffic, 1e-3);
   flow.speed = speed;
   flow.trucks = trucks;
   flow.buses = buses;
