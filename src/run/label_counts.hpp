@@ -15,7 +15,7 @@ struct LabelCounts {
   std::array<std::uint64_t, 5> of{};  ///< by PointLabel
 
   void add(Span<const PointLabel> labels) {
-    detail::with_largest_packs([&](auto) {
+    detail::with_packs([&](auto) {
       for (std::size_t value = 0; value < of.size(); ++value) {
         std::uint32_t count = 0;
         for (const PointLabel label : labels) count += label == static_cast<PointLabel>(value);

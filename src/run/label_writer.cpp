@@ -35,7 +35,7 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
   const std::size_t count = verdict.labels.size();
   labels.resize(count);
   std::uint32_t all_ids = 0;
-  detail::with_largest_packs([&](auto) {
+  detail::with_packs([&](auto) {
     for (std::size_t i = 0; i < count; ++i) {
       all_ids |= verdict.instances[i];
       labels[i] = mos_class(verdict.labels[i]) | verdict.instances[i] << 16U;

@@ -93,7 +93,7 @@ class ClusterSet {
   void find_runs(Span<const std::uint32_t> scan_begin, Span<const std::uint32_t> cluster_of) {
     run_count_ = 0;
     first_run_.clear();
-    detail::with_largest_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       for (std::size_t k = 0; k < scan_count_; ++k) {
         first_run_.push_back(run_count_);

@@ -149,7 +149,7 @@ class CurvedVoxelClusterer {
   void find_cells(PolarView points) {
     using detail::PackConstant;
     const std::size_t count = points.size();
-    detail::grow(cell_or_cluster_, count + detail::kMaxPackWidth);
+    detail::grow(cell_or_cluster_, count + detail::kPackWidth);
     constexpr double kRadians = M_PI / 180.0;
     const PackConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
     const PackConstant elevation_scale(
@@ -167,7 +167,7 @@ class CurvedVoxelClusterer {
     auto* const cells = reinterpret_cast<std::int32_t*>(cell_or_cluster_.data());
     const PackConstant above_all(static_cast<float>(elevations_));
     const PackConstant below_all(-1.0F);
-    detail::with_largest_packs([&](auto packs) {
+    detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

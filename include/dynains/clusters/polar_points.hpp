@@ -34,7 +34,7 @@ class PolarBuffer {
   void clear() { size_ = 0; }
   void resize(std::size_t size) {
     size_ = size;
-    const std::size_t padded = size + detail::kMaxPackWidth;
+    const std::size_t padded = size + detail::kPackWidth;
     detail::grow(range, padded);
     detail::grow(azimuth, padded);
     detail::grow(z, padded);

@@ -235,7 +235,7 @@ class InstanceSampler {
   }
 
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
-    out.points.grow(supervoxel_count * most_ + kMaxPackWidth);
+    out.points.grow(supervoxel_count * most_ + kPackWidth);
     out.sample_begin.resize(supervoxel_count + 1);
     std::uint32_t to = 0;
     for (std::size_t s = 0; s < supervoxel_count; ++s) {

@@ -52,9 +52,9 @@ class ConcentricZones {
   const Neighbours& neighbours(std::size_t patch) const { return neighbours_[patch]; }
 
   /// Writes the patch of each point (m, sensor frame), and kPatches for points outside the zones.
-  /// `patch_of` must have room for kMaxPackWidth more numbers.
+  /// `patch_of` must have room for kPackWidth more numbers.
   void find_patches(PointsView points, std::int32_t* patch_of) const {
-    with_largest_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

@@ -57,7 +57,7 @@ class GroundSegmenter {
   /// ordered by patch, then as in the scan; only where a patch turned out not to be ground, the
   /// last ground points take its place.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
-    detail::grow(patch_of_, scan.size() + detail::kMaxPackWidth);
+    detail::grow(patch_of_, scan.size() + detail::kPackWidth);
     detail::ensure_capacity(heights_of_points_, scan.size());
     zones_.find_patches(scan, patch_of_.data());
     if (config_.noise_depth > 0.0) find_noise(scan);

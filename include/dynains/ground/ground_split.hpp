@@ -25,7 +25,7 @@ struct GroundSplit {
   }
   void resize(std::size_t size) {
     count = size;
-    const std::size_t padded = size + detail::kMaxPackWidth;
+    const std::size_t padded = size + detail::kPackWidth;
     points.grow(padded);
     detail::grow(input, padded);
   }

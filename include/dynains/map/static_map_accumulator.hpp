@@ -217,10 +217,10 @@ class StaticMapAccumulator {
     const PackConstant size[3] = {static_cast<float>(block_size(0)),
                                   static_cast<float>(block_size(1)),
                                   static_cast<float>(block_size(2))};
-    alignas(64) std::int32_t first[3][detail::kMaxPackWidth];
-    std::fill_n(first[0], detail::kMaxPackWidth, corner.x);
-    std::fill_n(first[1], detail::kMaxPackWidth, corner.y);
-    std::fill_n(first[2], detail::kMaxPackWidth, corner.z);
+    alignas(64) std::int32_t first[3][detail::kPackWidth];
+    std::fill_n(first[0], detail::kPackWidth, corner.x);
+    std::fill_n(first[1], detail::kPackWidth, corner.y);
+    std::fill_n(first[2], detail::kPackWidth, corner.z);
     const PointsView points = scan.subview(begin, count);
     detail::for_packs(count, [&](auto at) {
       using Float = typename decltype(at)::Float;

@@ -36,8 +36,8 @@ class Ingest {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
     unjudged.reset(count);
-    points_.grow(count + kMaxPackWidth);
-    grow(input_, count + kMaxPackWidth);
+    points_.grow(count + kPackWidth);
+    grow(input_, count + kPackWidth);
     count_ = 0;
     for (std::size_t begin = 0; begin < count; begin += kChunk) {
       const std::size_t length = std::min(kChunk, count - begin);
@@ -108,7 +108,7 @@ class Ingest {
   std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
                      UnjudgedPoints& unjudged) {
     std::size_t result = 0;
-    with_largest_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;

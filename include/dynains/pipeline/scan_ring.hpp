@@ -49,7 +49,7 @@ struct ScanSlot {
   /// Ensures capacity for `points` points and writes to the memory of the points, so that later
   /// scans cause no page faults.
   void touch(std::size_t points) {
-    split.points.grow(points + kMaxPackWidth);
+    split.points.grow(points + kPackWidth);
     unjudged.reset(points);
     input.reserve(points);
     cluster_of.reserve(points);

@@ -43,8 +43,8 @@ class MarkedColumns {
           kTileEdge * static_cast<double>(first[static_cast<std::size_t>(axis)]);
     }
     const detail::PackTransform to_columns(T_window_sensor, 1.0 / kWorldCell);
-    x_.resize(points.size() + detail::kMaxPackWidth);
-    y_.resize(points.size() + detail::kMaxPackWidth);
+    x_.resize(points.size() + detail::kPackWidth);
+    y_.resize(points.size() + detail::kPackWidth);
     is_near.resize(points.size());
     detail::for_packs(points.size(), [&](auto at) {
       const auto x = at.load(points.x.data());

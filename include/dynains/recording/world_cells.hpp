@@ -86,7 +86,7 @@ class LocatedPoints {
   }
   /// Finds the cells of all points, and their runs.
   void locate(const Pose& T_world_sensor) {
-    detail::with_largest_packs([&](auto) {
+    detail::with_packs([&](auto) {
       for (int row = 0; row < 3; ++row) {
         locate(axes_[static_cast<std::size_t>(row)], T_world_sensor(row, 0), T_world_sensor(row, 1),
                T_world_sensor(row, 2), T_world_sensor(row, 3));

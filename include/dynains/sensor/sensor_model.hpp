@@ -60,8 +60,8 @@ struct BeamAngles {
 
 inline BeamAngles beam_angles(PointsView points) {
   BeamAngles angles;
-  angles.azimuth.resize(points.size() + kMaxPackWidth);
-  angles.elevation.resize(points.size() + kMaxPackWidth);
+  angles.azimuth.resize(points.size() + kPackWidth);
+  angles.elevation.resize(points.size() + kPackWidth);
   static constexpr PackConstant kDegrees(static_cast<float>(180.0 / M_PI));
   for_packs(points.size(), [&](auto at) {
     const auto x = at.load(points.x.data());

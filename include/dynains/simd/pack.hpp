@@ -13,14 +13,12 @@ namespace dynains::detail {
 
 inline constexpr std::size_t kPackWidth = 8;        ///< 32-bit numbers in the packs of with_packs
 inline constexpr std::size_t kShortPackWidth = 16;  ///< 16-bit numbers in these packs
-inline constexpr std::size_t kMaxPackWidth = 16;    ///< 32-bit numbers in the largest pack
 
 /// One number, repeated for a pack. It stays in memory, for loops that need all registers.
 struct PackConstant {
-  alignas(64) float values[kMaxPackWidth];
+  alignas(32) float values[kPackWidth];
   constexpr PackConstant(float value)
-      : values{value, value, value, value, value, value, value, value,
-               value, value, value, value, value, value, value, value} {}
+      : values{value, value, value, value, value, value, value, value} {}
 };
 
 /// Calls `operation(r, x...)` for each register of the result and the registers of `packs` at the

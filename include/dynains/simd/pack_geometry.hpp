@@ -73,7 +73,7 @@ struct PackTransform {
 };
 
 /// Stores the transformed points in `to`, from index `begin` on. `points` may be the same memory.
-/// `to` must have room for kMaxPackWidth more points.
+/// `to` must have room for kPackWidth more points.
 inline void transform_points(PointsView points, const PackTransform& transform, PointBuffer& to,
                              std::size_t begin) {
   for_packs(points.size(), [&](auto at) {
@@ -89,7 +89,7 @@ inline void transform_points(PointsView points, const PackTransform& transform, 
 
 /// The rotated points, held by `rotated`. `points` may be held by the same buffer.
 inline PointsView rotate(PointsView points, const Eigen::Matrix3d& R, PointBuffer& rotated) {
-  rotated.grow(points.size() + kMaxPackWidth);
+  rotated.grow(points.size() + kPackWidth);
   transform_points(points, PackTransform::rotation(R), rotated, 0);
   return PointsView(rotated).subview(0, points.size());
 }

@@ -2,7 +2,7 @@
 //
 // A kernel is a generic function object that takes a kind of packs, or a slice of arrays, and works
 // with its types. It is compiled for each kind; results are equal bit by bit. Vectors must not be
-// passed to or returned from with_avx2 and with_avx512, whose callers pass vectors differently.
+// passed to or returned from with_avx2, whose callers pass vectors differently.
 #pragma once
 
 #include <cstddef>
@@ -25,36 +25,19 @@ struct PackKind {
 };
 using BaselinePacks = PackKind<8, 2>;  ///< SSE2, NEON
 using Avx2Packs = PackKind<8, 1>;
-using Avx512Packs = PackKind<16, 1>;
 
 #if defined(__x86_64__) && defined(__SSE2__)
 template <class Kernel>
 [[gnu::target("avx2"), gnu::flatten]] void with_avx2(Kernel& kernel) {
   kernel(Avx2Packs());
 }
-template <class Kernel>
-[[gnu::target("avx512f,avx512bw,avx512dq,avx512vl"), gnu::flatten]] void with_avx512(
-    Kernel& kernel) {
-  kernel(Avx512Packs());
-}
 inline bool has_avx2() { return __builtin_cpu_supports("avx2") != 0; }
-/// Requires VBMI2 as well, because older processors lower their clock rate for AVX-512.
-inline bool has_avx512() {
-  return kHasAvx512Code && __builtin_cpu_supports("avx512vbmi2") != 0 &&
-         __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
-         __builtin_cpu_supports("avx512vl") != 0;
-}
 #else
 template <class Kernel>
 void with_avx2(Kernel& kernel) {
   kernel(Avx2Packs());
 }
-template <class Kernel>
-void with_avx512(Kernel& kernel) {
-  kernel(Avx512Packs());
-}
 inline bool has_avx2() { return false; }
-inline bool has_avx512() { return false; }
 #endif
 
 /// Calls `kernel` with packs of eight numbers: Avx2Packs or BaselinePacks.
@@ -62,15 +45,6 @@ template <class Kernel>
 void with_packs(Kernel&& kernel) {
   if (has_avx2()) return with_avx2(kernel);
   kernel(BaselinePacks());
-}
-
-/// Calls `kernel` with the largest packs that the processor supports.
-template <class Kernel>
-void with_largest_packs(Kernel&& kernel) {
-  if constexpr (kHasAvx512Code) {
-    if (has_avx512()) return with_avx512(kernel);
-  }
-  with_packs(kernel);
 }
 
 #if defined(__clang__)
@@ -85,8 +59,7 @@ template <class Packs, class Kernel>
 /// The numbers 0, 1, 2, ...
 template <class Int>
 Int pack_indices() {
-  alignas(64) static constexpr std::int32_t kIndices[kMaxPackWidth] = {
-      0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  alignas(32) static constexpr std::int32_t kIndices[kPackWidth] = {0, 1, 2, 3, 4, 5, 6, 7};
   return Int::load(kIndices);
 }
 
@@ -139,7 +112,7 @@ struct PackSlice : Packs {
   template <class Result, class Value>
   Result load_as(const Value* from) const {
     if constexpr (!kTail) return Result::load(from + begin);
-    alignas(64) Value values[Packs::kCount] = {};
+    alignas(32) Value values[Packs::kCount] = {};
     for (std::size_t i = begin; i < end; ++i) values[i - begin] = from[i];
     return Result::load(values);
   }
@@ -176,10 +149,10 @@ void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel)
   kernel(PaddedPackSlice<Packs, false>(end - Packs::kCount, end));
 }
 
-/// Calls `kernel(PackSlice)` for [0, count) in order, with the largest packs of the processor.
+/// Calls `kernel(PackSlice)` for [0, count) in order, with the packs of with_packs().
 template <class Kernel>
 void for_packs(std::size_t count, Kernel&& kernel) {
-  with_largest_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
+  with_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
 }
 
 }  // namespace dynains::detail

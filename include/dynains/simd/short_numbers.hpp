@@ -29,7 +29,7 @@ class ShortNumbers {
     reserve(numbers.size());
     lower_.resize(numbers.size());
     runs_.clear();
-    with_largest_packs([&](auto packs) {
+    with_packs([&](auto packs) {
       using Packs = decltype(packs);
       take<Packs>(numbers);
     });

@@ -76,15 +76,12 @@ Register<T, kWidth / 2> half_of(const Register<T, kWidth>& a) {
 
 using Floats4 = Register<float, 4>;
 using Floats8 = Register<float, 8>;
-using Floats16 = Register<float, 16>;
 using Ints4 = Register<std::int32_t, 4>;
 using Ints8 = Register<std::int32_t, 8>;
-using Ints16 = Register<std::int32_t, 16>;
 using Shorts8 = Register<std::int16_t, 8>;
 using Shorts16 = Register<std::int16_t, 16>;
 // Completes the types: GCC 12 has an internal error if an AVX2 function does it first.
 static_assert(sizeof(Floats8) == 32 && sizeof(Ints8) == 32 && sizeof(Shorts16) == 32);
-static_assert(sizeof(Floats16) == 64 && sizeof(Ints16) == 64);
 
 // Operations for all registers; overloads for some of them follow.
 template <class T, int kWidth>
@@ -199,56 +196,6 @@ inline void take_root(const Floats8& a, Floats8& root) {
 inline unsigned sign_bits(const Ints8& a) {
   return sign_bits(half_of<0>(a)) | sign_bits(half_of<1>(a)) << 4;
 }
-#endif
-
-#if defined(__x86_64__) && defined(__SSE2__) && !defined(__clang__) && __GNUC__ >= 12
-/// Whether the compiler makes code for registers of 64 bytes.
-inline constexpr bool kHasAvx512Code = true;
-
-// Outside AVX-512 functions, GCC compiles comparisons number by number. AVX-512 includes fused
-// multiply-add; a product by a builtin function is not contracted with a sum, so that all
-// instruction sets give equal bits.
-#pragma GCC push_options
-#pragma GCC target("avx512f,avx512bw,avx512dq,avx512vl")
-template <class T>
-void broadcast(T number, Register<T, 16>& to) {
-  to.v = number - typename Register<T, 16>::Vector{};
-}
-template <class T>
-void compare_less(const Register<T, 16>& a, const Register<T, 16>& b, Ints16& result) {
-  result.v = a.v < b.v;
-}
-template <class T>
-void compare_at_most(const Register<T, 16>& a, const Register<T, 16>& b, Ints16& result) {
-  result.v = a.v <= b.v;
-}
-template <class T>
-void compare_equal(const Register<T, 16>& a, const Register<T, 16>& b, Ints16& result) {
-  result.v = a.v == b.v;
-}
-template <class T>
-void choose(const Ints16& mask, const Register<T, 16>& a, const Register<T, 16>& b,
-            Register<T, 16>& result) {
-  result.v = mask.v ? a.v : b.v;
-}
-inline void multiply(const Floats16& a, const Floats16& b, Floats16& result) {
-  result.v = __builtin_ia32_mulps512_mask(a.v, b.v, a.v, -1, 4);
-}
-inline void take_lesser(const Floats16& a, const Floats16& b, Floats16& result) {
-  result.v = __builtin_ia32_minps512_mask(a.v, b.v, a.v, -1, 4);
-}
-inline void take_greater(const Floats16& a, const Floats16& b, Floats16& result) {
-  result.v = __builtin_ia32_maxps512_mask(a.v, b.v, a.v, -1, 4);
-}
-inline void take_root(const Floats16& a, Floats16& root) {
-  root.v = __builtin_ia32_sqrtps512_mask(a.v, a.v, -1, 4);
-}
-inline unsigned sign_bits(const Ints16& a) {
-  return static_cast<unsigned>(__builtin_ia32_cvtd2mask512(a.v));
-}
-#pragma GCC pop_options
-#else
-inline constexpr bool kHasAvx512Code = false;
 #endif
 
 }  // namespace dynains::detail

@@ -69,7 +69,7 @@ class LocatedPoints {
   };
 
   void locate(PointBlock& block) {
-    dynains::detail::with_largest_packs([&](auto) {
+    dynains::detail::with_packs([&](auto) {
       // Local copies avoid reloads after stores that could alias the originals.
       const std::size_t size = block.count;
       const Transform transform = T_world_sensor_;
