@@ -25,15 +25,15 @@ struct SimulateOptions {
   std::string format = kFolder;
   bool force = false;
   bool quiet = false;
-  bool is_random = false;
   ParameterFlags flags;
 };
 
 simulation::Config make_config(const SimulateOptions& options) {
   simulation::Config config;
-  const ParameterValues values = options.flags.values();
+  ParameterValues values = options.flags.values();
+  const bool is_random = values.take("scene", "random");
   values.apply(config);
-  if (options.is_random) {
+  if (is_random) {
     config = simulation::random_world(config.seed);
     values.apply(config);
   }
@@ -113,8 +113,6 @@ void add_simulate_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command.add_flag("--force", options->force, "replace an earlier simulation in OUT");
-  command.add_flag("--random", options->is_random,
-                   "draw scene, sensor and every parameter that is not given from the seed");
   command
       .add_option("--format", options->format,
                   "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap [kitti]")
@@ -122,7 +120,9 @@ void add_simulate_command(CLI::App& app) {
       ->type_name("kitti|mcap");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   options->flags.add_to(command, simulation::Config(), "Parameters");
-  command.footer("The same flags give the same files. simulation.json keeps all parameters.");
+  command.footer(
+      "The same flags give the same files. --scene random draws scene, sensor and every parameter "
+      "that is not given\nfrom the seed. simulation.json keeps all parameters.");
   command.callback([options] { simulate(*options); });
 }
 

@@ -105,6 +105,14 @@ class ParameterValues {
   /// Whether a value has this flag name.
   bool has(const std::string& name) const { return values_.count(name) > 0; }
 
+  /// Whether `name` has the value `text`, which is removed.
+  bool take(const std::string& name, const std::string& text) {
+    const auto found = values_.find(name);
+    if (found == values_.end() || found->second.text != text) return false;
+    values_.erase(found);
+    return true;
+  }
+
   /// Assigns all values to the parameters of `config`. Throws ConfigError, also for unknown names.
   template <class Config>
   void apply(Config& config) const {
