@@ -116,8 +116,7 @@ bool Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdi
   const Pose& T_level_sensor = T_level_sensor_[number];
   places_.begin_scan(points, T_level_sensor, is_near_);
   ground_.free_far(T_level_sensor.translation());
-  restore_objects(points, number, verdict);
-  restore_ground(points, T_level_sensor, verdict);
+  restore(points, number, verdict);
   remove_objects(points, number, verdict);
   return restored_ + removed_ > before;
 }
@@ -141,25 +140,22 @@ bool Visit::stands(const Place& place, std::uint32_t number) const {
   return place.stands() || (has_come && place.stands_since(number));
 }
 
-void Visit::restore_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
+// Restores removed points that stand, or do not rise above the ground of all scans. What looks like
+// ground under an instance is often its underside or its wheels, and stays removed.
+void Visit::restore(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
+  constexpr double kMostRise = 0.02;  // m
+  const Pose& T_level_sensor = T_level_sensor_[number];
   const auto is_removed = [&](std::size_t i) {
     return verdict.labels[i] == PointLabel::kDynamic && verdict.causes[i] != Cause::kUnderInstance;
   };
-  const auto restore = [&](std::size_t i, const Place* place) {
+  const auto restore_point = [&](std::size_t i, const Place* place) {
     if (place == nullptr || !stands(*place, number)) return;
     verdict.labels[i] = PointLabel::kStatic;
     verdict.causes[i] = Cause::kStands;
     if (!verdict.beliefs.empty()) verdict.beliefs[i] = kRestoredBelief;
     ++restored_;
   };
-  places_.for_each_place(points, T_level_sensor_[number], is_removed, restore);
-}
-
-// Removed points that do not rise above the ground of all scans come back. The underside of a lorry
-// can look like ground where the ground nearby is lower.
-void Visit::restore_ground(PointsView points, const Pose& T_level_sensor, VerdictArrays& verdict) {
-  constexpr double kMostRise = 0.02;  // m
-  const auto is_removed = [&](std::size_t i) { return verdict.labels[i] == PointLabel::kDynamic; };
+  places_.for_each_place(points, T_level_sensor, is_removed, restore_point);
   ground_.for_each_rise(points, T_level_sensor, is_removed,
                         [&](std::size_t i, const WorldCell&, double rise, bool is_level) {
                           if (!is_level || rise > kMostRise) return;

@@ -97,8 +97,7 @@ class Visit {
   const Place* changed_at_ground(const WorldCell& cell);
   bool has_changed(const Place& place, std::uint32_t number) const;
   bool stands(const Place& place, std::uint32_t number) const;
-  void restore_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict);
-  void restore_ground(PointsView points, const Pose& T_level_sensor, VerdictArrays& verdict);
+  void restore(PointsView points, std::uint32_t number, VerdictArrays& verdict);
   void remove_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict);
   void remove_instances(VerdictArrays& verdict);
   void remove(std::size_t point, VerdictArrays& verdict);
