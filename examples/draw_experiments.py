@@ -1,8 +1,8 @@
-"""Draws Fig. 5 and Fig. 7 of the paper from tables of `dynains`, by matplotlib:
+"""Draws Fig. 5 and Fig. 7 of the paper from the tables of `dynains experiment`, by matplotlib:
 
     dynains experiment sweep SEQ --csv sweep.csv
-    dynains run SEQ --out OUT --preset paper --one-thread
-    python3 draw_experiments.py sweep.csv OUT/timing.csv  # writes sweep.png and OUT/timing.png
+    dynains experiment runtime SEQ --csv runtime.csv
+    python3 draw_experiments.py sweep.csv runtime.csv     # writes sweep.png and runtime.png
 """
 import csv
 import sys
@@ -38,14 +38,12 @@ def draw_sweep(path):
     return figure
 
 
-def draw_timing(path):
-    """Fig. 7: mean time of each stage, with a line up to its 95th percentile."""
-    times = {name: values for name, values in columns_of(path).items() if name.endswith("_ms")}
+def draw_runtime(path):
+    """Fig. 7: mean time of each component, with a line up to its 95th percentile."""
+    table = columns_of(path)
     figure, axes = plt.subplots()
-    means = [sum(values) / len(values) for values in times.values()]
-    p95 = [sorted(values)[(95 * len(values) - 1) // 100] for values in times.values()]
-    above = [max(0, high - mean) for high, mean in zip(p95, means)]
-    axes.barh([name.removesuffix("_ms") for name in times], means, xerr=[[0] * len(above), above])
+    above = [max(0, p95 - mean) for mean, p95 in zip(table["mean_ms"], table["p95_ms"])]
+    axes.barh(table["component"], table["mean_ms"], xerr=[[0] * len(above), above])
     axes.invert_yaxis()
     axes.set(xlabel="ms per scan")
     return figure
@@ -53,6 +51,6 @@ def draw_timing(path):
 
 for path in sys.argv[1:]:
     with open(path) as file:
-        is_timing = file.readline().startswith("scan,")
-    draw = draw_timing if is_timing else draw_sweep
+        is_runtime = file.readline().startswith("component,")
+    draw = draw_runtime if is_runtime else draw_sweep
     draw(path).savefig(path.removesuffix(".csv") + ".png", bbox_inches="tight", dpi=150)

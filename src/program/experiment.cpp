@@ -8,6 +8,7 @@ void add_experiment_command(CLI::App& app) {
   experiment.require_subcommand(1);
   add_table1_command(experiment);
   add_sweep_command(experiment);
+  add_runtime_command(experiment);
 }
 
 }  // namespace dynains::program

@@ -11,10 +11,10 @@ file(MAKE_DIRECTORY ${WORK_DIR})
 run(${PROGRAM} simulate ${WORK_DIR}/street --scans 6 --sensor vlp16)
 run(${PROGRAM} experiment sweep ${WORK_DIR}/street --quiet --values 0.2,0.6
   --csv ${WORK_DIR}/sweep.csv)
-run(${PROGRAM} run ${WORK_DIR}/street --out ${WORK_DIR}/out --preset paper --one-thread)
+run(${PROGRAM} experiment runtime ${WORK_DIR}/street --repeat 1 --csv ${WORK_DIR}/runtime.csv)
 run(${PYTHON} -B ${SOURCE_DIR}/examples/draw_experiments.py ${WORK_DIR}/sweep.csv
-  ${WORK_DIR}/out/timing.csv)
-foreach(name sweep out/timing)
+  ${WORK_DIR}/runtime.csv)
+foreach(name sweep runtime)
   file(READ ${WORK_DIR}/${name}.png begin LIMIT 8 HEX)
   if(NOT begin STREQUAL "89504e470d0a1a0a")
     message(SEND_ERROR "${name}.png is no picture")
