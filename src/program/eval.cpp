@@ -13,10 +13,10 @@
 #include "evaluation_options.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
+#include "run/finished_run.hpp"
 #include "run/input_files.hpp"
 #include "run/labelled_sequence.hpp"
 #include "run/output_folder.hpp"
-#include "run/write_view.hpp"
 
 namespace dynains::program {
 namespace {
@@ -32,6 +32,7 @@ struct EvalOptions {
   EvaluationOptions evaluation;
   bool online = false;
   bool errors = false;
+  bool unfinished = false;
   std::string json;
   std::string csv;
 };
@@ -71,7 +72,7 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
-  check_are_finished(options);
+  if (!options.unfinished) check_are_finished(options);
   std::vector<RunLabels> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
@@ -128,6 +129,8 @@ void add_eval_command(CLI::App& program) {
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,
                    "also tell where the first run went wrong: by class, instance, range and cause");
+  command.add_flag("--unfinished", options->unfinished,
+                   "also judge runs, and maps of runs, whose report.json says \"complete\": false");
   command.add_option("--json", options->json, "write everything to this file, errors included");
   command.add_option("--csv", options->csv, "write the table to this file");
   command.callback([options] { eval(*options); });

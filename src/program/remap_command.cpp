@@ -33,6 +33,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// Name of the map in the folder of the run.
+constexpr const char* kRemappedMap = "static_map_remapped.ply";
+
 /// Flags of `dynains remap`.
 struct RemapOptions {
   explicit RemapOptions(CLI::App& command) : sequence(command, "recording of the run") {}
@@ -150,20 +153,57 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   return map;
 }
 
-/// Place of the map. Throws ConfigError, and IoError for one among the scans.
-fs::path target_of(const RemapOptions& options, const Recording& recording) {
-  const fs::path folder = whole_path(options.run);
-  const fs::path target = options.map.empty() ? fs::path(folder).concat("_remapped.ply")
-                                              : map_path(options.map, folder);
-  if (is_las(target)) {
-    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+/// The map is a file of its own, or is added to the folder of the run, whose report describes it.
+class NewMap {
+ public:
+  NewMap(const RemapOptions& options, ResultFolder& out, const Recording& recording,
+         const ScanRange& range, const InputFiles& inputs)
+      : out_(out) {
+    const fs::path folder = whole_path(out.path());
+    path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
+    if (is_las(path_)) {
+      throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
+    }
+    if (path_.parent_path() != folder) {
+      check_is_no_scan(path_, recording);
+      outside_.emplace(path_, options.force, inputs);
+    } else if (path_.filename() == kRemappedMap) {
+      added_.emplace(out, kRemappedMap);
+    } else {
+      throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
+                        kRemappedMap);
+    }
+    writer_ =
+        open_map(outside_ ? outside_->path() : added_->path(), recording, range, RunOutputs());
   }
-  if (target.parent_path() == folder) {
-    throw ConfigError("--map " + options.map + ": choose a place outside of OUT");
+
+  const fs::path& path() const { return path_; }
+
+  /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
+  template <class Publish>
+  void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
+    map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
+    writer_->commit();
+    if (outside_) {
+      publish_more();
+      return outside_->put_in_place();
+    }
+    Json report = out_.marker();
+    report.erase(kField);
+    added_->put_in_place(report, publish_more);
+    report[kField] = description;
+    out_.mark(report, OutputListing(out_.listing()));
   }
-  check_is_no_scan(target, recording);
-  return target;
-}
+
+ private:
+  static constexpr const char* kField = "remapped_map";
+
+  ResultFolder& out_;
+  fs::path path_;
+  std::optional<OutputFile> outside_;
+  std::optional<AddedFile> added_;
+  std::unique_ptr<MapFile> writer_;
+};
 
 InputFiles inputs_of(const Recording& corrected, const std::optional<Recording>& original) {
   InputFiles inputs;
@@ -202,7 +242,7 @@ Json point_flags(const EarlierRun& run) {
 
 void remap(RemapOptions& options) {
   check_run_folder(options.run);
-  const ResultFolder out = open_finished_run(options.run);
+  ResultFolder out = open_finished_run(options.run);
   const EarlierRun run = read_run(out);
   options.sequence.complete(options.sequence.folder(), point_flags(run));
   const Recording corrected = open_corrected(options, run);
@@ -210,9 +250,7 @@ void remap(RemapOptions& options) {
   check_poses(corrected, scans);
   const std::optional<Recording> original = open_original(options, run);
   const ScanRange range{scans.front(), scans.back()};
-  const fs::path target = target_of(options, corrected);
-  OutputFile file(target, options.force, inputs_of(corrected, original));
-  const std::unique_ptr<MapFile> writer = open_map(file.path(), corrected, range, RunOutputs());
+  NewMap file(options, out, corrected, range, inputs_of(corrected, original));
 
   const InterruptGuard interrupt;
   const StaticMapAccumulator map =
@@ -232,12 +270,16 @@ void remap(RemapOptions& options) {
          out.path(), pose_fingerprint(corrected, range), scans},
         original ? *original : corrected, corrected, store.emplace(whole_path(options.update)));
   }
-  map.for_each([&](const Eigen::Vector3d& point) { writer->add(point, MapAttributes()); });
-  writer->commit();
-  if (session) session->commit();
-  file.put_in_place();
+  file.write(map,
+             {{"file", kRemappedMap},
+              {"points", map.size()},
+              {"map_voxel", map.config().map_voxel},
+              {"poses_and_times", pose_fingerprint(corrected, range)}},
+             [&] {
+               if (session) session->commit();
+             });
   if (options.quiet) return;
-  std::cout << scans.size() << " scans, static map: " << target.string() << " (" << map.size()
+  std::cout << scans.size() << " scans, static map: " << file.path().string() << " (" << map.size()
             << " points)" << std::endl;
 }
 
@@ -252,7 +294,7 @@ void add_remap_command(CLI::App& app) {
       ->type_name("");
   command
       .add_option("--map", options->map,
-                  "static map, .ply or .pcd, outside of OUT [OUT_remapped.ply]")
+                  std::string("static map, .ply or .pcd [") + kRemappedMap + " in OUT]")
       ->type_name("FILE");
   command
       .add_option("--map-voxel", options->map_voxel,
@@ -271,7 +313,9 @@ void add_remap_command(CLI::App& app) {
       "The verdicts of the run stay: they were made between neighbouring scans, and a correction "
       "moves these\ntogether. The map is built from the points that OUT/labels calls static, in "
       "the "
-      "order of the scans and of\ntheir points. Nothing in OUT changes.");
+      "order of the scans and of\ntheir points. Nothing in OUT changes but the map and its entry "
+      "in "
+      "report.json; earlier maps of remap are\nreplaced.");
   command.callback([options] { remap(*options); });
 }
 

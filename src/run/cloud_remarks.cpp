@@ -5,13 +5,12 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <iomanip>
 #include <locale>
 #include <sstream>
 #include <vector>
 
-#include "dynains/errors.hpp"
-#include "dynains/sensor/own_body.hpp"
 #include "io/finite_points.hpp"
 
 namespace dynains::program {
@@ -121,13 +120,13 @@ std::optional<std::string> remark_on_grid(const RecordedScan& scan, const Pose& 
   return std::nullopt;
 }
 
-/// Ranges in the x-y plane of the points with a return.
-void add_ranges(const RecordedScan& scan, std::vector<double>& ranges) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const float* p = scan.xyzi.data() + 4 * i;
-    const double range = std::hypot(p[0], p[1]);
-    if (std::isfinite(range) && std::isfinite(p[2]) && range > 0.0) ranges.push_back(range);
+/// Whether cloud `i` and the next one have points, all of them with equal bits.
+bool is_repeated(const Recording& recording, std::size_t i) {
+  if (recording.point_count(i) == 0 || recording.point_count(i) != recording.point_count(i + 1)) {
+    return false;
   }
+  const RecordedScan a = recording.read_scan(i), b = recording.read_scan(i + 1);
+  return std::memcmp(a.xyzi.data(), b.xyzi.data(), a.xyzi.size() * sizeof(float)) == 0;
 }
 
 }  // namespace
@@ -157,6 +156,22 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
   return text.str();
 }
 
+std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {
+  constexpr std::size_t kPlaces = 3;
+  constexpr double kLeastMotion = 0.05;  // m
+  for (std::size_t k = 0; k < kPlaces && range.size() > 2; ++k) {
+    const std::size_t first = range.first + k * (range.size() - 3) / (kPlaces - 1);
+    for (std::size_t i = first; i < first + 2; ++i) {
+      const Pose T = recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + 1);
+      if (T.translation().norm() > kLeastMotion && is_repeated(recording, i)) {
+        return "clouds " + recording.name(i) + " and " + recording.name(i + 1) +
+               " are equal, though the sensor moves between them: leave copies of clouds out";
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> remark_on_mounting(const Recording& recording,
                                               const Mounting& mounting) {
   if (mounting.known || recording.size() == 0) return std::nullopt;
@@ -172,75 +187,6 @@ std::optional<std::string> remark_on_tilted_scans(const Recording& recording,
     if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
   }
   return remark_on_tilt(recording);
-}
-
-std::optional<std::string> remark_on_lone_scans(const Recording& recording, const ScanRange& range,
-                                                const RemoverConfig& config) {
-  const auto [first, last] = range;
-  if (first == last) {
-    return "one scan alone is compared with no other, and nothing is removed from it";
-  }
-  std::size_t breaks = 0;
-  for (std::size_t i = first + 1; i <= last; ++i) {
-    const Eigen::Vector3d step =
-        recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation();
-    const double pause = recording.time(i) - recording.time(i - 1);
-    breaks += config.starts_epoch(pause, step.norm()) ? 1 : 0;
-  }
-  if (2 * breaks <= last - first) return std::nullopt;
-  return std::to_string(breaks) + " of " + std::to_string(last - first + 1) +
-         " scans come so long after the one before, or so far from it, that they are not compared, "
-         "and nothing is removed from scans that stand alone; are times in seconds and poses in "
-         "metres? If so, see --max-gap and --max-speed";
-}
-
-void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
-                  bool unit_is_given) {
-  constexpr double kFarthestReturn = 250.0;  // m, of most points of a LiDAR
-  std::vector<double> ranges;
-  for (const std::size_t i : {range.first, range.first + range.size() / 2, range.last}) {
-    add_ranges(recording.read_scan(i), ranges);
-  }
-  if (ranges.empty()) return;
-  std::sort(ranges.begin(), ranges.end());
-  const auto count_within = [&](double most) {
-    return static_cast<double>(std::upper_bound(ranges.begin(), ranges.end(), most) -
-                               ranges.begin());
-  };
-  const auto count = static_cast<double>(ranges.size());
-  const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
-  const bool is_far = !unit_is_given && count_within(kFarthestReturn) < 0.1 * count;
-  if (judged >= 0.01 && !is_far) return;
-  std::ostringstream text = plain_text();
-  text << std::setprecision(1) << recording.folder().string() << ": " << 100.0 * judged
-       << " % of the points can be judged, those from " << config.min_range
-       << " m (--min-range) to " << config.max_range
-       << " m (--max-range) from the sensor; half of the points are beyond "
-       << ranges[ranges.size() / 2]
-       << " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units "
-          "cm; in the frame of the world: --frame world; else --point-units m runs unless nothing "
-          "can be judged";
-  throw ConfigError(text.str());
-}
-
-double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
-  constexpr std::size_t kScans = 24;
-  constexpr double kLeastMotion = 5.0;  // m
-  const std::size_t count = std::min(kScans, range.size());
-  std::vector<PointBuffer> scans;
-  RecordedScan scan;
-  double motion = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1));
-    motion = std::max(motion, (recording.T_world_sensor(i).translation() -
-                               recording.T_world_sensor(range.first).translation())
-                                  .norm());
-    recording.read_scan(i, scan);
-    scans.push_back(finite_points(scan));
-  }
-  if (motion < kLeastMotion) return otherwise;
-  const OwnBody body = estimate_own_body(scans);
-  return body.known ? std::min(body.min_range(), otherwise) : otherwise;
 }
 
 }  // namespace dynains::program

@@ -1,20 +1,12 @@
 // Files and folders that a command reads, so that it never changes them.
 #pragma once
 
-#include <sys/types.h>
-
 #include <filesystem>
 #include <map>
-#include <optional>
-#include <utility>
+
+#include "folder.hpp"
 
 namespace dynains::program {
-
-/// Device and inode: equal for two paths that lead to one file.
-using FileIdentity = std::pair<dev_t, ino_t>;
-
-/// Identity of the file or folder that `path` leads to, through links; nothing if there is none.
-std::optional<FileIdentity> identity_of(const std::filesystem::path& path);
 
 class InputFiles {
  public:
@@ -22,8 +14,14 @@ class InputFiles {
   void add(const std::filesystem::path& path) {
     if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
   }
-  /// Throws IoError that names both paths if the file or folder that `output` leads to is read.
-  void refuse(const std::filesystem::path& output) const;
+
+  /// Throws IoError that names both paths if `output`, the file or folder with this identity, is
+  /// read.
+  void refuse(const FileIdentity& identity, const std::filesystem::path& output) const;
+  /// Refuses the file or folder that `output` leads to, if it exists and is read.
+  void refuse(const std::filesystem::path& output) const {
+    if (const auto identity = identity_of(output)) refuse(*identity, output);
+  }
 
  private:
   std::map<FileIdentity, std::filesystem::path> paths_;

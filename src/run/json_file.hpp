@@ -22,23 +22,26 @@ nlohmann::ordered_json read_json_file(const std::filesystem::path& path);
 /// Text of a JSON file. Bytes that are not UTF-8, as of paths, are replaced.
 std::string to_text(const nlohmann::ordered_json& json);
 
-/// The reason that an exception of the JSON library tells.
-std::string json_problem(const nlohmann::json::exception& error);
-
 /// The field of `json` that `pointer` ("/static_map/file") names; nothing if there is none or if it
-/// is null. Throws IoError with path and pointer for a value of another type. `path` is the file
-/// that `json` was read from.
+/// is null. Throws IoError with path, pointer and expected type for a value of another type. T is
+/// bool, std::uint64_t, double or std::string. `path` is the file that `json` was read from.
 template <class T>
 std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
-                            const std::string& pointer) {
-  const nlohmann::ordered_json::json_pointer where(pointer);
-  if (!json.contains(where) || json[where].is_null()) return std::nullopt;
-  try {
-    return json[where].get<T>();
-  } catch (const nlohmann::json::type_error& error) {
-    throw IoError(path.string() + ": " + pointer + ": " + json_problem(error));
-  }
-}
+                            const std::string& pointer);
+template <>
+std::optional<bool> json_field(const std::filesystem::path& path,
+                               const nlohmann::ordered_json& json, const std::string& pointer);
+template <>
+std::optional<std::uint64_t> json_field(const std::filesystem::path& path,
+                                        const nlohmann::ordered_json& json,
+                                        const std::string& pointer);
+template <>
+std::optional<double> json_field(const std::filesystem::path& path,
+                                 const nlohmann::ordered_json& json, const std::string& pointer);
+template <>
+std::optional<std::string> json_field(const std::filesystem::path& path,
+                                      const nlohmann::ordered_json& json,
+                                      const std::string& pointer);
 
 /// A field that must exist; see json_field.
 template <class T>

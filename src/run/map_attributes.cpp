@@ -3,7 +3,6 @@
 #include <cmath>
 
 namespace dynains::program {
-namespace {
 
 MapAttributes attributes_of(const RecordedScan& scan, const ScanVerdict& verdict,
                             const std::vector<std::uint32_t>& labels, std::size_t i) {
@@ -18,8 +17,6 @@ MapAttributes attributes_of(const RecordedScan& scan, const ScanVerdict& verdict
   attributes.is_ground = verdict.labels[i] == PointLabel::kGround;
   return attributes;
 }
-
-}  // namespace
 
 MapAttributeTable::MapAttributeTable(double voxel, const Eigen::Vector3d& origin)
     : voxel_(voxel), origin_((origin / voxel).array().floor()) {}

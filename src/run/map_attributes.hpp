@@ -23,6 +23,10 @@ struct MapAttributes {
   bool is_ground = false;
 };
 
+/// Attributes of point i of a scan with its verdict. `labels` of the recording may be empty.
+MapAttributes attributes_of(const RecordedScan& scan, const ScanVerdict& verdict,
+                            const std::vector<std::uint32_t>& labels, std::size_t i);
+
 /// For each voxel of the world, the attributes of the first point that was kept in it. Memory grows
 /// with the map: some 100 bytes for each voxel.
 class MapAttributeTable {
@@ -30,7 +34,7 @@ class MapAttributeTable {
   /// `voxel`: edge of the voxels of the map, m. `origin`: m, world frame, within 200 km of the map.
   MapAttributeTable(double voxel, const Eigen::Vector3d& origin);
 
-  /// Adds the points of a scan that the verdict keeps. `labels` of the recording may be empty.
+  /// Adds the points of a scan that the verdict keeps.
   void add(const RecordedScan& scan, const ScanVerdict& verdict,
            const std::vector<std::uint32_t>& labels);
 

@@ -1,18 +1,14 @@
 #include "output_folder.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <random>
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
-#include "io/failure.hpp"
 #include "json_file.hpp"
 
 namespace dynains::program {
@@ -23,42 +19,24 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kPartialEnd = ".partial";
 
-fs::path partial_of(const fs::path& target) { return fs::path(target).concat(kPartialEnd); }
+/// The folder of an OutputFile.
+const OutputKind& file_kind() {
+  static const OutputKind kind = {"file", "partial.json"};
+  return kind;
+}
 
-bool has_value(const Json& marker, const char* field, const Json& value) {
+OutputListing listing_of_file(const std::string& name) { return {{listed_name(name)}, {}, {}}; }
+
+bool has(const Json& marker, const char* field, const Json& value) {
   const Json::json_pointer pointer(field);
   return marker.contains(pointer) && marker[pointer] == value;
 }
 
-/// `path` by whole_path(). Throws ConfigError for a name that another output has while it is
-/// written, and IoError for one of `inputs`.
-fs::path checked_target(const fs::path& path, const InputFiles& inputs) {
-  fs::path target = whole_path(path);
-  if (target.extension() == kPartialEnd) {
-    throw ConfigError(target.string() +
-                      ": names that end in .partial are those of unfinished outputs; choose "
-                      "another");
-  }
-  inputs.refuse(target);
-  return target;
-}
-
-/// Throws IoError for a folder that cannot be renamed.
-void check_movable(const fs::path& folder, const fs::path& as_given) {
-  const auto identity = identity_of(folder);
-  const char* const what = identity == identity_of(".")
-                               ? ": is the current folder, which a new one would replace"
-                           : identity && identity->first != identity_of(folder.parent_path())->first
-                               ? ": is mounted and cannot be replaced; choose a folder in it"
-                               : nullptr;
-  if (what != nullptr) throw IoError(as_given.string() + what);
-}
-
-/// `flags` of renameat2. False if the file system does not know them.
-bool rename(const fs::path& from, const fs::path& to, unsigned flags) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), flags) == 0) return true;
-  if (flags != 0 && (errno == EINVAL || errno == ENOSYS)) return false;
-  fail_by_system(to, "cannot be put in place", errno);
+/// Throws ConfigError for a name that another output has while it is written.
+void check_name(const fs::path& target) {
+  if (target.extension() != kPartialEnd) return;
+  throw ConfigError(target.string() +
+                    ": names that end in .partial are those of unfinished outputs; choose another");
 }
 
 }  // namespace
@@ -81,197 +59,266 @@ Json begin_marker(const OutputKind& kind) {
           {"complete", false}};
 }
 
-ResultFolder::ResultFolder(fs::path folder, const OutputKind& kind)
-    : path_(std::move(folder)), identity_(identity_of(path_)), lock_(path_), kind_(kind) {
-  // Another command may have renamed the folder before it was locked here.
-  if (identity_of(path_) != identity_) throw UsageError(path_.string() + ": is in use");
-  const fs::file_type marker = fs::symlink_status(marker_path()).type();
-  if (marker == fs::file_type::regular) {
+ResultFolder::ResultFolder(Folder folder, const OutputKind& kind)
+    : folder_(std::move(folder)), kind_(kind) {
+  folder_.lock();
+  if (const std::optional<Folder::Entry> marker = folder_.find(kind.marker)) {
+    if (marker->kind != Folder::Kind::kFile) {
+      throw IoError(marker_path().string() + ": is a link or a folder; expected a file");
+    }
     marker_ = read_json_file(marker_path());
     listing_ = read_listing(marker_path(), marker_, kind.command);
     return;
   }
-  if (marker != fs::file_type::not_found) {
-    throw IoError(marker_path().string() + ": is a link or a folder; expected a file");
-  }
-  for (const fs::directory_entry& entry : fs::directory_iterator(path_)) {
-    if (target_of_temporary(entry.path().filename()) == kind.marker) continue;
-    throw IoError(path_.string() + ": is not empty and holds no earlier results (no " +
+  for (const std::string& name : folder_.names()) {
+    if (target_of_temporary(name) == kind.marker) continue;
+    throw IoError(path().string() + ": is not empty and holds no earlier results (no " +
                   kind.marker + "); choose another folder");
   }
 }
 
-bool ResultFolder::is_listed(const std::string& folder, const fs::directory_entry& entry) const {
-  if (entry.symlink_status().type() != fs::file_type::regular) return false;
-  const std::string name = entry.path().filename();
+bool ResultFolder::is_complete() const { return has(marker_, "/complete", true); }
+
+bool ResultFolder::is_listed(const std::string& folder, const std::string& name) const {
   const std::string target = target_of_temporary(name);
   const std::string& file = target.empty() ? name : target;
   return listing_.contains(folder, file) || (folder.empty() && file == kind_.marker);
 }
 
-std::vector<ResultFolder::Entry> ResultFolder::entries() const {
-  std::vector<Entry> result;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path_)) {
-    const std::string name = entry.path().filename();
-    if (entry.symlink_status().type() != fs::file_type::directory ||
-        listing_.folders.count(listed_name(name)) == 0) {
-      result.push_back({entry.path(), is_listed("", entry)});
+template <class Visit>
+void ResultFolder::visit_entries(Visit&& visit) const {
+  for (const std::string& name : folder_.names()) {
+    const std::optional<Folder::Entry> entry = folder_.find(name);
+    if (!entry) continue;
+    if (entry->kind != Folder::Kind::kFolder || listing_.folders.count(listed_name(name)) == 0) {
+      visit(folder_, name, *entry, entry->kind == Folder::Kind::kFile && is_listed("", name));
       continue;
     }
-    for (const fs::directory_entry& file : fs::directory_iterator(entry.path())) {
-      result.push_back({file.path(), is_listed(name, file)});
+    const Folder inner(folder_, name);
+    for (const std::string& file : inner.names()) {
+      const std::optional<Folder::Entry> found = inner.find(file);
+      if (!found) continue;
+      visit(inner, file, *found, found->kind == Folder::Kind::kFile && is_listed(name, file));
     }
-    result.push_back({entry.path(), true});
+    visit(folder_, name, *entry, true);
   }
-  return result;
 }
 
 void ResultFolder::check(const InputFiles& inputs) const {
-  inputs.refuse(path_);
-  for (const Entry& entry : entries()) {
-    if (!entry.is_ours) {
-      throw IoError(entry.path.string() + ": is no file of the results (" + kind_.marker +
-                    " does not list it), which would be replaced as a whole; move it away");
-    }
-    inputs.refuse(entry.path);
-  }
+  inputs.refuse(folder_.identity(), path());
+  folder_.check_changeable();
+  visit_entries(
+      [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
+        const fs::path file = parent.path() / name;
+        if (!is_ours) {
+          throw IoError(file.string() + ": is no file of the results (" + kind_.marker +
+                        " does not list it), which would be replaced as a whole; move it away");
+        }
+        inputs.refuse(entry.identity, file);
+        if (entry.kind == Folder::Kind::kFolder) Folder(parent, name).check_changeable();
+      });
 }
 
-void ResultFolder::mark(Json marker, OutputListing listing) {
+void ResultFolder::mark(Json marker, const OutputListing& listing) {
+  for (const std::string& name : folder_.names()) {
+    if (target_of_temporary(name) == kind_.marker)
+      folder_.remove_file(name);  // of a killed command
+  }
   marker["outputs"] = listing.to_json();
   AtomicFile file(marker_path());
   file.stream() << to_text(marker);
   file.commit();
   marker_ = std::move(marker);
-  listing_ = std::move(listing);
+  listing_ = listing;
 }
 
 void ResultFolder::remove_results() const {
-  const fs::path marker = marker_path();
-  std::error_code error;
-  for (const Entry& entry : entries()) {
-    if (!entry.is_ours || entry.path == marker) continue;
-    fs::remove(entry.path, error);  // a folder stays if it holds anything else
-    if (error && error != std::errc::directory_not_empty) {
-      throw IoError(entry.path.string() + ": cannot be removed: " + error.message());
-    }
-  }
-  fs::remove(marker, error);
+  visit_entries(
+      [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
+        if (!is_ours || (&parent == &folder_ && name == kind_.marker)) return;
+        if (entry.kind == Folder::Kind::kFile) return parent.remove_file(name);
+        parent.remove_folder(name);  // stays if it holds anything else
+      });
+  folder_.remove_file(kind_.marker);
 }
 
-OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind, OutputListing listing,
-                           bool may_replace, const InputFiles& inputs)
-    : target_(checked_target(target, inputs)), listing_(std::move(listing)) {
-  if (fs::exists(fs::symlink_status(target_))) {
-    earlier_.emplace(target_, kind);
-    if (earlier_->has_results() && !may_replace) {
-      throw IoError(target.string() +
-                    ": holds earlier results; choose another folder, or replace them by --force");
-    }
-    check_movable(target_, target);
-    earlier_->check(inputs);
+MissingFolders::MissingFolders(const fs::path& folder) {
+  std::error_code ignored;
+  for (fs::path path = folder; path.has_relative_path() && !fs::exists(path, ignored);
+       path = path.parent_path()) {
+    created_.push_back(path);
   }
-  const fs::path partial = partial_of(target_);
-  create_folder(target_.parent_path());
-  std::error_code error;
-  fs::create_directory(partial, error);
-  if (fs::symlink_status(partial).type() != fs::file_type::directory) {
-    throw IoError(partial.string() + (error ? ": cannot be created: " + error.message()
-                                            : ": is a link or a file; move it away"));
-  }
-  partial_.emplace(partial, kind);
-  partial_->check(inputs);
-  left_ = partial_->marker();
-  partial_->remove_results();
-  partial_->mark(begin_marker(kind), listing_);
+  create_folder(folder);
 }
 
-OutputFolder::~OutputFolder() {
+MissingFolders::~MissingFolders() {
+  for (const fs::path& folder : created_) ::rmdir(folder.c_str());
+}
+
+PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
+                             const OutputListing& listing, const InputFiles& inputs)
+    : missing_(target.parent_path()),
+      parent_(target.parent_path()),
+      target_(target.filename().string()),
+      name_(target_ + kPartialEnd) {
+  parent_.make_folder(name_);
+  results_.emplace(Folder(parent_, name_), kind);
+  // Another command may have renamed the folder before it was locked here.
+  const std::optional<Folder::Entry> entry = parent_.find(name_);
+  if (!entry || entry->identity != results_->folder().identity()) {
+    throw UsageError(path().string() + ": is in use");
+  }
+  results_->check(inputs);
+  left_ = results_->marker();
+  results_->remove_results();
+  try {
+    results_->mark(begin_marker(kind), listing);
+  } catch (...) {
+    parent_.remove_folder(name_);
+    throw;
+  }
+}
+
+PartialFolder::~PartialFolder() {
   if (is_kept_) return;
   try {
-    partial_->remove_results();
-    fs::remove(path());
-  } catch (const std::exception&) {
+    remove();
+  } catch (const IoError&) {
     // The next command with this target removes the rest.
   }
 }
 
+void PartialFolder::remove() {
+  keep();
+  results_->remove_results();
+  parent_.remove_folder(name_);
+}
+
+void PartialFolder::replace(ResultFolder* earlier) {
+  if (earlier == nullptr) {
+    parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
+    parent_.sync();
+    return;
+  }
+  if (parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
+    parent_.sync();
+    earlier->remove_results();
+    parent_.remove_folder(name_);
+    return;
+  }
+  // Nothing that is called complete loses its files one by one.
+  Json marker = earlier->marker();
+  marker["complete"] = false;
+  earlier->mark(marker, OutputListing(earlier->listing()));
+  earlier->remove_results();
+  parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
+  parent_.sync();
+}
+
+OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
+                           const OutputListing& listing, bool may_replace, const InputFiles& inputs)
+    : listing_(listing) {
+  const fs::path place = whole_path(target);
+  check_name(place);
+  inputs.refuse(place);
+  if (fs::exists(fs::symlink_status(place))) {
+    if (identity_of(place) == identity_of(".")) {
+      throw IoError(target.string() +
+                    ": is the current folder, which a new one would replace; "
+                    "choose another folder");
+    }
+    ResultFolder found(Folder(place), kind);
+    if (found.has_results() && !may_replace) {
+      throw IoError(target.string() +
+                    ": holds earlier results; choose another folder, or replace them by --force");
+    }
+    found.check(inputs);
+    Folder(place.parent_path()).check_replaceable(place.filename().string());
+    if (!found.folder().names().empty()) earlier_.emplace(std::move(found));
+  }
+  partial_.emplace(place, kind, listing, inputs);
+}
+
 bool OutputFolder::earlier_have(const char* field, const std::string& text) const {
-  return (earlier_ && has_value(earlier_->marker(), field, text)) ||
-         (has_value(left_, "/complete", true) && has_value(left_, field, text));
+  return earlier_ && has(earlier_->marker(), field, text);
+}
+
+bool OutputFolder::left_have(const char* field, const std::string& text) const {
+  return has(partial_->left(), "/complete", true) && has(partial_->left(), field, text);
+}
+
+bool OutputFolder::owns(const char* field, const fs::path& path) const {
+  // A file that still waits to be put in place is not the one there.
+  const fs::path waiting = fs::path(path).concat(kPartialEnd) / path.filename();
+  return earlier_have(field, path.string()) ||
+         (left_have(field, path.string()) && !fs::exists(fs::symlink_status(waiting)));
 }
 
 void OutputFolder::keep_unfinished(const Json& marker) {
-  partial_->mark(marker, listing_);
+  partial_->results().mark(marker, listing_);
   sync_files(path());
-  is_kept_ = true;
+  partial_->keep();
 }
 
 void OutputFolder::finish(Json marker, const std::function<void()>& put_others) {
   marker["complete"] = true;
-  keep_unfinished(marker);
-  try {
-    put_others();
-  } catch (...) {
-    marker["complete"] = false;  // what is in their place is not ours
-    partial_->mark(marker, listing_);
-    throw;
-  }
-  put_in_place();
-}
-
-void OutputFolder::put_in_place() {
-  const fs::path partial = path();
-  if (earlier_ && rename(partial, target_, RENAME_EXCHANGE)) {
-    sync_files(target_.parent_path());
-    earlier_->was_moved_to(partial);
-    earlier_->remove_results();
-    std::error_code ignored;
-    fs::remove(partial, ignored);
-    return;
-  }
-  if (earlier_) {
-    // Nothing that is called complete loses its files one by one.
-    Json marker = earlier_->marker();
-    marker["complete"] = false;
-    earlier_->mark(marker, earlier_->listing());
-    earlier_->remove_results();
-  }
-  rename(partial, target_, 0);
-  sync_files(target_.parent_path());
+  partial_->results().mark(marker, listing_);
+  sync_files(path());
+  partial_->keep();  // the results are whole
+  put_others();
+  partial_->replace(earlier_ ? &*earlier_ : nullptr);
 }
 
 OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
-    : target_(checked_target(target, inputs)) {
-  const fs::file_type type = fs::symlink_status(target_).type();
-  if (type != fs::file_type::regular && type != fs::file_type::not_found) {
-    throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
+    : target_(whole_path(target)), lock_(target_.parent_path(), FolderLock::Mode::kShared) {
+  check_name(target_);
+  inputs.refuse(target_);
+  const Folder parent(target_.parent_path());
+  if (const auto entry = parent.find(target_.filename().string())) {
+    if (entry->kind != Folder::Kind::kFile) {
+      throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
+    }
+    if (!may_replace) {
+      throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
+    }
+    replaces_ = true;
   }
-  replaces_ = type == fs::file_type::regular;
-  if (replaces_ && !may_replace) {
-    throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
-  }
-  std::random_device random;
-  path_ = target_.parent_path() / ('.' + std::to_string(random()) + std::to_string(random()) +
-                                   ".partial." + target_.filename().string());
-  const int file = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (file < 0) fail_by_system(target_, "cannot be created", errno);
-  ::close(file);
-}
-
-OutputFile::~OutputFile() {
-  std::error_code ignored;
-  if (!is_kept_) fs::remove(path_, ignored);
+  const std::string name = target_.filename().string();
+  partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
 }
 
 void OutputFile::put_in_place() {
-  sync_files(target_.parent_path());
-  is_kept_ = true;  // the file is whole
-  if (!replaces_ && rename(path_, target_, RENAME_NOREPLACE)) return;
-  if (!replaces_ && fs::exists(fs::symlink_status(target_))) {
-    fail_by_system(target_, "cannot be put in place", EEXIST);
+  sync_files(partial_->path());
+  partial_->keep();  // the file is whole
+  partial_->results().folder().rename(partial_->target(), partial_->parent(), partial_->target(),
+                                      replaces_ ? Folder::Rename::kReplace : Folder::Rename::kNew);
+  partial_->parent().sync();
+  partial_->remove();
+}
+
+AddedFile::AddedFile(ResultFolder& results, const std::string& name)
+    : results_(results),
+      name_(name),
+      partial_(whole_path(results.path()).concat('.' + name), file_kind(), listing_of_file(name),
+               InputFiles()) {
+  const std::optional<Folder::Entry> entry = results.folder().find(name);
+  if (!entry || (entry->kind == Folder::Kind::kFile && results.listing().contains("", name))) {
+    return;
   }
-  rename(path_, target_, 0);
+  throw IoError((results.path() / name).string() + ": is in the way, and no part of the results (" +
+                results.kind().marker + " does not list it); move it away");
+}
+
+void AddedFile::put_in_place(const Json& marker, const std::function<void()>& publish_more) {
+  sync_files(partial_.path());
+  OutputListing listing = results_.listing();
+  listing.files.insert(listed_name(name_));
+  // Listed first: a file that is not listed would count as one of the user.
+  results_.mark(marker, listing);
+  publish_more();
+  partial_.results().folder().rename(name_, results_.folder(), name_, Folder::Rename::kReplace);
+  results_.folder().sync();
+  partial_.remove();
 }
 
 }  // namespace dynains::program

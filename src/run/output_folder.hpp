@@ -1,10 +1,9 @@
 // Outputs of a command: each appears whole, or not at all, and nothing of others is replaced.
 //
-// A command writes the folder TARGET into TARGET.partial, which it creates, locks and marks as its
+// A command writes TARGET into the folder TARGET.partial, which it creates, locks and marks as its
 // own before anything else, and renames when all is on the disk. A command that is killed leaves
-// that folder, which the next one with this target replaces. A single file is written beside its
-// target, under a name that no other command uses. Links are never followed below the folder that
-// holds the target.
+// that folder, which the next one with this target replaces. Links are never followed below the
+// folder that holds the target.
 #pragma once
 
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include <vector>
 
 #include "dynains/io/folder_lock.hpp"
+#include "folder.hpp"
 #include "input_files.hpp"
 #include "output_listing.hpp"
 
@@ -42,39 +42,86 @@ class ResultFolder {
  public:
   /// Throws unless the folder holds results of this kind, or nothing but temporaries of the marker;
   /// UsageError if another command has locked it. `kind` outlives this.
-  ResultFolder(std::filesystem::path folder, const OutputKind& kind);
+  ResultFolder(Folder folder, const OutputKind& kind);
 
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path marker_path() const { return path_ / kind_.marker; }
+  const Folder& folder() const { return folder_; }
+  const std::filesystem::path& path() const { return folder_.path(); }
+  std::filesystem::path marker_path() const { return path() / kind_.marker; }
+  const OutputKind& kind() const { return kind_; }
   /// Null if there is none.
   const nlohmann::ordered_json& marker() const { return marker_; }
   bool has_results() const { return !marker_.is_null(); }
   const OutputListing& listing() const { return listing_; }
+  /// Whether the marker has `"complete": true`.
+  bool is_complete() const;
 
   /// Throws if any file is not listed, or is one of `inputs`.
   void check(const InputFiles& inputs) const;
   /// Replaces the marker, with this listing in the field `outputs`. It is on the disk afterwards.
-  void mark(nlohmann::ordered_json marker, OutputListing listing);
+  void mark(nlohmann::ordered_json marker, const OutputListing& listing);
   /// Removes the listed files, and at last the marker. Files of others stay.
   void remove_results() const;
-  /// The folder has got another name.
-  void was_moved_to(std::filesystem::path path) { path_ = std::move(path); }
 
  private:
-  struct Entry {
-    std::filesystem::path path;
-    bool is_ours;
-  };
-  /// All entries, those of a listed folder before it.
-  std::vector<Entry> entries() const;
-  bool is_listed(const std::string& folder, const std::filesystem::directory_entry& entry) const;
+  /// visit(parent, name, entry, is_ours) for all entries, those of a folder before it.
+  template <class Visit>
+  void visit_entries(Visit&& visit) const;
+  bool is_listed(const std::string& folder, const std::string& name) const;
 
-  std::filesystem::path path_;
-  std::optional<FileIdentity> identity_;  ///< before the lock
-  FolderLock lock_;
+  Folder folder_;
   const OutputKind& kind_;
   nlohmann::ordered_json marker_;
   OutputListing listing_;
+};
+
+/// Folders that were missing above an output. The destructor removes those that are still empty.
+class MissingFolders {
+ public:
+  /// Creates them.
+  explicit MissingFolders(const std::filesystem::path& folder);
+  ~MissingFolders();
+  MissingFolders(const MissingFolders&) = delete;
+  MissingFolders& operator=(const MissingFolders&) = delete;
+
+ private:
+  std::vector<std::filesystem::path> created_;  // innermost first
+};
+
+/// The folder TARGET.partial. The destructor removes it unless it was renamed or kept.
+class PartialFolder {
+ public:
+  /// Creates the folder with a marker of this listing. What a killed command of this kind has left
+  /// there is removed before. Throws IoError if anything else has the name, or `inputs` are there;
+  /// UsageError if another command writes the target.
+  PartialFolder(const std::filesystem::path& target, const OutputKind& kind,
+                const OutputListing& listing, const InputFiles& inputs);
+  ~PartialFolder();
+  PartialFolder(const PartialFolder&) = delete;
+  PartialFolder& operator=(const PartialFolder&) = delete;
+
+  const std::filesystem::path& path() const { return results_->path(); }
+  ResultFolder& results() { return *results_; }
+  /// Marker of what a killed command had left; null if there was nothing.
+  const nlohmann::ordered_json& left() const { return left_; }
+  /// The folder of the target.
+  const Folder& parent() const { return parent_; }
+  /// Name of the target there.
+  const std::string& target() const { return target_; }
+  /// Moves this folder to the target, in place of the results that are there, if any.
+  void replace(ResultFolder* earlier);
+  /// The folder stays as it is.
+  void keep() { is_kept_ = true; }
+  /// Removes the folder, which has nothing left but its marker.
+  void remove();
+
+ private:
+  MissingFolders missing_;
+  Folder parent_;
+  std::string target_;
+  std::string name_;
+  std::optional<ResultFolder> results_;
+  nlohmann::ordered_json left_;
+  bool is_kept_ = false;
 };
 
 /// Results in a folder.
@@ -83,18 +130,18 @@ class OutputFolder {
   /// `listing` has all files that will be written. Throws IoError unless `target` is missing, empty
   /// or, if `may_replace`, holds results of this kind, all of which are listed and none of which
   /// are `inputs`; UsageError if another command uses it.
-  OutputFolder(const std::filesystem::path& target, const OutputKind& kind, OutputListing listing,
-               bool may_replace, const InputFiles& inputs);
-  /// Removes the folder unless it was kept or put in place.
-  ~OutputFolder();
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
+  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
+               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
 
   /// The folder to write into.
   const std::filesystem::path& path() const { return partial_->path(); }
-  /// Whether the results that will be replaced, or complete ones that a killed command has left
-  /// beside the target, have this text in `field` of their marker.
+  /// Whether the results that will be replaced have this text in `field` of their marker.
   bool earlier_have(const char* field, const std::string& text) const;
+  /// Whether complete results have, which a killed command has left beside the target.
+  bool left_have(const char* field, const std::string& text) const;
+  /// Whether the file `path` was put in place with those results, which name it in `field`. Then it
+  /// is theirs, wherever it lies.
+  bool owns(const char* field, const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
   /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. At last it
@@ -104,38 +151,50 @@ class OutputFolder {
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 
  private:
-  void put_in_place();
-
-  std::filesystem::path target_;
   OutputListing listing_;
   std::optional<ResultFolder> earlier_;
-  std::optional<ResultFolder> partial_;
-  nlohmann::ordered_json left_;  ///< marker of what a killed command had left; null: nothing
-  bool is_kept_ = false;
+  std::optional<PartialFolder> partial_;
 };
 
 /// A file as an output of its own.
 class OutputFile {
  public:
   /// Throws IoError if `target` cannot be written, is one of `inputs`, or exists and must not be
-  /// replaced.
+  /// replaced; UsageError if another command writes it or its folder.
   OutputFile(const std::filesystem::path& target, bool may_replace, const InputFiles& inputs);
-  /// Removes the file unless it was put in place.
-  ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
 
-  /// The file to write, with the ending of the target.
-  const std::filesystem::path& path() const { return path_; }
+  /// The file to write, of the name of the target.
+  std::filesystem::path path() const { return partial_->path() / target_.filename(); }
+  /// By whole_path().
+  const std::filesystem::path& target() const { return target_; }
   /// The file is at the target, and on the disk. If it cannot be put there, it stays in path().
   /// Throws IoError.
   void put_in_place();
 
  private:
-  std::filesystem::path target_;  // by whole_path()
-  std::filesystem::path path_;
+  std::filesystem::path target_;
+  FolderLock lock_;
   bool replaces_ = false;
-  bool is_kept_ = false;
+  std::optional<PartialFolder> partial_;
+};
+
+/// A file that is added to finished results, or replaces the one that was added before.
+class AddedFile {
+ public:
+  /// `results` outlive this. Throws IoError if a file of others has the name.
+  AddedFile(ResultFolder& results, const std::string& name);
+
+  /// The file to write.
+  std::filesystem::path path() const { return partial_.path() / name_; }
+  /// The marker lists the file, and the file is in place. Calls `publish_more()` when all bytes
+  /// are on the disk and only names are left to change. Throws IoError.
+  void put_in_place(
+      const nlohmann::ordered_json& marker, const std::function<void()>& publish_more = [] {});
+
+ private:
+  ResultFolder& results_;
+  std::string name_;
+  PartialFolder partial_;
 };
 
 }  // namespace dynains::program

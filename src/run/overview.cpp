@@ -4,16 +4,23 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <utility>
 
 #include "moving_points.hpp"
+#include "picture_text.hpp"
 
 namespace dynains::program {
 namespace {
 
-constexpr double kMargin = 50.0;        // m around the path
-constexpr double kLongerSide = 1200.0;  // pixels of a panel
-constexpr double kMostPerMetre = 8.0;   // pixels
-constexpr int kGap = 8;                 // pixels between panels
+constexpr double kMargin = 50.0;         // m around the path
+constexpr double kLongerSide = 1200.0;   // pixels of a panel
+constexpr double kMostPerMetre = 8.0;    // pixels
+constexpr int kGap = 8;                  // pixels between panels
+constexpr int kStrip = kTextHeight + 8;  // pixels of a title, and of the scale below all panels
+constexpr int kInset = 4;                // pixels around text
+constexpr Colour kInk = {40, 40, 40};
+constexpr Colour kGrey = {150, 150, 150};  // static points in a legend
 constexpr Colour kMoving = {30, 80, 220};
 constexpr Colour kRemoved = {30, 160, 60};
 constexpr Colour kPale = {232, 232, 232};
@@ -26,6 +33,45 @@ std::size_t static_step(std::size_t scans) {
 /// Grey that gets darker with the height above the ground below the sensor.
 std::uint8_t shade(double height) {
   return static_cast<std::uint8_t>(std::clamp(205.0 - 18.0 * (height + 1.7), 70.0, 215.0));
+}
+
+void fill(Picture& picture, int x, int y, int width, int height, Colour colour) {
+  for (int row = y; row < std::min(y + height, picture.height()); ++row) {
+    for (int column = x; column < std::min(x + width, picture.width()); ++column) {
+      picture.set(column, row, colour);
+    }
+  }
+}
+
+/// Colours and their meaning.
+using Entries = std::vector<std::pair<Colour, std::string>>;
+
+/// Title and legend of a panel, above it. `x`, `y`: its upper left corner, pixels.
+void draw_title(Picture& picture, int x, int y, const std::string& title, const Entries& entries) {
+  x += kInset;
+  y += kInset;
+  draw_text(picture, x, y, title, kInk);
+  x += text_width(title + ' ');
+  for (const auto& [colour, meaning] : entries) {
+    fill(picture, x, y + 2, kTextHeight - 4, kTextHeight - 4, colour);
+    x += kTextHeight;
+    draw_text(picture, x, y, meaning, kInk);
+    x += text_width(meaning + "  ");
+  }
+}
+
+/// A bar of a round length at the lower border. `scale`: pixels per m.
+void draw_scale(Picture& picture, double scale) {
+  constexpr double kMostPixels = 200.0;
+  constexpr int kBar = 4;  // pixels
+  int metres = 1;
+  for (const int next : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000}) {
+    if (next * scale <= kMostPixels) metres = next;
+  }
+  const int length = std::max(1, static_cast<int>(std::lround(metres * scale)));
+  const int y = picture.height() - kStrip + kInset;
+  fill(picture, kInset, y + (kTextHeight - kBar) / 2, length, kBar, kInk);
+  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kInk);
 }
 
 }  // namespace
@@ -79,10 +125,10 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
 Picture Overview::picture() const {
   const bool is_beside = height_ > width_;
   const int step_x = is_beside ? width_ + kGap : 0;
-  const int step_y = is_beside ? 0 : height_ + kGap;
-  Picture picture(width_ + 2 * step_x, height_ + 2 * step_y);
+  const int step_y = is_beside ? 0 : kStrip + height_ + kGap;
+  Picture picture(width_ + 2 * step_x, kStrip + height_ + 2 * step_y + kStrip);
   const auto draw = [&](int panel, int x, int y, Colour colour) {
-    picture.set(x + panel * step_x, y + panel * step_y, colour);
+    picture.set(x + panel * step_x, y + kStrip + panel * step_y, colour);
   };
   for (int y = 0; y < height_; ++y) {
     const std::vector<Pixel>& row = rows_[static_cast<std::size_t>(y)];
@@ -99,6 +145,11 @@ Picture Overview::picture() const {
       if (pixel.has_static()) draw(1, x, y, grey);
     }
   }
+  const Entries before = {{kGrey, "static"}, {kMoving, "moving"}};
+  draw_title(picture, 0, 0, "before:", before);
+  draw_title(picture, step_x, step_y, "after:", {{kGrey, "static"}});
+  draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kRemoved, "moving"}});
+  draw_scale(picture, scale_);
   return picture;
 }
 

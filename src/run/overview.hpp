@@ -22,7 +22,8 @@ class Overview {
   void add(const RecordedScan& scan, const ScanVerdict& verdict);
 
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
-  /// ones blue), after (static points), removed (moving points green, the others pale).
+  /// ones blue), after (static points), removed (moving points green, the others
+  /// pale); each with title and legend, below them a scale bar.
   Picture picture() const;
 
  private:

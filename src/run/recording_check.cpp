@@ -13,6 +13,7 @@
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
+#include "lone_scans.hpp"
 #include "pose_advice.hpp"
 
 namespace dynains::program {
@@ -62,7 +63,8 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
 void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
   if (recording.size() == 0) return;
   for (const auto& remark :
-       {remark_on_stripes(recording), remark_on_mounting(recording, d.mounting)}) {
+       {remark_on_stripes(recording), remark_on_copies(recording, {0, recording.size() - 1}),
+        remark_on_mounting(recording, d.mounting)}) {
     if (remark) text << "note: " << *remark << '\n';
   }
 }
@@ -127,7 +129,7 @@ RecordingCheck check_recording(const Recording& recording) {
   check.findings = describe(recording, check.diagnosis);
   std::optional<std::string> lone;
   if (recording.size() > 1) {
-    lone = remark_on_lone_scans(recording, {0, recording.size() - 1}, RemoverConfig());
+    lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
   }
   check.passed = sound && !lone;
   if (!lone || !sound) check.advice = advice(recording, check.diagnosis) + '\n';

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "cloud_remarks.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
@@ -17,6 +16,7 @@
 #include "interrupt.hpp"
 #include "log_output.hpp"
 #include "output_folder.hpp"
+#include "range_check.hpp"
 #include "run_doubts.hpp"
 #include "run_plan.hpp"
 #include "run_sequence.hpp"
@@ -165,11 +165,11 @@ struct OutsideOutputs {
     const fs::path& map_file = plan.outputs.map;
     if (plan.outputs.has_outside_map()) {
       check_is_no_scan(map_file, plan.sequence);
-      map.emplace(map_file, out.earlier_have("/static_map/file", map_file.string()), plan.inputs);
+      map.emplace(map_file, out.owns("/static_map/file", map_file), plan.inputs);
     }
     const fs::path& log_file = plan.outputs.log;
     if (log_file.empty()) return;
-    log.emplace(plan, out.earlier_have("/request/write_log", log_file.string()));
+    log.emplace(plan, out.owns("/request/write_log", log_file));
   }
 
   std::optional<OutputFile> map;
@@ -228,7 +228,7 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ord
   }
   if (outputs.write_page) {
     outcome.page = plan.outputs.folder / kViewPage;
-    write_page(outputs.folder / kViewPage, outputs.folder, report, plan.sequence,
+    write_page(outputs.folder / kViewPage, outputs.folder, outputs.map, report, plan.sequence,
                kDefaultViewPoints);
   }
   out.finish(report, [&] {
@@ -248,7 +248,9 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   std::optional<SessionAlignment> alignment;
   // The results that are replaced may have added the session already.
   const std::string& name = plan.session.info.name;
-  const bool has_session = out.earlier_have(kSessionField, name) && plan.session.is_fulfilled();
+  const bool has_session =
+      (out.earlier_have(kSessionField, name) || out.left_have(kSessionField, name)) &&
+      plan.session.is_fulfilled();
   if (!plan.session.city.empty() && !has_session) {
     const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
     alignment = request.info.alignment;

@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "cloud_remarks.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/extrinsic.hpp"
@@ -13,6 +12,7 @@
 #include "dynains/pose.hpp"
 #include "io/fingerprint.hpp"
 #include "naming_scan.hpp"
+#include "own_body_range.hpp"
 
 namespace dynains::program {
 namespace {
@@ -186,7 +186,7 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   if (!is_map_name(name) || !is_map_name(map)) {
     throw ConfigError("--map " + name + ": expected a name that ends in .ply, .pcd or .las");
   }
-  if (map == out / "dynamic_points.ply") {
+  if (map == out / "dynamic_points.ply" || map == out / "dynamic_points.las") {
     throw ConfigError("--map " + name + ": the moving points go there");
   }
   if (is_in_results(map, out) && map.parent_path() != out) {

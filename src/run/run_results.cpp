@@ -24,6 +24,8 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
+constexpr const char* kDynamicLas = "dynamic_points.las";
+
 PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
   PointColumns columns;
   columns.double_xyz = far;
@@ -76,6 +78,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(listed_name(map_name()));
+  if (has_las_map()) listing.files.insert(kDynamicLas);
   if (write_poses) listing.files.insert(kEstimatedPoses);
   if (write_page) listing.files.insert(kViewPage);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
@@ -113,10 +116,13 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       needs_beliefs_(outputs.needs_beliefs()),
       writing_(outputs.thread) {
   final_labels_.create_folders();
-  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online").create_folders();
+  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
   if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
+  if (outputs.has_las_map()) {
+    dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
+  }
   if (outputs.map_attributes) {
     map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
   }
@@ -125,9 +131,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 void RunResults::take_newest(const FrameResult& frame) {
   const NewestVerdict& verdict = frame.newest;
   compared_.add(frame);
-  if (!online_labels_) return;
-  online_labels_->take(verdict);
-  online_labels_->write(recording_.name(range_.first + verdict.scan));
+  if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
 }
 
 void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
@@ -247,6 +251,11 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
   if (session_ != nullptr) session_->add(scan, verdict, labels, index);
+  if (!dynamic_las_) return;
+  for_each_moving(verdict.labels, [&](std::size_t i) {
+    const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
+    dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
+  });
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
@@ -255,7 +264,9 @@ void RunResults::add_map_point(const Eigen::Vector3d& point) {
 
 void RunResults::commit() {
   finish();
+  if (online_labels_) online_labels_->finish();
   dynamic_points_.commit();
+  if (dynamic_las_) dynamic_las_->commit();
   overview_.picture().write_png(overview_file_);
   if (map_) map_->commit();
 }

@@ -71,7 +71,7 @@ struct RunOutputs {
 /// Positions of the sensor, m, world frame.
 std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range);
 
-/// Opens a file for the map of these scans. Throws IoError.
+/// Opens a file for the map of these scans, or for its moving points. Throws IoError.
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
 
@@ -139,12 +139,13 @@ class RunResults {
   const Recording& recording_;
   ScanRange range_;
   LabelFiles final_labels_;
-  std::optional<LabelFiles> online_labels_;
+  std::optional<LabelWriter> online_labels_;
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
   Overview overview_;
   std::filesystem::path overview_file_;
   std::unique_ptr<MapFile> map_;
+  std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "cloud_remarks.hpp"
+#include "lone_scans.hpp"
 #include "pose_advice.hpp"
 
 namespace dynains::program {
@@ -35,8 +36,9 @@ StartCheck check_start(const Recording& recording, const ScanRange& range,
   const auto warn_if = [&](const std::optional<std::string>& remark) {
     if (remark) result.warnings.push_back(*remark);
   };
-  warn_if(remark_on_lone_scans(recording, range, config));
+  warn_if(remark_on_lone_scans(recording, range.first, range.last, config));
   warn_if(remark_on_stripes(recording));
+  warn_if(remark_on_copies(recording, range));
   if (config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0) {
     warn_if(remark_on_tilted_scans(recording, range));
   }

@@ -1,9 +1,12 @@
 #include "write_view.hpp"
 
+#include <algorithm>
 #include <string>
 
 #include "dynains/errors.hpp"
+#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "finished_run.hpp"
 #include "json_file.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
@@ -25,11 +28,12 @@ std::size_t scan_named(const Recording& recording, const std::string& name,
                 recording.folder().string() + " does not have; is it the recording of the run?");
 }
 
-viewer::RunFiles files_of(const fs::path& folder, const nlohmann::ordered_json& json,
-                          const Recording& recording) {
+viewer::RunFiles files_of(const fs::path& folder, const fs::path& map,
+                          const nlohmann::ordered_json& json, const Recording& recording) {
   const fs::path report = folder / run_output_kind().marker;
   viewer::RunFiles files;
   files.folder = folder;
+  files.map = map;
   const auto text = [&](const char* field) {
     return required_json_field<std::string>(report, json, field);
   };
@@ -38,26 +42,22 @@ viewer::RunFiles files_of(const fs::path& folder, const nlohmann::ordered_json& 
   if (files.last < files.first) {
     throw IoError(report.string() + ": /last_scan: expected a scan after /first_scan");
   }
-  files.map_voxel = required_json_field<double>(report, json, "/configuration/map_voxel");
+  const FreeSpaceConfig defaults;
+  const auto scans = [&](const std::string& name, int value) {
+    const auto given = json_field<double>(report, json, "/configuration/" + name);
+    return static_cast<std::size_t>(std::clamp(given.value_or(value), 0.0, 1e9));
+  };
+  files.references = viewer::ReferenceWindow(
+      scans("lookback_scans", defaults.lookback_scans),
+      scans("lookahead_scans", defaults.lookahead_scans),
+      std::max<std::size_t>(scans("reference_step", defaults.reference_step), 1));
   return files;
 }
 
 }  // namespace
 
-void check_run_is_finished(const std::filesystem::path& folder) {
-  const std::filesystem::path file = folder / "report.json";
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return;
-  const auto report = read_json_file(file);
-  if (json_field<std::string>(file, report, "/program") != "dynains") return;
-  if (required_json_field<bool>(file, report, "/complete")) return;
-  throw IoError(file.string() +
-                ": /complete: expected true, found false: the run was interrupted or is still at "
-                "work. Repeat it");
-}
-
 ResultFolder open_finished_run(const fs::path& folder) {
-  ResultFolder out(folder, run_output_kind());
+  ResultFolder out(Folder(folder), run_output_kind());
   if (!out.has_results()) {
     throw IoError(out.marker_path().string() + ": not found; expected a folder of `dynains run`");
   }
@@ -65,10 +65,11 @@ ResultFolder open_finished_run(const fs::path& folder) {
   return out;
 }
 
-void write_page(const fs::path& page, const fs::path& folder, const nlohmann::ordered_json& report,
-                const Recording& recording, std::size_t max_points) {
+void write_page(const fs::path& page, const fs::path& folder, const fs::path& map,
+                const nlohmann::ordered_json& report, const Recording& recording,
+                std::size_t max_points) {
   const viewer::ViewData data =
-      viewer::view_of_run(recording, files_of(folder, report, recording), max_points);
+      viewer::view_of_run(recording, files_of(folder, map, report, recording), max_points);
   AtomicFile file(page);
   viewer::write_page(file.stream(), data);
   file.commit();
@@ -76,20 +77,12 @@ void write_page(const fs::path& page, const fs::path& folder, const nlohmann::or
 
 fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
   ResultFolder out = open_finished_run(folder);
-  const fs::path page = out.path() / kViewPage;
-  const fs::file_type type = fs::symlink_status(page).type();
-  const bool is_ours =
-      type == fs::file_type::regular && out.listing().contains("", std::string(kViewPage));
-  if (type != fs::file_type::not_found && !is_ours) {
-    throw IoError(page.string() + ": is no part of the results; move it away");
-  }
-  const Recording recording = open(out.marker_path(), out.marker());
-  // Listed first: a file that is not listed would count as one of the user.
-  OutputListing listing = out.listing();
-  listing.files.insert(kViewPage);
-  out.mark(out.marker(), listing);
-  write_page(page, out.path(), out.marker(), recording, max_points);
-  return page;
+  AddedFile page(out, kViewPage);
+  const auto map = json_field<std::string>(out.marker_path(), out.marker(), "/static_map/file");
+  write_page(page.path(), out.path(), map ? out.path() / *map : fs::path(), out.marker(),
+             open(out.marker_path(), out.marker()), max_points);
+  page.put_in_place(out.marker());
+  return out.path() / kViewPage;
 }
 
 }  // namespace dynains::program

@@ -72,7 +72,7 @@ struct JudgedStreet {
 
 }  // namespace
 
-TEST_CASE("eval refuses an incomplete run") {
+TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
   const TemporaryFolder folder;
   const std::string sequence = (folder.path() / "street").string();
   const auto scans = write_street(sequence, 2);
@@ -88,7 +88,9 @@ TEST_CASE("eval refuses an incomplete run") {
   CHECK_NOTHROW(call({"eval", sequence, run.string()}));
   report(unfinished);
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("run/report.json: /complete: expected true, found false"));
+                    ContainsSubstring("run/report.json: /complete: expected true, found false") &&
+                        ContainsSubstring("--unfinished"));
+  CHECK_NOTHROW(call({"eval", sequence, run.string(), "--unfinished"}));
 
   PointFileWriter map(run / "map.ply");
   map.add({});
@@ -100,14 +102,14 @@ TEST_CASE("eval refuses an incomplete run") {
 
   report(R"({"program": "dynains", "complete": "no"})");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("/complete: type must be boolean, but is string"));
+                    ContainsSubstring("/complete: expected true or false, found string"));
   report("{");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("report.json: expected JSON: "));
+                    ContainsSubstring("report.json:1: column 2: expected JSON"));
   fs::remove(run / "report.json");
   fs::create_directory(run / "report.json");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("report.json: is not a regular file; expected a JSON file"));
+                    ContainsSubstring("report.json: is a folder; expected a JSON file"));
 }
 
 TEST_CASE("eval scores a run beside identity and oracle") {
@@ -209,14 +211,14 @@ TEST_CASE("A file that cannot be written is detected before the evaluation") {
   const std::string broken = (folder.path() / "no run").string();
   for (const char* flag : {"--json", "--csv"}) {
     CHECK(has(message_of({"eval", sequence.string(), broken, flag, file}),
-              file + ": cannot be created"));
+              missing + ": cannot be opened"));
   }
   fs::remove(sequence / "labels" / "000001.label");
   CHECK(has(message_of({"experiment", "sweep", sequence.string(), "--quiet", "--csv", file}),
-            file + ": cannot be created"));
+            missing + ": cannot be opened"));
   for (const char* flag : {"--csv", "--json"}) {
     CHECK(has(message_of({"experiment", "table1", sequence.string(), "--quiet", flag, file}),
-              file + ": cannot be created"));
+              missing + ": cannot be opened"));
   }
 }
 
@@ -429,6 +431,16 @@ TEST_CASE("The experiments run on any labelled sequence") {
     CHECK(!has(read_text(online), scores("0.6")));
     CHECK(has(message_of({"experiment", "sweep", street, "--values", "2"}), "tau-s = 2"));
     CHECK(has(message_of({"experiment", "sweep", street, "--parameter", "tau-x"}), "tau-x"));
+  }
+  SECTION("runtime") {
+    const std::string csv_path = (folder.path() / "runtime.csv").string();
+    const std::string text =
+        call({"experiment", "runtime", street, "--repeat", "2", "--csv", csv_path});
+    CHECK(has(read_text(csv_path), "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms\n"));
+    CHECK(has(read_text(csv_path), "\ntotal,"));
+    CHECK(has(text, "12 frames (2 times 6)"));
+    CHECK(has(text, "evidence"));
+    CHECK(has(text, "total"));
   }
 }
 

@@ -197,6 +197,17 @@ TEST_CASE("check and run tell points that lie on a grid") {
   }
 }
 
+TEST_CASE("check and run tell clouds that were recorded twice") {
+  const Drive drive;
+  for (std::size_t i = 1; i < drive.size(); i += 2) {
+    write_scan(drive.file_of(i), drive.scan(i - 1).xyzi);
+  }
+  for (const std::string& told :
+       {start({"check", drive.path()}).out, drive.run({"--accept-poses"}).err}) {
+    CHECK_THAT(told, ContainsSubstring("are equal, though the sensor moves"));
+  }
+}
+
 TEST_CASE("check tells clouds that are parts of a turn") {
   constexpr std::size_t kParts = 6;
   const Drive drive;

@@ -212,9 +212,9 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   const auto before = content_of(days.at("city"));
   const auto remap = [&](const std::string& poses, const std::string& city,
                          const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"remap",         "--force",     days.at("day1"),
-                                          days.at("out1"), "--poses",     days.at(poses),
-                                          "--update",      days.at(city), "-q"};
+    std::vector<std::string> arguments = {
+        "remap",        days.at("day1"), days.at("out1"), "--poses",
+        days.at(poses), "--update",      days.at(city),   "-q"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return start(arguments);
   };

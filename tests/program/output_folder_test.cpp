@@ -1,6 +1,6 @@
 #include "run/output_folder.hpp"
 
-#include <iterator>
+#include <unistd.h>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
@@ -78,7 +78,7 @@ TEST_CASE(
     const auto out = place.begin();
     write_text(out->path() / "labels/000001.label", "new");
   }
-  CHECK(fs::is_empty(place.root.path() / "above"));
+  CHECK(fs::is_empty(place.root.path()));
   {
     const auto out = place.begin();
     write_text(out->path() / "labels/000001.label", "new");
@@ -212,7 +212,7 @@ TEST_CASE("A marker is ours if it names the program and the command, and lists f
     return place.refusal();
   };
   CHECK(with(listed().dump()) == kNoRefusal);
-  CHECK_THAT(with("{"), ContainsSubstring("report.json: expected JSON: "));
+  CHECK_THAT(with("{"), ContainsSubstring("report.json:1: column 2: expected JSON"));
   CHECK_THAT(with(std::string(40000, '[')), ContainsSubstring("at most 64 arrays"));
   for (const char* text : {"{}", "[1]", R"({"program": "dynains", "command": "simulate"})",
                            R"({"program": "other", "command": "run"})"}) {
@@ -280,22 +280,25 @@ TEST_CASE("Two commands never write one output") {
     out->finish(begin_marker(kKind));
   }
   {
-    const ResultFolder reader(place.out, kKind);
+    const ResultFolder reader(Folder(place.out), kKind);
     CHECK_THROWS_AS(place.begin(), UsageError);
   }
   const fs::path file = place.root / "map.ply";
   {
     OutputFile first(file, false, InputFiles());
-    OutputFile second(file, false, InputFiles());
+    CHECK_THROWS_AS(OutputFile(file, true, InputFiles()), UsageError);
+    OutputFile other(place.root / "other.ply", false, InputFiles());
     write_text(first.path(), "first");
-    write_text(second.path(), "second");
+    write_text(other.path(), "other");
     first.put_in_place();
-    CHECK_THROWS_AS(second.put_in_place(), IoError);
-    CHECK(read_text(second.path()) == "second");
-    fs::remove(second.path());
+    other.put_in_place();
   }
   CHECK(read_text(file) == "first");
-  CHECK(std::distance(fs::directory_iterator(place.root.path()), {}) == 2);
+  CHECK(read_text(place.root / "other.ply") == "other");
+  CHECK_FALSE(fs::exists(file.string() + ".partial"));
+  // Nobody replaces the folder of a file that is being written.
+  const OutputFile within(place.out / "map.ply", false, InputFiles());
+  CHECK_THROWS_AS(place.begin(), UsageError);
 }
 
 TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a new one") {
@@ -335,6 +338,42 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
     // The new results are kept.
     CHECK(read_text(output.path()) == "new");
   }
+  SECTION("what a killed command left") {
+    const fs::path partial = file.string() + ".partial";
+    fs::create_directory(partial);
+    SECTION("of ours") {
+      Json json = begin_marker({"file", "partial.json"});
+      json["outputs"] = OutputListing{{"map.ply"}, {}, {}}.to_json();
+      write_text(partial / "partial.json", json.dump());
+      write_text(partial / "map.ply", "half");
+      OutputFile output(file, false, InputFiles());
+      CHECK_FALSE(fs::exists(output.path()));
+    }
+    SECTION("of others") {
+      write_text(partial / "map.ply", "mine");
+      CHECK_THAT(refusal(true), StartsWith(partial.string()));
+      CHECK(read_text(partial / "map.ply") == "mine");
+    }
+  }
+}
+
+TEST_CASE("A file is added to results, and replaced if it was added before") {
+  const Place place;
+  write_results(place.out);
+  ResultFolder results(Folder(place.out), kKind);
+  for (const char* text : {"first", "second"}) {
+    AddedFile page(results, "view.html");
+    write_text(page.path(), text);
+    CHECK_FALSE(read_text(place.out / "report.json").empty());
+    page.put_in_place(results.marker());
+    CHECK(read_text(place.out / "view.html") == text);
+  }
+  CHECK(results.listing().contains("", "view.html"));
+  CHECK(results.is_complete());
+  results.check(InputFiles());
+  write_text(place.out / "other.html", "mine");
+  CHECK_THAT(message_of<IoError>([&] { AddedFile(results, "other.html"); }),
+             ContainsSubstring("other.html: is in the way"));
 }
 
 TEST_CASE("Names of unfinished outputs and the current folder are no places for results") {

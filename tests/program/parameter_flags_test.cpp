@@ -122,7 +122,7 @@ TEST_CASE("Config files are refused by line") {
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder / "none.cfg"); }),
              ContainsSubstring("none.cfg: does not exist"));
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder.path()); }),
-             ContainsSubstring(": is not a regular file; expected a config file"));
+             ContainsSubstring(": is a folder; expected a config file"));
   REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
   for (const std::string& endless : {std::string("/dev/zero"), std::string(folder / "pipe")}) {
     CHECK_THAT(message_of<IoError>([&] { read_config_file(endless); }),

@@ -57,7 +57,7 @@ struct RemapFixture {
     if (start(arguments).code != 0) throw std::runtime_error("run failed");
   }
   Outcome remap(std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"remap", seq, out, "--force"};
+    std::vector<std::string> arguments = {"remap", seq, out};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return start(arguments);
   }
@@ -66,7 +66,7 @@ struct RemapFixture {
   std::string seq = folder / "a seq";
   std::string out = folder / "an out";
   std::string corrected = folder / "corrected.txt";
-  std::string map = out + "_remapped.ply";
+  std::string map = out + "/static_map_remapped.ply";
 };
 
 /// Bytes of the map of the labels in `out` under the poses of `corrected`.
@@ -114,11 +114,19 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
   CHECK(read_text(f.map) == expected_map(f));
   CHECK_THAT(outcome.out, ContainsSubstring("12 scans, static map: "));
   CHECK(read_text(f.out + "/static_map.ply") == own_map);
+  const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
+  CHECK(report["remapped_map"]["points"] == read_points(f.map).positions.size());
+  CHECK(report["complete"] == true);
 
   SECTION("a further correction replaces the map") {
     write_other_poses(f.corrected, kRunScans, 8);
     REQUIRE(f.remap({"--poses", f.corrected, "-q"}).code == 0);
     CHECK(read_text(f.map) == expected_map(f));
+  }
+  SECTION("the run is complete as before, and --force removes the map with it") {
+    CHECK_THAT(start({"run", f.seq, "--out", f.out}).err, ContainsSubstring("earlier results"));
+    REQUIRE(start({"run", f.seq, "--out", f.out, "--force"}).code == 0);
+    CHECK_FALSE(fs::exists(f.map));
   }
   SECTION("a map elsewhere leaves the folder of the run as it is") {
     const std::string before = read_text(f.out + "/report.json");
@@ -126,9 +134,9 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
     REQUIRE(f.remap({"--poses", f.corrected, "--map", elsewhere}).code == 0);
     CHECK(read_text(elsewhere) == expected_map(f));
     CHECK(read_text(f.out + "/report.json") == before);
-    CHECK_THAT(start({"remap", f.seq, f.out, "--map", elsewhere}).err, ContainsSubstring("exists"));
+    CHECK_THAT(f.remap({"--map", elsewhere}).err, ContainsSubstring("exists"));
     CHECK(read_text(elsewhere) == expected_map(f));
-    CHECK(f.remap({"--map", elsewhere}).code == 0);
+    CHECK(f.remap({"--map", elsewhere, "--force"}).code == 0);
     CHECK(read_text(elsewhere) != expected_map(f));
   }
 }
@@ -199,7 +207,7 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
   RecordingOptions corrected;
   corrected.poses = f.corrected;
   corrected.frame = PointFrame::kSensor;
-  CHECK(read_text(out + "_remapped.ply") ==
+  CHECK(read_text(out + "/static_map_remapped.ply") ==
         expected_map(Recording(seq, world), Recording(seq, corrected), out));
 
   // The poses of the run came from elsewhere.
@@ -272,13 +280,13 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
     write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
     expected = "not finite";
   }
-  SECTION("a folder in the place of the map") {
-    fs::create_directory(f.map);
-    expected = "is a link or a folder";
+  SECTION("a file of another owner in the place of the map") {
+    write_text(f.map, "mine");
+    expected = "is in the way";
   }
   SECTION("a map under a name of the run") {
     arguments.insert(arguments.end(), {"--map", f.out + "/static_map.ply"});
-    expected = "choose a place outside of OUT";
+    expected = "in the folder of the run, the map is static_map_remapped.ply";
     code = 2;
   }
   SECTION("a voxel size that no map has") {
@@ -294,10 +302,11 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
     return;
   }
   const std::string before = fs::exists(report_file) ? read_text(report_file) : "";
+  const std::string in_the_way = fs::exists(f.map) ? read_text(f.map) : "";
   const Outcome outcome = f.remap(arguments);
   CAPTURE(outcome.err);
   CHECK(outcome.code == code);
   CHECK_THAT(outcome.err, ContainsSubstring(expected));
   CHECK((fs::exists(report_file) ? read_text(report_file) : "") == before);
-  CHECK_FALSE(fs::is_regular_file(f.map));
+  CHECK((fs::exists(f.map) ? read_text(f.map) : "") == in_the_way);
 }

@@ -188,13 +188,15 @@ TEST_CASE("Flags --start and --end are scan numbers, both included") {
   CHECK(fixture.report()["scans"] == 5);
 }
 
-TEST_CASE("A map of LAS holds classes and attributes") {
+TEST_CASE("A map of LAS holds classes and attributes, and moving points have a file of their own") {
   const Fixture fixture;
   const std::string map = fixture.folder / "map.las";
   REQUIRE(fixture.run({"--map-attributes"}).code == 0);
   const PointFile expected = read_points(fixture.out + "/static_map.ply");
   CHECK(expected.intensity.size() == expected.positions.size());
   CHECK(expected.time.empty());
+  const std::size_t moving = read_points(fixture.out + "/dynamic_points.ply").positions.size();
+  CHECK(moving > 0);
 
   REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
   CHECK(fixture.report()["static_map"]["points"] == expected.positions.size());
@@ -204,6 +206,10 @@ TEST_CASE("A map of LAS holds classes and attributes") {
     CHECK((points.positions[i] - expected.positions[i]).cwiseAbs().maxCoeff() < 0.00052);
   }
   CHECK(points.time.size() == points.positions.size());
+  CHECK(read_points(fixture.out + "/dynamic_points.las").positions.size() == moving);
+  // Results without LAS replace both files.
+  REQUIRE(fixture.run({"--force"}).code == 0);
+  CHECK_FALSE(fs::exists(fixture.out + "/dynamic_points.las"));
 }
 
 TEST_CASE("Flags of attributes of the map that do not fit together are refused") {
@@ -220,7 +226,7 @@ TEST_CASE("Flags of attributes of the map that do not fit together are refused")
              ContainsSubstring("found nowhere") || ContainsSubstring("this build has no PROJ"));
   CHECK_THAT(refusal({"--map-attributes", "--build-map", "false"}),
              ContainsSubstring("--map-attributes needs --build-map true"));
-  CHECK_THAT(refusal({"--map", fixture.out + "/dynamic_points.ply"}),
+  CHECK_THAT(refusal({"--map", fixture.out + "/dynamic_points.las"}),
              ContainsSubstring("the moving points go there"));
   CHECK_THAT(refusal({"--map", fixture.folder / "map.laz"}),
              ContainsSubstring("ends in .ply, .pcd or .las"));
@@ -353,13 +359,13 @@ TEST_CASE("A run never removes or replaces a file that it reads") {
   const std::string clean = fixture.out + "/clean";
   const std::string poses = fixture.seq + "/poses.txt";
   CHECK_THAT(refusal({"run", clean, "--poses", poses, "--out", fixture.out, "--force"}),
-             ContainsSubstring(".bin: is read by this command, as " + clean));
+             ContainsSubstring(clean + "/000000.bin: is read by this command, as " + clean));
 
   // Access through links: to the folder, to one scan, and to the poses.
   const std::string link = fixture.folder / "link";
   fs::create_directory_symlink(clean, link);
   CHECK_THAT(refusal({"run", link, "--poses", poses, "--out", fixture.out, "--force"}),
-             ContainsSubstring(".bin: is read by this command, as " + link));
+             ContainsSubstring(clean + "/000000.bin: is read by this command, as " + link));
   const std::string scan = fixture.seq + "/velodyne/000003.bin";
   const std::string real = fixture.folder / "real.ply";
   fs::rename(scan, real);
@@ -397,6 +403,21 @@ TEST_CASE("A folder with a report that run did not write belongs to another owne
   }
 }
 
+TEST_CASE("Two runs never write one map at a time") {
+  const Fixture fixture;
+  const std::string map = fixture.folder / "map.ply";
+  {
+    program::OutputFile other(map, false, program::InputFiles());
+    write_text(other.path(), "of another run");
+    const Outcome refused = fixture.run({"--map", map});
+    CHECK(refused.code == 2);
+    CHECK_THAT(refused.err, ContainsSubstring(map + ".partial: is in use"));
+    CHECK_FALSE(fs::exists(fixture.out));
+    other.put_in_place();
+  }
+  CHECK(read_text(map) == "of another run");
+}
+
 TEST_CASE("Until the results of --force are complete, the earlier ones stay as they are") {
   const Fixture fixture(200);
   const std::string map = fixture.folder / "map.ply";
@@ -414,7 +435,10 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
   const std::string partial = fixture.out + ".partial";
   const auto end_by = [&](int signal) {
     Process process({"run", fixture.seq, "--out", fixture.out, "--map", map, "--force"});
-    const auto is_writing = [&] { return fs::exists(partial + "/labels/000000.label"); };
+    // The run removes files of a killed run before it begins the map.
+    const auto is_writing = [&] {
+      return fs::exists(map + ".partial") && fs::exists(partial + "/labels/000000.label");
+    };
     for (int i = 0; i < 60000 && !is_writing(); ++i) ::usleep(1000);
     REQUIRE(is_writing());
     ::kill(process.id(), signal);
@@ -427,13 +451,14 @@ TEST_CASE("Until the results of --force are complete, the earlier ones stay as t
                                   ContainsSubstring("stay in " + partial));
   CHECK(contents() == before);
   CHECK(nlohmann::json::parse(read_text(partial + "/report.json"))["complete"] == false);
-  CHECK(count_entries(fixture.folder.path()) == 4);
+  CHECK_FALSE(fs::exists(map + ".partial"));
 
   CHECK(end_by(SIGKILL).code == 128 + SIGKILL);
   CHECK(contents() == before);
+  CHECK(fs::exists(map + ".partial"));
   REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
   CHECK(fixture.labels() == 200);
-  CHECK_FALSE(fs::exists(partial));
+  CHECK(count_entries(fixture.folder.path()) == 3);
 }
 
 TEST_CASE("A run that was killed between its map and its folder is repeated with --force") {
@@ -445,6 +470,16 @@ TEST_CASE("A run that was killed between its map and its folder is repeated with
   REQUIRE(fixture.run({"--map", map, "--force"}).code == 0);
   CHECK(read_text(map) == expected);
   CHECK(count_entries(fixture.folder.path()) == 3);
+
+  // A map that was not put in place yet is not the one of that name.
+  fs::rename(fixture.out, fixture.out + ".partial");
+  fs::create_directory(map + ".partial");
+  fs::rename(map, map + ".partial/map.ply");
+  write_text(map, "mine");
+  const Outcome refused = fixture.run({"--map", map, "--force"});
+  CHECK(refused.code == 1);
+  CHECK_THAT(refused.err, ContainsSubstring(map + ": exists"));
+  CHECK(read_text(map) == "mine");
 }
 
 TEST_CASE("Different spellings of a path name one place") {
@@ -542,7 +577,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--votes", "9", "--window", "4"}, "votes = 9 must be at most window = 4"},
       {{"--tau-x", "1"}, "--tau-x"},
       {{"--decision", "paper"}, "--decision = paper: expected window|free_space"},
-      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter, see dynains config"},
+      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter; did you mean tau-s?"},
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},
       {{"--start", "5", "--end", "4"}, "--start and --end leave no scan"},
@@ -612,7 +647,7 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   }
   SECTION("a map that cannot be written") {
     flags.insert(flags.end(), {"--map", "/no/such/map.ply"});
-    expected = "/no/such/map.ply: cannot be created: No such file or directory";
+    expected = "/no/such: cannot be opened: No such file or directory";
   }
   const Outcome outcome = fixture.run(flags);
   CHECK(outcome.code == 1);
@@ -871,13 +906,14 @@ TEST_CASE("a run without ground truth leaves a picture, also without a map") {
   REQUIRE(fixture.run({"--build-map", "false"}).code == 0);
   const std::string png = read_text(fixture.out + "/overview.png");
   CHECK(png.substr(1, 3) == "PNG");
-  // The sensor stands: three panels of 100 m at 8 pixels per m, below each other.
+  // The sensor stands: three panels of 100 m at 8 pixels per m, below each other, each with a title
+  // of 22 pixels, and a scale bar below.
   const auto side = [&](std::size_t byte) {
     return 256 * static_cast<unsigned char>(png[byte + 2]) +
            static_cast<unsigned char>(png[byte + 3]);
   };
   CHECK(side(16) == 800);
-  CHECK(side(20) == 3 * 800 + 2 * 8);
+  CHECK(side(20) == 3 * (800 + 22) + 2 * 8 + 22);
 }
 
 TEST_CASE("Coordinates in millimetres are refused before any output, and read by --point-units") {
@@ -910,7 +946,7 @@ TEST_CASE("Coordinates in millimetres are refused before any output, and read by
   // The map of remap is in metres, too: the flag comes from the report of the run.
   REQUIRE(start({"remap", fixture.seq, fixture.out, "--poses", fixture.seq + "/poses.txt"}).code ==
           0);
-  for (const Eigen::Vector3d& p : read_points(fixture.out + "_remapped.ply").positions) {
+  for (const Eigen::Vector3d& p : read_points(fixture.out + "/static_map_remapped.ply").positions) {
     REQUIRE(p.norm() < 100.0);
   }
 }

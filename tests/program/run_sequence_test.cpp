@@ -9,7 +9,7 @@
 #include "io/files.hpp"
 #include "program/tiny_sequence.hpp"
 #include "run/label_writer.hpp"
-#include "run/read_ahead.hpp"
+#include "run/open_scans.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;

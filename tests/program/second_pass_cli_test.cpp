@@ -91,7 +91,7 @@ TEST_CASE("the second pass removes and restores points, and its results agree") 
   // remap builds the map of the static labels.
   REQUIRE(start({"remap", recording.seq, recording.path("two").string()}).code == 0);
   CHECK(read_text(recording.path("two") / "static_map.ply") ==
-        read_text(recording.path("two_remapped.ply")));
+        read_text(recording.path("two") / "static_map_remapped.ply"));
 }
 
 TEST_CASE("a run of two passes that was killed is repeated with the same bytes") {
@@ -135,8 +135,8 @@ TEST_CASE("passes are one or two, and the policy of what stands needs two") {
   for (const char* const passes : {"0", "3"}) {
     CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);
   }
-  const std::vector<std::vector<std::string>> streams = {{"--passes", "1"},
-                                                         {"--preset", "default"}};
+  const std::vector<std::vector<std::string>> streams = {
+      {"--passes", "1"}, {"--preset", "default"}};
   for (const std::vector<std::string>& stream : streams) {
     CAPTURE(stream.front());
     std::vector<std::string> flags = {"run",          folder / "seq", "--out",

@@ -238,12 +238,10 @@ inline Scenario added_session() {
 inline Scenario moved_session() {
   const Arguments command = {"remap",    "/seq",       "/disk/out", "--poses", "/seq/corrected.txt",
                              "--update", "/maps/city", "--quiet"};
-  Arguments again = command;
-  again.push_back("--force");
   return {{run_with({"--update", "/maps/city", "--accept-poses"})},
           command,
-          again,
-          {"maps/city/seq.session", "disk/out_remapped.ply"}};
+          command,
+          {"maps/city/seq.session", "disk/out/static_map_remapped.ply"}};
 }
 
 inline Scenario simulation() { return {{}, simulate_with({}), simulate_with({"--force"})}; }
