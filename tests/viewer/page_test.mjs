@@ -76,7 +76,7 @@ async function facts(page) {
   });
 }
 
-// Position of a pixel of a moving instance, in pixels of the page.
+// Position of a pixel of a moving instance that no control covers, in pixels of the page.
 async function movingPixel(page) {
   return page.evaluate(async () => {
     const {renderer, state} = await window.dynainsViewer;
@@ -85,6 +85,7 @@ async function movingPixel(page) {
     const pixel = new Uint8Array(4);
     for (let y = canvas.height * 0.4; y < canvas.height; y += 3) {
       for (let x = canvas.width * 0.45; x > canvas.width * 0.3; x -= 3) {
+        if (document.elementFromPoint(x, y) !== canvas) continue;
         gl.readPixels(x, canvas.height - 1 - y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
         if (Math.max(...pixel.slice(0, 3)) - Math.min(...pixel.slice(0, 3)) > 100) return [x, y];
       }
