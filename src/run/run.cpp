@@ -228,7 +228,7 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ord
   }
   if (outputs.write_page) {
     outcome.page = plan.outputs.folder / kViewPage;
-    write_page(outputs.folder / kViewPage, outputs.folder, outputs.map, report, plan.sequence,
+    write_page(outputs.folder / kViewPage, outputs.folder, report, plan.sequence,
                kDefaultViewPoints);
   }
   out.finish(report, [&] {

@@ -1,10 +1,8 @@
 #include "write_view.hpp"
 
-#include <algorithm>
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "dynains/evidence/free_space_config.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "finished_run.hpp"
 #include "json_file.hpp"
@@ -28,12 +26,11 @@ std::size_t scan_named(const Recording& recording, const std::string& name,
                 recording.folder().string() + " does not have; is it the recording of the run?");
 }
 
-viewer::RunFiles files_of(const fs::path& folder, const fs::path& map,
-                          const nlohmann::ordered_json& json, const Recording& recording) {
+viewer::RunFiles files_of(const fs::path& folder, const nlohmann::ordered_json& json,
+                          const Recording& recording) {
   const fs::path report = folder / run_output_kind().marker;
   viewer::RunFiles files;
   files.folder = folder;
-  files.map = map;
   const auto text = [&](const char* field) {
     return required_json_field<std::string>(report, json, field);
   };
@@ -42,15 +39,7 @@ viewer::RunFiles files_of(const fs::path& folder, const fs::path& map,
   if (files.last < files.first) {
     throw IoError(report.string() + ": /last_scan: expected a scan after /first_scan");
   }
-  const FreeSpaceConfig defaults;
-  const auto scans = [&](const std::string& name, int value) {
-    const auto given = json_field<double>(report, json, "/configuration/" + name);
-    return static_cast<std::size_t>(std::clamp(given.value_or(value), 0.0, 1e9));
-  };
-  files.references = viewer::ReferenceWindow(
-      scans("lookback_scans", defaults.lookback_scans),
-      scans("lookahead_scans", defaults.lookahead_scans),
-      std::max<std::size_t>(scans("reference_step", defaults.reference_step), 1));
+  files.map_voxel = required_json_field<double>(report, json, "/configuration/map_voxel");
   return files;
 }
 
@@ -65,11 +54,10 @@ ResultFolder open_finished_run(const fs::path& folder) {
   return out;
 }
 
-void write_page(const fs::path& page, const fs::path& folder, const fs::path& map,
-                const nlohmann::ordered_json& report, const Recording& recording,
-                std::size_t max_points) {
+void write_page(const fs::path& page, const fs::path& folder, const nlohmann::ordered_json& report,
+                const Recording& recording, std::size_t max_points) {
   const viewer::ViewData data =
-      viewer::view_of_run(recording, files_of(folder, map, report, recording), max_points);
+      viewer::view_of_run(recording, files_of(folder, report, recording), max_points);
   AtomicFile file(page);
   viewer::write_page(file.stream(), data);
   file.commit();
@@ -78,9 +66,8 @@ void write_page(const fs::path& page, const fs::path& folder, const fs::path& ma
 fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
   ResultFolder out = open_finished_run(folder);
   AddedFile page(out, kViewPage);
-  const auto map = json_field<std::string>(out.marker_path(), out.marker(), "/static_map/file");
-  write_page(page.path(), out.path(), map ? out.path() / *map : fs::path(), out.marker(),
-             open(out.marker_path(), out.marker()), max_points);
+  write_page(page.path(), out.path(), out.marker(), open(out.marker_path(), out.marker()),
+             max_points);
   page.put_in_place(out.marker());
   return out.path() / kViewPage;
 }

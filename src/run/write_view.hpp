@@ -19,10 +19,10 @@ inline constexpr std::size_t kDefaultViewPoints = 1000000;
 ResultFolder open_finished_run(const std::filesystem::path& folder);
 
 /// Writes the file `page` about results in `folder`, with this report, of a run over `recording`.
-/// `map`: file of its map; empty: none. Throws IoError.
+/// Throws IoError.
 void write_page(const std::filesystem::path& page, const std::filesystem::path& folder,
-                const std::filesystem::path& map, const nlohmann::ordered_json& report,
-                const Recording& recording, std::size_t max_points);
+                const nlohmann::ordered_json& report, const Recording& recording,
+                std::size_t max_points);
 
 /// Opens the recording of a run by its report, which is in `report_file`.
 using OpenRecording = std::function<Recording(const std::filesystem::path& report_file,
