@@ -29,11 +29,9 @@ struct ScanOfArrays {
 Simulator make_simulator(const std::string& scene, const std::string& sensor,
                          const std::string& labelling, const py::kwargs& parameters) {
   simulation::Config config;
-  py::dict values = parameters;
-  values["scene"] = scene;
-  values["sensor"] = sensor;
-  values["labelling"] = labelling;
-  assign_all(config, values);
+  assign_all(config, parameters);
+  assign_all(config, py::dict(py::arg("scene") = scene, py::arg("sensor") = sensor,
+                              py::arg("labelling") = labelling));
   const py::gil_scoped_release release;
   return Simulator(config);
 }

@@ -50,7 +50,8 @@ class GroundFootprint {
     for_each_bit(which & located.inside, [&](std::size_t i) {
       for (std::int32_t row = -1; row <= 1; ++row) {
         for (std::int32_t column = -1; column <= 1; ++column) {
-          const auto cell = static_cast<std::size_t>(located.cell[i] + row * width_ + column);
+          const std::int32_t number = located.cell[i] + row * width_ + column;
+          const auto cell = static_cast<std::size_t>(number);
           if (lowest_[cell] == kNothing) touched_.push_back(cell);
           lowest_[cell] = std::min(lowest_[cell], block.z[i]);
         }
@@ -97,7 +98,8 @@ class GroundFootprint {
   Located locate(PointsView block) const {
     Located located;
     located.inside = 0;
-    const PackConstant per_metre(per_metre_), centre(static_cast<float>(width_ / 2)),
+    const std::int32_t half = width_ / 2;
+    const PackConstant per_metre(per_metre_), centre(static_cast<float>(half)),
         border(static_cast<float>(width_ - 1));
     for_packs(block.size(), [&](auto at) {
       using Float = typename decltype(at)::Float;
