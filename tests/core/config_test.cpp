@@ -89,6 +89,7 @@ TEST_CASE("the configuration of the public implementation is that of the paper b
   CHECK(config.descriptor.ignored_low == 0.2);
   CHECK(config.descriptor.bounds_of_ends);
   CHECK(config.belief.vanished_weight == 1.0);
+  CHECK(config.ground.ground_fit_points == 1000000);
 }
 
 TEST_CASE("cells of a descriptor are bounded, since a cluster may reach all around the sensor") {

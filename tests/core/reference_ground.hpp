@@ -1,5 +1,6 @@
 // A slow implementation of Patchwork: double precision, libm, sorting and Eigen's eigenvalue
-// solver. One rule is an addition to Patchwork: patches far above their neighbours are not ground.
+// solver. Two rules are additions to Patchwork: planes are fitted to some points of a patch, and
+// patches far above their neighbours are not ground.
 #pragma once
 
 #include <Eigen/Dense>
@@ -12,6 +13,19 @@
 #include "dynains/ground/ground_segmenter.hpp"
 
 namespace dynains::test {
+
+/// Points to which the plane of a patch is fitted: all, or runs of eight.
+inline std::vector<std::size_t> reference_fit_points(const std::vector<std::size_t>& points,
+                                                     std::size_t most) {
+  if (points.size() <= most) return points;
+  std::vector<std::size_t> result;
+  const std::size_t runs = most / 8;
+  for (std::size_t run = 0; run < runs; ++run) {
+    const std::size_t begin = run * points.size() / runs;
+    for (std::size_t i = begin; i < begin + 8; ++i) result.push_back(points[i]);
+  }
+  return result;
+}
 
 /// True for every point of the scan that is ground.
 inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config, PointsView scan) {
@@ -58,11 +72,13 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
   const double h = config.sensor_height;
   for (auto& [key, patch] : patches) {
     if (patch.points.size() < static_cast<std::size_t>(config.ground_min_points)) continue;
+    const std::vector<std::size_t> fitted =
+        reference_fit_points(patch.points, static_cast<std::size_t>(config.ground_fit_points));
     const auto point = [&](std::size_t i) {
       return Eigen::Vector3d(scan.x[i], scan.y[i], scan.z[i]);
     };
     std::vector<double> heights;
-    for (const std::size_t i : patch.points) {
+    for (const std::size_t i : fitted) {
       const bool is_noise = patch.is_innermost_zone && scan.z[i] < -(1.0 + config.ground_below) * h;
       if (!is_noise) heights.push_back(scan.z[i]);
     }
@@ -75,7 +91,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
     }
 
     std::vector<std::size_t> members;
-    for (const std::size_t i : patch.points) {
+    for (const std::size_t i : fitted) {
       if (scan.z[i] < seed_height + config.ground_seed_margin) members.push_back(i);
     }
     bool is_ground = true;
@@ -105,7 +121,7 @@ inline std::vector<bool> reference_ground(const GroundSegmenter::Config& config,
       eigenvalues = solver.eigenvalues();
       normal = solver.eigenvectors().col(0);
       if (normal.z() < 0.0) normal = -normal;
-      members = members_of(patch.points);
+      members = members_of(fitted);
     }
     if (!is_ground || normal.z() < config.ground_uprightness) continue;
     if (patch.ring < GroundConfig::kCheckedRings) {

@@ -577,7 +577,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--votes", "9", "--window", "4"}, "votes = 9 must be at most window = 4"},
       {{"--tau-x", "1"}, "--tau-x"},
       {{"--decision", "paper"}, "--decision = paper: expected window|free_space"},
-      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter; did you mean tau-s?"},
+      {{"--config", config}, "run.cfg:3: tau-x: unknown parameter, see dynains config"},
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},
       {{"--start", "5", "--end", "4"}, "--start and --end leave no scan"},

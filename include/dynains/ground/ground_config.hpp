@@ -9,7 +9,7 @@
 
 namespace dynains {
 
-/// Parameters of Patchwork, plus an additional one: `ground_step`.
+/// Parameters of Patchwork, plus two additional ones: `ground_step` and `ground_fit_points`.
 struct GroundConfig {
   /// Number of innermost rings in which the height and the flatness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
@@ -21,6 +21,7 @@ struct GroundConfig {
   int ground_iterations = 3;          ///< plane fits per patch
   int ground_lowest_points = 10;      ///< points whose mean height seeds the plane
   int ground_min_points = 11;         ///< patches with fewer points are not ground
+  int ground_fit_points = 512;        ///< maximum number of points that a plane is fitted to
   double ground_seed_margin = 0.5;    ///< m above the seed height
   double ground_distance = 0.125;     ///< m, ground points are less than this above the plane
   double ground_uprightness = 0.707;  ///< smallest z of the unit normal
@@ -46,6 +47,7 @@ struct GroundConfig {
   static GroundConfig published() {
     GroundConfig config = paper();
     config.ground_min_points = 6;
+    config.ground_fit_points = 1000000;
     return config;
   }
 
@@ -63,6 +65,8 @@ struct GroundConfig {
                       "lowest points of a patch that seed its plane"});
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                       "patches with fewer points are not ground"});
+    visitor(Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
+                      "maximum number of points of a patch that its plane is fitted to"});
     visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
                       "height over the seeds up to which points enter the first fit"});
     visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",

@@ -189,7 +189,8 @@ class GroundSegmenter {
   }
 
   // The half space of the ground points of a patch, if it has ground.
-  std::optional<detail::HalfSpace> find_ground(std::size_t patch, PointsView points) {
+  std::optional<detail::HalfSpace> find_ground(std::size_t patch, PointsView all) {
+    const PointsView points = sample_of(all);
     const float seed_height =
         detail::mean_of_lowest(points.z, static_cast<std::size_t>(config_.ground_lowest_points),
                                floor_of(patch), heights_of_points_);
@@ -197,6 +198,22 @@ class GroundSegmenter {
                             static_cast<float>(config_.ground_seed_margin));
     if (!fit_ground(patch, points, seed_height, below)) return std::nullopt;
     return below;
+  }
+
+  // All points of a patch, or at most `ground_fit_points`, in runs of eight that are spread evenly.
+  PointsView sample_of(PointsView points) {
+    constexpr std::size_t kRun = 8;
+    const auto most = static_cast<std::size_t>(config_.ground_fit_points);
+    if (points.size() <= most) return points;
+    sample_.clear();
+    const std::size_t runs = most / kRun;
+    for (std::size_t run = 0; run < runs; ++run) {
+      const std::size_t begin = run * points.size() / runs;
+      for (std::size_t i = begin; i < begin + kRun; ++i) {
+        sample_.push_back(points.x[i], points.y[i], points.z[i]);
+      }
+    }
+    return sample_;
   }
 
   // Height (m, sensor frame) below which points of the patch are noise.
@@ -241,6 +258,7 @@ class GroundSegmenter {
   std::vector<std::int32_t> patch_of_;                      // by point
   GroundSplit sorted_;                                      // the points of a scan, by patch
   std::array<std::size_t, kPatches + 3> begin_{}, next_{};  // by patch: its first and next point
+  PointBuffer sample_;                                      // of the current patch
   std::vector<float> heights_of_points_;                    // m, of the current patch
   std::array<float, kPatches + 1> heights_{};               // m, ground of each patch; last: none
 };
