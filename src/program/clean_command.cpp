@@ -104,12 +104,16 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
     const std::vector<std::uint32_t> labels = read_run_labels(file, scan.size());
-    standing.clear();
-    for (std::size_t k = 0; k < labels.size(); ++k) {
-      const float* const p = &scan.xyzi[4 * k];
-      if (class_of(labels[k]) != kRunMoving) standing.push_back(p[0], p[1], p[2]);
+    const Pose T_world_sensor = recording.T_world_sensor(i);
+    if (alignment.is_due(T_world_sensor)) {
+      standing.clear();
+      for (std::size_t k = 0; k < labels.size(); ++k) {
+        const float* const p = &scan.xyzi[4 * k];
+        if (class_of(labels[k]) != kRunMoving) standing.push_back(p[0], p[1], p[2]);
+      }
+      alignment.align(standing, T_world_sensor);
     }
-    const Pose T_map_sensor = alignment.T_map_sensor(standing, recording.T_world_sensor(i));
+    const Pose T_map_sensor = alignment.T_map_world() * T_world_sensor;
     for (std::size_t k = 0; k < labels.size(); ++k) {
       const std::uint32_t label = class_of(labels[k]);
       if (label == kRunNotJudged) continue;
@@ -205,9 +209,8 @@ void add_clean_command(CLI::App& app) {
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   command.footer(
       "A point of the map leaves if its voxel holds more moving than static points of the scans.\n"
-      "The map must lie in the frame of the poses of the run, but for about a metre. All columns "
-      "of "
-      "the\npoints stay.");
+      "The map must lie in the frame of the poses of the run, but for about a metre.\n"
+      "All columns of the points stay.");
   command.callback([options] { clean(*options); });
 }
 

@@ -36,23 +36,23 @@ PointBuffer MapAlignment::around(const Eigen::Vector3d& centre) const {
   return points;
 }
 
-Pose MapAlignment::T_map_sensor(PointsView standing, const Pose& T_world_sensor) {
+bool MapAlignment::is_due(const Pose& T_world_sensor) const {
+  return !latest_ || (T_world_sensor.translation() - *latest_).norm() >= kWay;
+}
+
+void MapAlignment::align(PointsView standing, const Pose& T_world_sensor) {
   const Eigen::Vector3d sensor = T_world_sensor.translation();
-  if (tried_ > 0 && (sensor - latest_).norm() < kWay) return T_map_world_ * T_world_sensor;
-  ++tried_;
   latest_ = sensor;
   const Eigen::Vector3d centre = T_map_world_ * sensor;
-  const Eigen::Translation3d T_map_centre(centre);
-  const Pose T_centre_map = T_map_centre.inverse() * Pose::Identity();
+  const Pose T_map_centre(Eigen::Translation3d{centre});
+  const Pose T_centre_map = T_map_centre.inverse();
   const Pose T_latest = T_centre_map * T_map_world_ * T_world_sensor;
   const RegistrationScan map(around(centre), kReach), scan(standing, kReach);
   const auto found = register_scans(map, scan, {T_latest, T_centre_map * T_world_sensor});
-  if (found && found->score >= kLeastScore && found->uncertainty <= kMostUncertain) {
-    T_map_world_ = T_map_centre * found->T_a_b * T_world_sensor.inverse();
-    ++aligned_;
-    farthest_ = std::max(farthest_, (T_map_world_ * sensor - sensor).norm());
-  }
-  return T_map_world_ * T_world_sensor;
+  if (!found || found->score < kLeastScore || found->uncertainty > kMostUncertain) return;
+  T_map_world_ = T_map_centre * found->T_a_b * T_world_sensor.inverse();
+  ++aligned_;
+  farthest_ = std::max(farthest_, (T_map_world_ * sensor - sensor).norm());
 }
 
 }  // namespace dynains::program
