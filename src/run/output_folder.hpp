@@ -144,9 +144,9 @@ class OutputFolder {
   bool owns(const char* field, const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. At last it
-  /// puts the results in the place of the target, whose marker says that everything is in place. If
-  /// `put_others()` fails, the results stay in path(). Throws IoError.
+  /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. The results
+  /// replace the target at last, so a complete marker there means that the other outputs are in
+  /// place. The results stay in path() if `put_others()` fails. Throws IoError.
   void finish(
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 

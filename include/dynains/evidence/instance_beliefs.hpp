@@ -46,7 +46,8 @@ struct InstanceBeliefs {
   std::vector<Belief> supervoxels;
   std::vector<Counts> counts;  ///< by instance
   InstanceViews views;
-  std::vector<std::uint8_t> merged;  ///< by instance: 1 if larger than one object; the caller's
+  std::vector<std::uint8_t>
+      merged;  ///< by instance: 1 if larger than one object; the caller sets it
 };
 
 /// Updates beliefs by the visibility of samples from reference scans, and evaluates them.

@@ -40,7 +40,8 @@ def find_recordings(paths: Iterable[PathLike]) -> Dict[str, Path]:
 def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str, Any]:
     """On a worker: runs over one recording, unless OUT has its results. Returns them, or the error.
 
-    Another attempt would fail, too, but if a worker that was taken for dead still holds the folder.
+    An error is a result, because another attempt would fail, too. A folder may be held by a worker
+    that was taken for dead; then this waits.
     """
     end = time.monotonic() + _PATIENCE
     while True:
