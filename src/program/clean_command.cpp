@@ -104,7 +104,7 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
     const std::vector<std::uint32_t> labels = read_run_labels(file, scan.size());
-    const Pose T_world_sensor = recording.T_world_sensor(i);
+    const Pose& T_world_sensor = recording.T_world_sensor(i);
     if (alignment.is_due(T_world_sensor)) {
       standing.clear();
       for (std::size_t k = 0; k < labels.size(); ++k) {
