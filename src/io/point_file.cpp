@@ -4,6 +4,7 @@
 #include <ostream>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "failure.hpp"
@@ -146,7 +147,7 @@ bool is_point_file(const fs::path& path) {
 
 std::optional<std::string> conversion_of(const fs::path& path) {
   struct Conversion {
-    const char* extension;
+    const char* ending;  // the extension, or the name of a file in a folder
     const char* text;
   };
   static constexpr Conversion kConversions[] = {
@@ -161,10 +162,16 @@ std::optional<std::string> conversion_of(const fs::path& path) {
        "n.load('IN.npz')['points'])\""},
       {".pcap",
        "PCAP (packets of a sensor) is not read; play it through the ROS driver of the sensor and "
-       "record sensor_msgs/PointCloud2 in a log (.mcap, .bag)"}};
+       "record sensor_msgs/PointCloud2 in a log (.mcap, .bag)"},
+      {"points_compact.bin",
+       "a dump of GLIM holds submaps, not scans; pass the log that GLIM read, with --poses "
+       "traj_lidar.txt of the dump"}};
   const std::string extension = extension_in_lower_case(path);
+  std::error_code error;
   for (const Conversion& conversion : kConversions) {
-    if (extension == conversion.extension) return conversion.text;
+    if (extension == conversion.ending || fs::exists(path / conversion.ending, error)) {
+      return conversion.text;
+    }
   }
   return std::nullopt;
 }

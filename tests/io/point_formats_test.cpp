@@ -258,6 +258,10 @@ TEST_CASE("A known format that is not read gets its name and the way to convert 
     CHECK_THAT(of_file, StartsWith((folder / name).string()) && ContainsSubstring(expected));
     CHECK_THAT(error(name, ""), ContainsSubstring(expected));
   }
+  const TemporaryFolder dump;
+  write_text(dump / "000000" / "points_compact.bin", std::string(24, '\0'));
+  CHECK_THAT(message_of<IoError>([&] { Recording recording(dump.path()); }),
+             ContainsSubstring("000000: a dump of GLIM") && ContainsSubstring("traj_lidar.txt"));
 }
 
 }  // namespace dynains

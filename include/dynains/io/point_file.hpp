@@ -49,7 +49,7 @@ class PointFileWriter {
 /// Whether the extension is .ply or .pcd, those of PointFileWriter.
 bool is_point_file(const std::filesystem::path& path);
 
-/// For a known format that read_points() does not read (.laz, .e57, .pcap): its name and the way to
+/// For a known format that is not read (.laz, .e57, .pcap, a dump of GLIM): its name and the way to
 /// convert it. Else empty.
 std::optional<std::string> conversion_of(const std::filesystem::path& path);
 
