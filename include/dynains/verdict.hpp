@@ -35,7 +35,7 @@ enum class Cause : std::uint8_t {
   kTooLittleFree = 15,     ///< static: too few scans with free space, or too few free samples
   kDynamicOccupancy = 16,  ///< dynamic: most other points in its dynamic grid cell are dynamic
   kCameOrWent = 17,        ///< dynamic: scans of the whole recording saw it come or go
-  kStands = 18,            ///< static: removed at first, but it stands in the whole recording
+  kStands = 18,            ///< static: removed at first, but it came to stay
 };
 
 inline constexpr std::size_t kCauseCount = 19;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "dynains/errors.hpp"
@@ -80,7 +81,6 @@ bool Visit::test(const std::function<bool()>& keep_going) {
         });
   }
   places_.decide();
-  ground_.complete();
   list_objects();
   return true;
 }
@@ -97,99 +97,71 @@ void Visit::read(const Reference& kept, RecordingReference& reference) {
 void Visit::list_objects() {
   const Pose T_world_level = T_level_world_.inverse();
   objects_.assign(places_.object_count(), {});
-  places_.for_each([&](const Eigen::Vector3d& middle, const Place& place) {
-    if (place.state != PlaceState::kChanged) return;
+  places_.for_each_changed([&](const Eigen::Vector3d& corner, const ChangedPlace& place) {
     Object& object = objects_[place.object - 1];
-    const Eigen::Vector3d at = T_world_level * middle;
     const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * kWorldCell);
+    const Eigen::Vector3d at = T_world_level * Eigen::Vector3d(corner + half);
     object.lowest = object.lowest.cwiseMin(at - half);
     object.highest = object.highest.cwiseMax(at + half);
-    if (!place.was_passed()) return;
-    const auto [first, last] = places_.free_scans(place);
-    object.first_passed = std::min(object.first_passed, numbers_of_scans_[first]);
-    object.last_passed = std::max(object.last_passed, numbers_of_scans_[last]);
+    if (!place.was_passed) return;
+    object.first_passed = std::min(object.first_passed, numbers_of_scans_[place.passed.first]);
+    object.last_passed = std::max(object.last_passed, numbers_of_scans_[place.passed.last]);
   });
 }
 
 bool Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
-  const std::uint64_t before = restored_ + removed_;
   const Pose& T_level_sensor = T_level_sensor_[number];
-  places_.begin_scan(points, T_level_sensor, is_near_);
   ground_.free_far(T_level_sensor.translation());
-  restore(points, number, verdict);
-  remove_objects(points, number, verdict);
-  return restored_ + removed_ > before;
+  const std::uint64_t restored = restored_, removed = removed_;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PointLabel label = verdict.labels[i];
+    const bool is_removed = label == PointLabel::kDynamic;
+    // What looks like ground under an instance is often its underside or its wheels.
+    if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) continue;
+    const Eigen::Vector3d point = world_point(points, i, T_level_sensor);
+    const ChangedPlace* const place = places_.changed(cell_at(point));
+    const bool stands = place != nullptr && config_.static_policy == StaticPolicy::kLast &&
+                        place->stands_since(number);
+    if (is_removed) {
+      restore(i, stands && !place->is_beside, point, verdict);
+    } else if (place != nullptr && !stands && belongs_to(*place, label, point)) {
+      remove(i, verdict);
+      Object& object = objects_[place->object - 1];
+      if (object.points++ == 0) object.first_measured = numbers_of_scans_[number];
+      object.last_measured = numbers_of_scans_[number];
+    }
+  }
+  if (removed_ > removed) remove_instances(verdict);
+  return restored_ + removed_ > restored + removed;
 }
 
-// The place that has changed of a ground point that rises, or one that touches it; else null.
-const Visit::Place* Visit::changed_at_ground(const WorldCell& cell) {
-  const Place* const place = places_.find(cell);
-  const bool has_changed = place != nullptr && place->state == PlaceState::kChanged;
-  return has_changed ? place : places_.changed_beside(cell);
+// Whether a point that was kept is of the object of a place. Ground is, if it rises above the mean.
+bool Visit::belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point) {
+  constexpr double kRise = 0.10;  // m, more than 0.1 deg moves ground 50 m away
+  if (label != PointLabel::kGround) return !place.is_beside;
+  return ground_.rise(point).value_or(0.0) >= kRise;
 }
 
-// Whether what scan `number` measured in a place is no part of the static map.
-bool Visit::has_changed(const Place& place, std::uint32_t number) const {
-  const bool stays = config_.static_policy == StaticPolicy::kLast && place.stands_since(number);
-  return place.state == PlaceState::kChanged && !stays;
-}
-
-bool Visit::stands(const Place& place, std::uint32_t number) const {
-  const bool has_come =
-      config_.static_policy == StaticPolicy::kLast && place.state == PlaceState::kChanged;
-  return place.stands() || (has_come && place.stands_since(number));
-}
-
-// Restores removed points that stand, or do not rise above the ground of all scans. What looks like
-// ground under an instance is often its underside or its wheels, and stays removed.
-void Visit::restore(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
+// Restores a removed point that stands, or does not rise above the ground of all scans.
+void Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
+                    VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m
-  const Pose& T_level_sensor = T_level_sensor_[number];
-  const auto is_removed = [&](std::size_t i) {
-    return verdict.labels[i] == PointLabel::kDynamic && verdict.causes[i] != Cause::kUnderInstance;
+  const auto is_ground = [&] {
+    const std::optional<double> rise = ground_.rise(point);
+    return rise && *rise <= kMostRise && ground_.is_level(point);
   };
-  const auto restore_point = [&](std::size_t i, const Place* place) {
-    if (place == nullptr || !stands(*place, number)) return;
+  if (stands) {
     verdict.labels[i] = PointLabel::kStatic;
     verdict.causes[i] = Cause::kStands;
-    if (!verdict.beliefs.empty()) verdict.beliefs[i] = kRestoredBelief;
-    ++restored_;
-  };
-  places_.for_each_place(points, T_level_sensor, is_removed, restore_point);
-  ground_.for_each_rise(points, T_level_sensor, is_removed,
-                        [&](std::size_t i, const WorldCell&, double rise, bool is_level) {
-                          if (!is_level || rise > kMostRise) return;
-                          verdict.labels[i] = PointLabel::kGround;
-                          verdict.causes[i] = Cause::kGround;
-                          verdict.instances[i] = kNoInstance;
-                          if (!verdict.beliefs.empty()) verdict.beliefs[i] = 0.0F;
-                          ++restored_;
-                        });
-}
-
-void Visit::remove_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
-  const std::uint64_t before = removed_;
-  const auto is_near = [&](PointLabel label) {
-    return [this, &verdict, label](std::size_t i) {
-      return is_near_[i] != 0 && verdict.labels[i] == label;
-    };
-  };
-  const auto leave = [&](std::size_t i, const Place* place) {
-    if (place == nullptr || !has_changed(*place, number)) return;
-    remove(i, verdict);
-    Object& object = objects_[place->object - 1];
-    if (object.points++ == 0) object.first_measured = numbers_of_scans_[number];
-    object.last_measured = numbers_of_scans_[number];
-  };
-  const Pose& T_level_sensor = T_level_sensor_[number];
-  // m, more than a pose that is off by 0.1 deg moves ground 50 m away
-  constexpr double kRise = 0.10;
-  ground_.for_each_rise(points, T_level_sensor, is_near(PointLabel::kGround),
-                        [&](std::size_t i, const WorldCell& cell, double rise, bool) {
-                          if (rise >= kRise) leave(i, changed_at_ground(cell));
-                        });
-  places_.for_each_place(points, T_level_sensor, is_near(PointLabel::kStatic), leave);
-  if (removed_ > before) remove_instances(verdict);
+  } else if (is_ground()) {
+    verdict.labels[i] = PointLabel::kGround;
+    verdict.causes[i] = Cause::kGround;
+    verdict.instances[i] = kNoInstance;
+  } else {
+    return;
+  }
+  if (!verdict.beliefs.empty()) verdict.beliefs[i] = stands ? kRestoredBelief : 0.0F;
+  ++restored_;
 }
 
 // Removes the instances of a scan of which at least half of the points have left.

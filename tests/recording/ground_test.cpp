@@ -1,6 +1,5 @@
 #include "dynains/recording/ground.hpp"
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -8,28 +7,6 @@
 #include "support/catch.hpp"
 
 using namespace dynains;
-
-namespace {
-
-struct Rise {
-  double metres;
-  bool is_level;
-};
-
-/// Height of a point (m, world frame) above the ground, if its cell has any.
-std::optional<Rise> rise_of(RecordingGround& ground, const std::array<float, 3>& at) {
-  PointBuffer points;
-  points.push_back(at[0], at[1], at[2]);
-  std::optional<Rise> found;
-  ground.for_each_rise(
-      points, Pose::Identity(), [](std::size_t) { return true; },
-      [&](std::size_t, const WorldCell&, double rise, bool is_level) {
-        found = Rise{rise, is_level};
-      });
-  return found;
-}
-
-}  // namespace
 
 TEST_CASE("the ground of a cell is the mean of its ground points, if there are enough") {
   for (const int count : {19, 20}) {
@@ -44,15 +21,13 @@ TEST_CASE("the ground of a cell is the mean of its ground points, if there are e
       const std::vector<PointLabel> labels = {PointLabel::kGround, PointLabel::kStatic};
       ground.add(points, labels, T_world_sensor);
     }
-    ground.complete();
-    const auto rise = rise_of(ground, {1000.2F, -1999.8F, 498.5F});
+    const Eigen::Vector3d above(1000.2, -1999.8, 498.5);
+    const std::optional<double> rise = ground.rise(above);
     REQUIRE(rise.has_value() == (count == 20));
-    if (rise) {
-      CHECK(rise->is_level);
-      CHECK(rise->metres == Approx(0.5).margin(1e-4));
-    }
-    CHECK_FALSE(rise_of(ground, {1000.5F, -1999.8F, 498.5F}));
-    CHECK_FALSE(rise_of(ground, {1100.2F, -1999.8F, 498.5F}));
+    CHECK(ground.is_level(above) == (count == 20));
+    if (rise) CHECK(*rise == Approx(0.5).margin(1e-4));
+    CHECK_FALSE(ground.rise({1000.5, -1999.8, 498.5}));
+    CHECK_FALSE(ground.rise({1100.2, -1999.8, 498.5}));
   }
 }
 
@@ -73,11 +48,9 @@ TEST_CASE("ground is level if none within two cells is lower, across tiles and t
       const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
       ground.add(points, labels, Pose::Identity());
       ground.free_far(Eigen::Vector3d(1000.0, 0.0, 0.0));
-      ground.complete();
-      const auto rise = rise_of(ground, {tested, 0.1F, -0.9F});
-      REQUIRE(rise);
-      CHECK(rise->metres == Approx(0.1).margin(1e-4));
-      CHECK(rise->is_level == (cells > 2));
+      const Eigen::Vector3d above(static_cast<double>(tested), 0.1, -0.9);
+      CHECK(ground.rise(above).value() == Approx(0.1).margin(1e-4));
+      CHECK(ground.is_level(above) == (cells > 2));
     }
   }
 }

@@ -29,11 +29,11 @@ TEST_CASE("tiles hold what was put into them, for any budget") {
     CAPTURE(budget);
     CountingStore store;
     PagedTiles<VoxelTile<int>> tiles(store, budget);
-    std::map<std::pair<GroundTile, VoxelKey>, int> expected;
+    std::map<std::pair<TileIndex, VoxelKey>, int> expected;
     std::mt19937 random(7);
     for (int i = 0; i < 3000; ++i) {
-      const GroundTile index = {static_cast<std::int64_t>(random() % 5) - 2,
-                                static_cast<std::int64_t>(random() % 5) - 2};
+      const TileIndex index = {static_cast<std::int64_t>(random() % 5) - 2,
+                               static_cast<std::int64_t>(random() % 5) - 2};
       const VoxelKey key = voxel_key(static_cast<std::int64_t>(random() % 20), 0, 0);
       const int value = static_cast<int>(random() % 1000);
       auto& tile = tiles.at(index);

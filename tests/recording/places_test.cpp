@@ -74,9 +74,7 @@ class Recorder {
   std::size_t changed() {
     places.decide();
     std::size_t count = 0;
-    places.for_each([&](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
-      if (place.state == PlaceState::kChanged) ++count;
-    });
+    places.for_each_changed([&](const Eigen::Vector3d&, const ChangedPlace&) { ++count; });
     return count;
   }
 
@@ -91,7 +89,7 @@ class Recorder {
   detail::Visibility visibility_;
 };
 
-constexpr int kEnough = RecordingPlaces::kFreeLooks;
+constexpr int kEnough = RecordingPlace::kFreeLooks;
 constexpr int kObject = 6;  // places
 
 TEST_CASE("a place that enough looks in a row passed has changed") {
@@ -183,7 +181,7 @@ TEST_CASE("a part of something that stays stays") {
 
 TEST_CASE("an object across the border of tiles is one object") {
   Recorder recorder;
-  const int border = kTileCells;  // places
+  const int border = 1 << kTileShift;  // places
   recorder.measure(6, border - 3);
   recorder.sensor.y() = 25.0;
   recorder.look(BeamResult::kHit, 5);
@@ -198,11 +196,11 @@ TEST_CASE("a changed place tells the scans that passed it") {
   recorder.look(BeamResult::kHit, 7);
   recorder.look(BeamResult::kFree, 5);
   REQUIRE(recorder.changed() == 6);
-  recorder.places.for_each([&](const Eigen::Vector3d& at, const RecordingPlaces::Place& place) {
-    const ScanSpan free = recorder.places.free_scans(place);
-    CHECK(free.first == 8);
-    CHECK(free.last == 12);
-    CHECK((at - Eigen::Vector3d(10.2, at.y(), 0.2)).norm() < 1e-9);
+  recorder.places.for_each_changed([](const Eigen::Vector3d& at, const ChangedPlace& place) {
+    CHECK(place.was_passed);
+    CHECK(place.passed.first == 8);
+    CHECK(place.passed.last == 12);
+    CHECK((at - Eigen::Vector3d(10.0, at.y(), 0.0)).norm() < 1e-9);
   });
 }
 
@@ -236,7 +234,7 @@ TEST_CASE("what came stands since the last look that passed its place") {
   recorder.look(BeamResult::kFree, 5);
   recorder.look(BeamResult::kHit, 3);
   CHECK(recorder.changed() == 6);
-  recorder.places.for_each([](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+  recorder.places.for_each_changed([](const Eigen::Vector3d&, const ChangedPlace& place) {
     CHECK_FALSE(place.stands_since(5));
     CHECK(place.stands_since(6));
   });
@@ -245,7 +243,7 @@ TEST_CASE("what came stands since the last look that passed its place") {
   left.look(BeamResult::kHit, 3);
   left.look(BeamResult::kFree, 5);
   CHECK(left.changed() == 6);
-  left.places.for_each([](const Eigen::Vector3d&, const RecordingPlaces::Place& place) {
+  left.places.for_each_changed([](const Eigen::Vector3d&, const ChangedPlace& place) {
     CHECK_FALSE(place.stands_since(8));
   });
 }
@@ -269,10 +267,10 @@ TEST_CASE("a point touches what changed, if fewer places beside it stay") {
     recorder.look_by(pass_near_ones, 10);
     REQUIRE(recorder.changed() == 6);
     const Eigen::Vector3d between(10.6, 1.0, 0.2);
-    const RecordingPlace* const beside = recorder.places.changed_beside(cell_at(between));
+    const ChangedPlace* const beside = recorder.places.changed(cell_at(between));
     REQUIRE((beside != nullptr) == (staying == 2));
-    if (beside != nullptr) CHECK(beside->state == PlaceState::kChanged);
-    CHECK(recorder.places.changed_beside(cell_at({9.4, 1.0, 0.2})) == nullptr);
+    if (beside != nullptr) CHECK(beside->is_beside);
+    CHECK(recorder.places.changed(cell_at({9.4, 1.0, 0.2})) == nullptr);
   }
 }
 

@@ -36,9 +36,6 @@ struct SessionGrid {
   void validate() const { validate_parameters("SessionGrid", *this); }
 };
 
-/// Indices of a tile along x and y of the world. A tile is not bounded in z.
-using TileIndex = GroundTile;
-
 /// One static point of a session, as files hold it.
 struct SessionPoint {
   float x, y;               ///< m, relative to the corner of its tile with the lowest x and y

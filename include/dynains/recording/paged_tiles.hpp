@@ -78,14 +78,14 @@ class PagedTiles {
       : store_(&store), budget_(budget), edge_(edge) {}
 
   /// The tile, which is new or not, to be changed. Throws what the store throws.
-  Tile& at(const GroundTile& index) {
+  Tile& at(const TileIndex& index) {
     if (!is_recent(index)) take_recent(*entries_.try_emplace(index).first);
     load(*recent_);
     recent_->is_changed = true;
     return *recent_->tile;
   }
   /// Null: there is no such tile. Throws what the store throws.
-  const Tile* find(const GroundTile& index) {
+  const Tile* find(const TileIndex& index) {
     if (!is_recent(index)) {
       const auto found = entries_.find(index);
       if (found == entries_.end()) return nullptr;
@@ -110,12 +110,12 @@ class PagedTiles {
   }
 
   /// Distance of a tile from a position (m, world frame) along the axis where it is larger, m.
-  double distance(const GroundTile& index, const Eigen::Vector3d& position) const {
+  double distance(const TileIndex& index, const Eigen::Vector3d& position) const {
     const Eigen::Vector3d away = position - middle(index);
     return away.head<2>().cwiseAbs().maxCoeff() - 0.5 * edge_;
   }
   /// m, world frame; z is 0.
-  Eigen::Vector3d middle(const GroundTile& index) const {
+  Eigen::Vector3d middle(const TileIndex& index) const {
     return {edge_ * (static_cast<double>(index[0]) + 0.5),
             edge_ * (static_cast<double>(index[1]) + 0.5), 0.0};
   }
@@ -155,10 +155,10 @@ class PagedTiles {
     std::size_t size = 0, count = 0;
   };
 
-  bool is_recent(const GroundTile& index) const {
+  bool is_recent(const TileIndex& index) const {
     return recent_ != nullptr && recent_index_[0] == index[0] && recent_index_[1] == index[1];
   }
-  void take_recent(std::pair<const GroundTile, Entry>& entry) {
+  void take_recent(std::pair<const TileIndex, Entry>& entry) {
     recent_index_ = entry.first;
     recent_ = &entry.second;
   }
@@ -186,10 +186,10 @@ class PagedTiles {
 
   ByteStore* store_;
   std::size_t budget_;
-  double edge_;                          // m
-  std::map<GroundTile, Entry> entries_;  // its elements do not move
+  double edge_;                         // m
+  std::map<TileIndex, Entry> entries_;  // its elements do not move
   Entry* recent_ = nullptr;
-  GroundTile recent_index_ = {};
+  TileIndex recent_index_ = {};
   std::vector<std::uint8_t> bytes_;
   std::vector<std::pair<double, Entry*>> far_;
 };

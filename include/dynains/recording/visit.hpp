@@ -45,10 +45,9 @@ struct SecondPassConfig {
 };
 
 /// Scans whose poses fit to each other. All of them test the places of their points above the
-/// ground. What came or went is removed, and what stands comes back (see
-/// RecordingPlaces), as does the ground. An instance of the first pass leaves a scan as a whole if
-/// half of its points leave. Scans of the visit are numbered from 0. Functions throw what the
-/// store throws.
+/// ground. What came or went is removed (see RecordingPlaces), and the ground comes back. An
+/// instance of the first pass leaves a scan as a whole if half of its points leave. Scans of the
+/// visit are numbered from 0. Functions throw what the store throws.
 class Visit {
  public:
   /// Touching places that came or went, and the scans of the recording that tell of it.
@@ -90,15 +89,11 @@ class Visit {
     std::uint64_t offset;  // in the store
     std::size_t size;      // bytes
   };
-  using Place = RecordingPlaces::Place;
   void find_up(PointsView points, const Pose& T_world_sensor);
   void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
-  const Place* changed_at_ground(const WorldCell& cell);
-  bool has_changed(const Place& place, std::uint32_t number) const;
-  bool stands(const Place& place, std::uint32_t number) const;
-  void restore(PointsView points, std::uint32_t number, VerdictArrays& verdict);
-  void remove_objects(PointsView points, std::uint32_t number, VerdictArrays& verdict);
+  bool belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point);
+  void restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
   void remove_instances(VerdictArrays& verdict);
   void remove(std::size_t point, VerdictArrays& verdict);
 
@@ -112,7 +107,6 @@ class Visit {
   std::vector<std::uint32_t> numbers_of_scans_;  // in the recording
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
-  std::vector<std::uint8_t> is_near_;   // what has changed; by point
   std::vector<std::int32_t> majority_;  // by instance: points that left, less those that stay
   std::vector<Object> objects_;
   std::uint64_t removed_ = 0, restored_ = 0;
