@@ -108,27 +108,14 @@ ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given) {
     result.deviation =
         std::max(result.deviation, lever * std::sqrt(std::max(0.0, alignment.covariance[i][i])));
   }
-  detail::PoseCovariance map = alignment.covariance;
   for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) result.covariance[6 * i + j] = alignment.covariance[i][j];
     const double deviation = i < 3 ? kMapDeviation : kMapDeviation / detail::kLever;
-    map[i][i] += deviation * deviation;
+    result.covariance[7 * i] += deviation * deviation;
   }
-  // From the axes of the map to those of the sensor.
-  const Eigen::Matrix3d R = result.T_earlier_later.linear();
-  const auto turned = [&](std::size_t row, std::size_t column) {
-    Eigen::Matrix3d block;
-    for (std::size_t i = 0; i < 9; ++i) {
-      block(i / 3, i % 3) = map[row + i / 3][column + i % 3];
-    }
-    block = R.transpose() * block * R;
-    for (std::size_t i = 0; i < 9; ++i) {
-      result.covariance[row + i / 3][column + i % 3] = block(i / 3, i % 3);
-    }
-  };
-  turned(0, 0);
-  turned(0, 3);
-  turned(3, 0);
-  turned(3, 3);
+  Pose R_later_map = Pose::Identity();
+  R_later_map.linear() = result.T_earlier_later.linear().transpose();
+  result.covariance = detail::transported_covariance(result.covariance, R_later_map);
   return result;
 }
 

@@ -90,14 +90,10 @@ void write_closures(const std::filesystem::path& file, const std::vector<ReturnT
     text << "EDGE_SE3:QUAT " << place.earlier << ' ' << place.later << ' ' << t.x() << ' ' << t.y()
          << ' ' << t.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w();
     // g2o counts a rotation as the vector of its quaternion: half of its angle.
-    Eigen::Matrix<double, 6, 6> covariance;
-    for (std::size_t i = 0; i < 6; ++i) {
-      for (std::size_t j = 0; j < 6; ++j) {
-        covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-            place.covariance[i][j] * (i < 3 ? 1.0 : 0.5) * (j < 3 ? 1.0 : 0.5);
-      }
-    }
-    const Eigen::Matrix<double, 6, 6> information = covariance.inverse();
+    Eigen::Matrix<double, 6, 6> scale = Eigen::Matrix<double, 6, 6>::Identity();
+    scale.bottomRows<3>() *= 0.5;
+    const Eigen::Map<const Eigen::Matrix<double, 6, 6>> covariance(place.covariance.data());
+    const Eigen::Matrix<double, 6, 6> information = (scale * covariance * scale).inverse();
     for (Eigen::Index i = 0; i < 6; ++i) {
       for (Eigen::Index j = i; j < 6; ++j) text << ' ' << information(i, j);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -24,8 +25,8 @@ struct ReturnToPlace {
   std::uint32_t earlier, later;             ///< numbers of scans, the nearest earlier one
   Pose T_earlier_later = Pose::Identity();  ///< as the surfaces fit
   /// Covariance of the translation (m) and the rotation (rad) of T_earlier_later, along the axes of
-  /// the later sensor.
-  detail::PoseCovariance covariance = {};
+  /// the later sensor, row by row.
+  std::array<double, 36> covariance = {};
   double distance = 0.0;  ///< m, between the two sensors
   double inliers = 1.0;   ///< share of the points in voxels with a plane
   double movement = 0.0;  ///< m, of points 10 m away to where they fit best
