@@ -18,13 +18,7 @@ class Candidates {
       : grid_(grid), history_(history) {}
 
   void add(std::size_t session, std::size_t i) {
-    const VoxelKey key = block(session, i);
-    const std::uint32_t number = numbers_.insert(key);
-    if (number == keys_.size()) {
-      keys_.push_back(key);
-      points_.emplace_back();
-    }
-    points_[number].push_back({session, i});
+    points_.values[points_.add(block(session, i))].push_back({session, i});
   }
   /// Adds a point that stands in both states.
   void add_standing(std::size_t session, std::size_t i) { standing_.insert(block(session, i)); }
@@ -33,14 +27,15 @@ class Candidates {
   /// all the time, and not a part of something that stands in both states.
   std::vector<CityPoint> objects() const {
     std::vector<CityPoint> result;
-    for_each_component(keys_, numbers_, [&](const std::vector<std::uint32_t>& members) {
-      if (!is_object(members)) return;
-      for (const std::uint32_t block : members) {
-        for (const auto& [session, i] : points_[block]) {
-          result.push_back({static_cast<std::uint32_t>(session), history_.points(session)[i]});
-        }
-      }
-    });
+    for_each_component(
+        points_.keys, points_.numbers, [&](const std::vector<std::uint32_t>& members) {
+          if (!is_object(members)) return;
+          for (const std::uint32_t block : members) {
+            for (const auto& [session, i] : points_.values[block]) {
+              result.push_back({static_cast<std::uint32_t>(session), history_.points(session)[i]});
+            }
+          }
+        });
     return result;
   }
 
@@ -60,11 +55,11 @@ class Candidates {
     float points = 0.0F, hits = 0.0F, passed = 0.0F, contacts = 0.0F;
     for (const std::uint32_t block : members) {
       bool touches = false;
-      for_each_touching(keys_[block], [&](VoxelKey key) {
+      for_each_touching(points_.keys[block], [&](VoxelKey key) {
         touches = touches || standing_.find(key) != VoxelHashTable<>::kNone;
       });
       contacts += touches ? 1.0F : 0.0F;
-      for (const auto& [session, i] : points_[block]) {
+      for (const auto& [session, i] : points_.values[block]) {
         const SessionPoint& point = history_.points(session)[i];
         box.extend(Eigen::Vector3f(point.x, point.y, point.z));
         points += 1.0F;
@@ -80,9 +75,8 @@ class Candidates {
 
   const SessionGrid& grid_;
   const TileHistory& history_;
-  VoxelHashTable<> numbers_, standing_;  // of blocks
-  std::vector<VoxelKey> keys_;
-  std::vector<std::vector<std::pair<std::size_t, std::size_t>>> points_;  // by block
+  VoxelHashTable<> standing_;                                           // blocks
+  VoxelTile<std::vector<std::pair<std::size_t, std::size_t>>> points_;  // by block
 };
 
 }  // namespace
@@ -154,21 +148,22 @@ CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32
 
 void CityMap::revise(TileHistory& history, const TileIndex& tile,
                      const SessionInfo& session) const {
-  ReferenceTest test(session.evidence);
+  detail::Visibility visibility;
   RecordingReference reference;
   const double edge = city_.grid().tile;
   const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
   const Eigen::Vector3d middle = corner + Eigen::Vector3d(0.5 * edge, 0.5 * edge, 0.0);
   // Beyond this distance, no point of the tile is in range.
-  const double reach = TileHistory::kRange + std::sqrt(0.5) * edge;
+  const double reach = TestedCells::kRange + std::sqrt(0.5) * edge;
   for (const SessionReference& which : session.references) {
     if ((which.sensor - middle).head<2>().norm() > reach) continue;
     city_.read_reference(session, which, reference);
     const Pose T_world_points(Eigen::Translation3d(which.sensor));
-    history.revise(which.sensor - corner,
-                   [&](const PointBuffer& points, std::size_t count) -> const detail::Visibility& {
-                     return test(reference, points, count, T_world_points);
-                   });
+    history.revise(
+        which.sensor - corner, [&](const PointBuffer& points, std::size_t count) -> const auto& {
+          return test_visibility(reference, session.evidence, points, count, T_world_points,
+                                 visibility);
+        });
   }
 }
 

@@ -1,6 +1,5 @@
 #include "dynains/city/session_writer.hpp"
 
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -78,12 +77,11 @@ void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
   if (reference == nullptr) return;
   session_.image_grid = references_.grid();
   const PoseRows rows = rows_of(T_world_sensor);
-  bytes_.resize(sizeof(rows) + most_packed_bytes(session_.image_grid));
-  std::memcpy(bytes_.data(), rows.data(), sizeof(rows));
-  const auto* const end = pack_image(reference->image, bytes_.data() + sizeof(rows));
-  const auto size = static_cast<std::size_t>(end - bytes_.data());
-  const std::uint64_t offset = store_.append({bytes_.data(), size});
-  session_.references.push_back({scan, T_world_sensor.translation(), {offset, size}});
+  const auto* const row_bytes = reinterpret_cast<const std::uint8_t*>(rows.data());
+  bytes_.assign(row_bytes, row_bytes + sizeof(rows));
+  pack_image(reference->image, bytes_);
+  session_.references.push_back(
+      {scan, T_world_sensor.translation(), {store_.append(bytes_), bytes_.size()}});
 }
 
 void SessionWriter::prepare() {

@@ -42,6 +42,7 @@ void SecondPass::test(const std::function<bool()>& keep_going) {
       return;
     } else {
       visit->rest();
+      places_ += visit->place_count();
     }
   }
   is_decided_ = true;
@@ -54,13 +55,11 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, VerdictArrays& 
   if (scan.visit != latest_ && visits_[latest_] != nullptr) visits_[latest_]->rest();
   latest_ = scan.visit;
   Visit* const visit = visits_[scan.visit].get();
-  return visit != nullptr && visit->revise(points, scan.number, verdict);
-}
-
-std::size_t SecondPass::place_count() const {
-  std::size_t count = 0;
-  for (const auto& visit : visits_) count += visit == nullptr ? 0 : visit->place_count();
-  return count;
+  if (visit == nullptr) return false;
+  const RevisedPoints points_of_scan = visit->revise(points, scan.number, verdict);
+  revised_.removed += points_of_scan.removed;
+  revised_.restored += points_of_scan.restored;
+  return points_of_scan.removed + points_of_scan.restored > 0;
 }
 
 std::vector<SecondPass::Object> SecondPass::objects() const {
@@ -70,18 +69,6 @@ std::vector<SecondPass::Object> SecondPass::objects() const {
     objects.insert(objects.end(), visit->objects().begin(), visit->objects().end());
   }
   return objects;
-}
-
-std::uint64_t SecondPass::removed() const {
-  std::uint64_t points = 0;
-  for (const auto& visit : visits_) points += visit == nullptr ? 0 : visit->removed();
-  return points;
-}
-
-std::uint64_t SecondPass::restored() const {
-  std::uint64_t points = 0;
-  for (const auto& visit : visits_) points += visit == nullptr ? 0 : visit->restored();
-  return points;
 }
 
 }  // namespace dynains

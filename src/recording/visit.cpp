@@ -12,9 +12,8 @@
 namespace dynains {
 namespace {
 
-constexpr float kBelief = 0.95F;         // of points that the second pass removes
-constexpr float kRestoredBelief = 0.5F;  // of objects that it brings back
-constexpr double kPlaceShare = 0.75;     // of the memory; the rest is for the ground
+constexpr float kBelief = 0.95F;      // of points that the second pass removes
+constexpr double kPlaceShare = 0.75;  // of the memory; the rest is for the ground
 
 std::size_t bytes_of(double megabytes) { return static_cast<std::size_t>(1e6 * megabytes); }
 
@@ -43,11 +42,9 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const Pose& T_wor
   ground_.add(points, verdict.labels, T);
   const RecordingReference* const reference = references_.add(points, verdict.labels, T, number);
   if (reference == nullptr) return;
-  packed_.resize(most_packed_bytes(reference->image.grid()));
-  const auto size =
-      static_cast<std::size_t>(pack_image(reference->image, packed_.data()) - packed_.data());
-  const std::uint64_t offset = store_.append({packed_.data(), size});
-  kept_.push_back({number, verdict.time, offset, size});
+  packed_.clear();
+  pack_image(reference->image, packed_);
+  kept_.push_back({number, verdict.time, store_.append(packed_), packed_.size()});
 }
 
 void Visit::rest() {
@@ -56,8 +53,7 @@ void Visit::rest() {
 }
 
 bool Visit::test(const std::function<bool()>& keep_going) {
-  std::array<ReferenceTest, 2> tests = {ReferenceTest(config_.evidence),
-                                        ReferenceTest(config_.evidence)};
+  std::array<detail::Visibility, 2> visibility;
   RecordingReference reference, next;
   Background reader;
   Background* const other = config_.threads > 1 ? &reader : nullptr;
@@ -70,7 +66,8 @@ bool Visit::test(const std::function<bool()>& keep_going) {
     const auto test_part = [&](std::size_t part) {
       places_.test(
           part, [&](const PointBuffer& points, std::size_t count) -> const auto& {
-            return tests[part](reference, points, count, T_level_points);
+            return test_visibility(reference, config_.evidence, points, count, T_level_points,
+                                   visibility[part]);
           });
     };
     run_both(
@@ -109,10 +106,10 @@ void Visit::list_objects() {
   });
 }
 
-bool Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
+RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
   const Pose& T_level_sensor = T_level_sensor_[number];
   ground_.free_far(T_level_sensor.translation());
-  const std::uint64_t restored = restored_, removed = removed_;
+  RevisedPoints revised;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointLabel label = verdict.labels[i];
     const bool is_removed = label == PointLabel::kDynamic;
@@ -123,16 +120,17 @@ bool Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdi
     const bool stands = place != nullptr && config_.static_policy == StaticPolicy::kLast &&
                         place->stands_since(number);
     if (is_removed) {
-      restore(i, stands && !place->is_beside, point, verdict);
+      revised.restored += restore(i, stands && !place->is_beside, point, verdict) ? 1 : 0;
     } else if (place != nullptr && !stands && belongs_to(*place, label, point)) {
       remove(i, verdict);
+      ++revised.removed;
       Object& object = objects_[place->object - 1];
       if (object.points++ == 0) object.first_measured = numbers_of_scans_[number];
       object.last_measured = numbers_of_scans_[number];
     }
   }
-  if (removed_ > removed) remove_instances(verdict);
-  return restored_ + removed_ > restored + removed;
+  if (revised.removed > 0) revised.removed += remove_instances(verdict);
+  return revised;
 }
 
 // Whether a point that was kept is of the object of a place. Ground is, if it rises above the mean.
@@ -142,8 +140,8 @@ bool Visit::belongs_to(const ChangedPlace& place, PointLabel label, const Eigen:
   return ground_.rise(point).value_or(0.0) >= kRise;
 }
 
-// Restores a removed point that stands, or does not rise above the ground of all scans.
-void Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
+// Restores a removed point if it stands, or does not rise above the ground of all scans.
+bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m
   const auto is_ground = [&] {
@@ -158,14 +156,16 @@ void Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
     verdict.causes[i] = Cause::kGround;
     verdict.instances[i] = kNoInstance;
   } else {
-    return;
+    return false;
   }
-  if (!verdict.beliefs.empty()) verdict.beliefs[i] = stands ? kRestoredBelief : 0.0F;
-  ++restored_;
+  if (!verdict.beliefs.empty()) verdict.beliefs[i] = 0.0F;
+  return true;
 }
 
-// Removes the instances of a scan of which at least half of the points have left.
-void Visit::remove_instances(VerdictArrays& verdict) {
+// Removes the instances of a scan of which at least half of the points have left. Returns the
+// number of points.
+std::uint64_t Visit::remove_instances(VerdictArrays& verdict) {
+  std::uint64_t removed = 0;
   majority_.assign(1 + *std::max_element(verdict.instances.begin(), verdict.instances.end()), 0);
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     const bool has_left = verdict.causes[i] == Cause::kCameOrWent;
@@ -176,8 +176,11 @@ void Visit::remove_instances(VerdictArrays& verdict) {
     const bool may_leave = verdict.labels[i] == PointLabel::kStatic &&
                            verdict.causes[i] != Cause::kStands &&
                            verdict.instances[i] != kNoInstance;
-    if (may_leave && majority_[verdict.instances[i]] >= 0) remove(i, verdict);
+    if (!may_leave || majority_[verdict.instances[i]] < 0) continue;
+    remove(i, verdict);
+    ++removed;
   }
+  return removed;
 }
 
 void Visit::remove(std::size_t point, VerdictArrays& verdict) {
@@ -186,7 +189,6 @@ void Visit::remove(std::size_t point, VerdictArrays& verdict) {
   if (!verdict.beliefs.empty()) {
     verdict.beliefs[point] = std::max(verdict.beliefs[point], kBelief);
   }
-  ++removed_;
 }
 
 }  // namespace dynains

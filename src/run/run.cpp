@@ -153,8 +153,8 @@ nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
                        {"passed", {name(object.first_passed), name(object.last_passed)}}});
   }
   return {{"places", pass.place_count()},
-          {"removed_points", pass.removed()},
-          {"restored_points", pass.restored()},
+          {"removed_points", pass.revised().removed},
+          {"restored_points", pass.revised().restored},
           {"objects", std::move(objects)}};
 }
 

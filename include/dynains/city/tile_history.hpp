@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -13,8 +12,9 @@
 #include "dynains/belief/log_odds.hpp"
 #include "dynains/city/session.hpp"
 #include "dynains/points.hpp"
+#include "dynains/recording/cell_samples.hpp"
+#include "dynains/recording/paged_tiles.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/touching_voxels.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
@@ -37,8 +37,6 @@ namespace dynains {
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
-  /// References do not test blocks at a larger horizontal range, m.
-  static constexpr double kRange = 60.0;
 
   /// Throws ConfigError.
   explicit TileHistory(const SessionGrid& grid) : grid_((grid.validate(), grid)) {}
@@ -83,19 +81,15 @@ class TileHistory {
     session.points = std::move(points);
     session.part_of.reserve(session.points.size());
     for (const SessionPoint& point : session.points) {
-      const VoxelKey voxel = session_voxel(grid_, point);
-      const VoxelKey key = block_of(voxel);
-      const std::uint32_t block = numbers_.insert(key);
-      if (block == blocks_.size()) blocks_.emplace_back().key = key;
-      std::uint32_t& newest = blocks_[block].newest_part;
+      const std::uint32_t block = blocks_.add(block_of(session_voxel(grid_, point)));
+      std::uint32_t& newest = blocks_.values[block].newest_part;
       if (newest == kNone || parts_[newest].session != number) {
         parts_.push_back({number, block, newest});
         newest = static_cast<std::uint32_t>(parts_.size() - 1);
       }
-      const auto octant =
-          static_cast<std::size_t>((voxel & 1U) | (voxel >> kVoxelKeyBits & 1U) << 1U |
-                                   (voxel >> 2 * kVoxelKeyBits & 1U) << 2U);
-      parts_[newest].samples |= 1U << blocks_[block].sample_at(octant, point);
+      const Eigen::Vector3d at = Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
+      const Eigen::Vector3d within = (at - corner_of(blocks_.keys[block], edge())) / edge();
+      parts_[newest].samples |= 1U << blocks_.values[block].samples.add(within);
       session.part_of.push_back(newest);
     }
     session.parts_end = static_cast<std::uint32_t>(parts_.size());
@@ -106,13 +100,19 @@ class TileHistory {
   /// detail::test_visibility(); points in the frame of SessionPoint, relative to `sensor`.
   template <class TestVisibility>
   void revise(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    gather(sensor);
-    if (tested_.empty()) return;
-    const auto& visibility = test_visibility(samples_, std::size_t{begin_.back()});
-    for (std::size_t i = 0; i < tested_.size(); ++i) {
-      const auto [free, hit] = visibility.bits(begin_[i], begin_[i + 1]);
+    tested_.clear();
+    for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+      const Block& block = blocks_.values[i];
+      if (!block.is_tested) continue;
+      tested_.add(i, block.samples, corner_of(blocks_.keys[i], edge()) - sensor, edge());
+    }
+    if (tested_.cells.empty()) return;
+    const auto& visibility = test_visibility(tested_.samples, std::size_t{tested_.begin.back()});
+    for (std::size_t i = 0; i < tested_.cells.size(); ++i) {
+      const auto [free, hit] = visibility.bits(tested_.begin[i], tested_.begin[i + 1]);
       if ((free | hit) == 0) continue;
-      for (std::uint32_t p = blocks_[tested_[i]].newest_part; p != kNone; p = parts_[p].next) {
+      for (std::uint32_t p = blocks_.values[tested_.cells[i]].newest_part; p != kNone;
+           p = parts_[p].next) {
         Part& part = parts_[p];
         const std::uint64_t samples = part.samples;
         const int verdict = detail::FreeSpaceSum::judge(detail::count_ones(free & samples),
@@ -140,9 +140,9 @@ class TileHistory {
       // A few references of the session itself outweigh whatever earlier sessions have seen.
       part.level = std::min(part.level, level_);
     }
-    for (Block& block : blocks_) block.is_tested = false;
+    for (Block& block : blocks_.values) block.is_tested = false;
     for (const Part& part : parts_) {
-      if (part.removed_by == kNever) blocks_[part.block].is_tested = true;
+      if (part.removed_by == kNever) blocks_.values[part.block].is_tested = true;
     }
   }
 
@@ -181,23 +181,9 @@ class TileHistory {
   static constexpr Limits kLeft = {1.0F, 0.2F};
 
   struct Block {
-    VoxelKey key = 0;
-    std::array<std::array<float, 3>, 8> samples;  // m
-    std::array<std::uint8_t, 8> octants;          // by sample
-    std::uint8_t sample_count = 0;
+    CellSamples samples;
     bool is_tested = true;  // whether any part is not removed
     std::uint32_t newest_part = kNone;
-
-    // Number of the sample in an octant, which is this point if there was none.
-    std::uint32_t sample_at(std::size_t octant, const SessionPoint& point) {
-      std::uint32_t i = 0;
-      while (i < sample_count && octants[i] != octant) ++i;
-      if (i < sample_count) return i;
-      octants[i] = static_cast<std::uint8_t>(octant);
-      samples[i] = {point.x, point.y, point.z};
-      ++sample_count;
-      return i;
-    }
   };
   /// The voxels that one session fills in a block, and the evidence about them.
   struct Part {
@@ -212,12 +198,16 @@ class TileHistory {
     std::uint8_t own_hits = 0;  // references of its own session that hit
     bool was_free = false;      // after a session before its own
   };
+  struct Ground {
+    float lowest = std::numeric_limits<float>::max();  // m
+  };
   struct Session {
     std::vector<SessionPoint> points;
     std::vector<std::uint32_t> part_of;  // by point
     std::uint32_t parts_end = 0;
   };
 
+  double edge() const { return 2.0 * grid_.map_voxel; }  // m, of a block
   const Part& part_of(std::size_t session, std::size_t point) const {
     return parts_[sessions_[session].part_of[point]];
   }
@@ -232,42 +222,18 @@ class TileHistory {
   }
   void add_ground(const SessionPoint& point) {
     if (point.is_ground == 0) return;
-    const std::uint32_t cell = ground_cells_.insert(ground_cell(point));
-    if (cell == lowest_ground_.size()) lowest_ground_.push_back(point.z);
-    lowest_ground_[cell] = std::min(lowest_ground_[cell], point.z);
+    float& lowest = ground_.values[ground_.add(ground_cell(point))].lowest;
+    lowest = std::min(lowest, point.z);
   }
   // m, in the cell of a point and those that touch it; the largest float if there is none.
   float lowest_ground_around(const SessionPoint& point) const {
     float lowest = std::numeric_limits<float>::max();
     for (int i = 0; i < 9; ++i) {
-      const std::uint32_t cell =
-          ground_cells_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (cell != kNone) lowest = std::min(lowest, lowest_ground_[cell]);
+      const Ground* const ground =
+          ground_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (ground != nullptr) lowest = std::min(lowest, ground->lowest);
     }
     return lowest;
-  }
-
-  // Collects the samples of the blocks near the sensor that have parts in the map.
-  void gather(const Eigen::Vector3d& sensor) {
-    tested_.clear();
-    begin_.assign(1, 0);
-    for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
-      const Block& block = blocks_[i];
-      if (!block.is_tested) continue;
-      const double dx = static_cast<double>(block.samples[0][0]) - sensor.x();
-      const double dy = static_cast<double>(block.samples[0][1]) - sensor.y();
-      if (dx * dx + dy * dy > kRange * kRange) continue;
-      std::uint32_t count = begin_.back();
-      samples_.grow(count + 8 + detail::kPackWidth);
-      for (std::size_t k = 0; k < block.sample_count; ++k, ++count) {
-        const std::array<float, 3>& sample = block.samples[k];
-        samples_.x[count] = static_cast<float>(static_cast<double>(sample[0]) - sensor.x());
-        samples_.y[count] = static_cast<float>(static_cast<double>(sample[1]) - sensor.y());
-        samples_.z[count] = static_cast<float>(static_cast<double>(sample[2]) - sensor.z());
-      }
-      tested_.push_back(i);
-      begin_.push_back(count);
-    }
   }
 
   // Adds what a reference tells.
@@ -282,25 +248,24 @@ class TileHistory {
 
   // Numbers the components of touching parts of a session with points above the ground.
   void find_components(std::uint32_t session) {
-    VoxelHashTable<> numbers;
-    std::vector<VoxelKey> keys;
-    std::vector<std::uint32_t> parts;
+    VoxelTile<std::uint32_t> parts;
     const Session& own = sessions_[session];
     for (std::size_t i = 0; i < own.points.size(); ++i) {
-      const VoxelKey key = blocks_[parts_[own.part_of[i]].block].key;
-      if (!is_above_ground(own.points[i]) || numbers.insert(key) < keys.size()) continue;
-      keys.push_back(key);
-      parts.push_back(own.part_of[i]);
+      if (!is_above_ground(own.points[i])) continue;
+      const std::uint32_t part = own.part_of[i];
+      parts.values[parts.add(blocks_.keys[parts_[part].block])] = part;
     }
-    for_each_component(keys, numbers, [&](const std::vector<std::uint32_t>& members) {
+    for_each_component(parts.keys, parts.numbers, [&](const std::vector<std::uint32_t>& members) {
       const auto first = static_cast<std::uint32_t>(is_compact_.size());
-      const bool is_whole = is_compact(keys, members);
+      const bool is_whole = is_compact(parts.keys, members);
       VoxelHashTable<> cubes;
       for (const std::uint32_t member : members) {
         // A tree that was felled beside others leaves alone.
-        const auto cube = [&](int axis) { return voxel_index(keys[member], axis) >> kCubeBits; };
+        const auto cube = [&](int axis) {
+          return voxel_index(parts.keys[member], axis) >> kCubeBits;
+        };
         const VoxelKey key = is_whole ? 0 : voxel_key(cube(0), cube(1), cube(2));
-        parts_[parts[member]].component = first + cubes.insert(key);
+        parts_[parts.values[member]].component = first + cubes.insert(key);
       }
       is_compact_.resize(first + cubes.size(), is_whole);
     });
@@ -308,17 +273,10 @@ class TileHistory {
 
   bool is_compact(const std::vector<VoxelKey>& keys,
                   const std::vector<std::uint32_t>& members) const {
-    const double edge = 2.0 * grid_.map_voxel;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto [lowest, highest] = std::minmax_element(
-          members.begin(), members.end(), [&](std::uint32_t a, std::uint32_t b) {
-            return voxel_index(keys[a], axis) < voxel_index(keys[b], axis);
-          });
-      const double extent = edge * static_cast<double>(voxel_index(keys[*highest], axis) -
-                                                       voxel_index(keys[*lowest], axis) + 1);
-      if (extent > (axis < 2 ? kCompactLength : kCompactHeight)) return false;
-    }
-    return true;
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t member : members) box.extend(corner_of(keys[member], edge()));
+    const Eigen::Vector3d sizes = box.sizes() + Eigen::Vector3d::Constant(edge());
+    return sizes.head<2>().maxCoeff() <= kCompactLength && sizes.z() <= kCompactHeight;
   }
 
   // Removes the parts of sessions up to `by` that are free after it. In the session that measured
@@ -365,16 +323,12 @@ class TileHistory {
   float hit_ = static_cast<float>(log_odds(0.155));
   float level_ = static_cast<float>(log_odds(0.95));  // from which a part is free (Eq. 19)
   std::vector<Session> sessions_;
-  VoxelHashTable<> numbers_;  // of blocks
-  std::vector<Block> blocks_;
+  VoxelTile<Block> blocks_;
   std::vector<Part> parts_;       // those of a session are together
   std::vector<bool> is_compact_;  // by component
-  VoxelHashTable<> ground_cells_;
-  std::vector<float> lowest_ground_;  // m, by cell, of the sessions that have tested
+  VoxelTile<Ground> ground_;      // of the sessions that have tested
   std::uint32_t tested_count_ = 0;
-  std::vector<std::uint32_t> tested_;  // blocks
-  std::vector<std::uint32_t> begin_;   // by tested block: first sample, and the end
-  PointBuffer samples_;
+  TestedCells tested_;
 };
 
 }  // namespace dynains

@@ -21,8 +21,6 @@ namespace dynains {
 /// Values by voxel of a tile, in the order of their insertion.
 template <class Value>
 struct VoxelTile {
-  static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
-
   VoxelHashTable<> numbers;
   std::vector<VoxelKey> keys;
   std::vector<Value> values;
@@ -48,6 +46,7 @@ struct VoxelTile {
   }
 
   void pack(std::vector<std::uint8_t>& bytes) const {
+    static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
     const std::size_t key_bytes = keys.size() * sizeof(VoxelKey);
     bytes.resize(key_bytes + values.size() * sizeof(Value));
     if (keys.empty()) return;
@@ -67,8 +66,7 @@ struct VoxelTile {
   }
 };
 
-/// Tiles by index. References to a tile are valid until free_far() frees it. `Tile`: VoxelTile, or
-/// another type with its functions size(), memory_bytes(), pack() and unpack().
+/// Tiles by index, each a VoxelTile. References to a tile are valid until free_far() frees it.
 template <class Tile>
 class PagedTiles {
  public:

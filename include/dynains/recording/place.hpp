@@ -2,9 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
-#include <cstddef>
 #include <cstdint>
+
+#include "dynains/recording/cell_samples.hpp"
 
 namespace dynains {
 
@@ -13,7 +13,7 @@ struct ScanSpan {
   std::uint32_t first = 0, last = UINT32_MAX;
 };
 
-/// Scans in which something was in a place: 64 slices of time, which double when the recording
+/// Scans in which something was seen in a place: 64 slices of time, which double when the recording
 /// gets longer.
 class Presence {
  public:
@@ -77,10 +77,8 @@ struct alignas(64) RecordingPlace {
   static constexpr int kFreeLooks = 4;  ///< in a row, after which it has changed
 
   FirstVerdicts first;
-  /// In scans that hit it, or of which the first pass kept points in it.
-  Presence present;
-  std::array<std::array<std::uint8_t, 3>, 8> samples;  ///< by octant, in 1/256 of a place
-  std::uint8_t filled = 0;                             ///< octants with a sample
+  Presence kept;  ///< points by the first pass
+  CellSamples samples;
 
   bool look_free = false, look_hit = false;      ///< of the open look
   bool was_hit = false;                          ///< by any look
@@ -97,7 +95,7 @@ struct alignas(64) RecordingPlace {
     const bool came = first.removed_first && free_before;
     const bool left = first.removed_last && free_after;
     return (first.any_kept && (came || left)) ||
-           (longest >= kFreeLooks && !present.any_within(passed));
+           (longest >= kFreeLooks && !kept.any_within(passed));
   }
 };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -14,11 +13,10 @@
 #include "dynains/belief/log_odds.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/place.hpp"
 #include "dynains/recording/world_cells.hpp"
-#include "dynains/simd/bits.hpp"
-#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/touching_voxels.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -52,9 +50,8 @@ struct ChangedPlace {
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
 class RecordingPlaces {
  public:
-  static constexpr double kPlaceRange = 60.0;  ///< m, horizontal, of a look at a place
-  static constexpr double kLookWay = 3.0;      ///< m, of the sensor between independent looks
-  static constexpr double kLookTime = 1.0;     ///< s, between independent looks
+  static constexpr double kLookWay = 3.0;   ///< m, of the sensor between independent looks
+  static constexpr double kLookTime = 1.0;  ///< s, between independent looks
 
   /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
   /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
@@ -79,11 +76,12 @@ class RecordingPlaces {
         Tile& tile = tiles_.at(tile_of(cell));
         place = &tile.values[tile.add(cell)];
       }
-      if (!is_removed) place->present.add(scan);
+      if (!is_removed) place->kept.add(scan);
       // The first verdicts on points that are too far for looks say little of their place.
-      const bool is_near = std::hypot(points.x[i], points.y[i]) <= static_cast<float>(kPlaceRange);
+      const bool is_near =
+          std::hypot(points.x[i], points.y[i]) <= static_cast<float>(TestedCells::kRange);
       if (is_near) place->first.add(is_removed, epoch_, scan);
-      add_sample(*place, point - corner_of(cell));
+      place->samples.add((point - corner_of(cell)) / kWorldCell);
     }
     free_far(T_world_sensor.translation());
   }
@@ -101,7 +99,8 @@ class RecordingPlaces {
     around_.clear();
     next_around_ = 0;
     tiles_.for_each_index([&](const TileIndex& index) {
-      if (tiles_.distance(index, sensor) <= kPlaceRange) around_.push_back(&tiles_.at(index));
+      if (tiles_.distance(index, sensor) <= TestedCells::kRange)
+        around_.push_back(&tiles_.at(index));
     });
   }
 
@@ -110,19 +109,22 @@ class RecordingPlaces {
   /// detail::test_visibility(); points relative to the sensor, with the axes of the world frame.
   template <class TestVisibility>
   void test(std::size_t part, TestVisibility&& test_visibility) {
-    Tested& tested = tested_[part];
+    TestedCells& tested = tested_[part];
     for (std::size_t next; (next = next_around_++) < around_.size();) {
-      gather(*around_[next], tested);
-      if (tested.places.empty()) continue;
+      Tile& tile = *around_[next];
+      tested.clear();
+      for (std::uint32_t i = 0; i < tile.size(); ++i) {
+        tested.add(i, tile.values[i].samples, corner_of(tile.keys[i]) - sensor_, kWorldCell);
+      }
+      if (tested.cells.empty()) continue;
       const auto& visibility = test_visibility(tested.samples, std::size_t{tested.begin.back()});
-      for (std::size_t i = 0; i < tested.places.size(); ++i) {
+      for (std::size_t i = 0; i < tested.cells.size(); ++i) {
         const std::uint32_t begin = tested.begin[i], end = tested.begin[i + 1];
         const auto count = visibility.count(begin, end);
         const int verdict = detail::FreeSpaceSum::judge(count.free, count.hit, end - begin);
         if (verdict == 0) continue;
-        Place& place = *tested.places[i];
-        if (!place.look_free && !place.look_hit) tested.touched.push_back(&place);
-        if (verdict < 0) place.present.add(look_.last);
+        Place& place = tile.values[tested.cells[i]];
+        if (!place.look_free && !place.look_hit) touched_[part].push_back(&place);
         (verdict > 0 ? place.look_free : place.look_hit) = true;
       }
     }
@@ -186,14 +188,6 @@ class RecordingPlaces {
   using Place = RecordingPlace;
   using Tile = VoxelTile<Place>;
 
-  /// Places of one tile that a thread tests, and those that it saw in the open look.
-  struct Tested {
-    std::vector<Place*> touched;       // by the open look
-    std::vector<Place*> places;        // of a tile
-    std::vector<std::uint32_t> begin;  // by place: first sample, and the end
-    PointBuffer samples;
-  };
-
   /// Begin of a look or an epoch.
   struct Begin {
     bool is_set = false;
@@ -208,30 +202,16 @@ class RecordingPlaces {
     }
   };
 
-  // The first point of an octant is its sample. `within`: m, from the corner of the place.
-  static void add_sample(Place& place, const Eigen::Vector3d& within) {
-    constexpr double kSteps = 256.0 / kWorldCell;
-    std::array<std::uint8_t, 3> sample;
-    unsigned octant = 0;
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      const double step = std::min(255.0, std::max(0.0, kSteps * within[axis]));
-      sample[axis] = static_cast<std::uint8_t>(step);
-      octant |= static_cast<unsigned>(sample[axis] >> 7U) << axis;
-    }
-    const unsigned bit = 1U << octant;
-    if ((place.filled & bit) != 0) return;
-    place.filled = static_cast<std::uint8_t>(place.filled | bit);
-    place.samples[octant] = sample;
-  }
-
   // Places of the open look stay in memory.
-  void free_far(const Eigen::Vector3d& sensor) { tiles_.free_far(sensor, kPlaceRange + kLookWay); }
+  void free_far(const Eigen::Vector3d& sensor) {
+    tiles_.free_far(sensor, TestedCells::kRange + kLookWay);
+  }
 
   // Adds the open look to the states of the places that it saw.
   void end_look() {
-    for (Tested& tested : tested_) {
-      for (Place* const place : tested.touched) end_look(*place);
-      tested.touched.clear();
+    for (std::vector<Place*>& touched : touched_) {
+      for (Place* const place : touched) end_look(*place);
+      touched.clear();
     }
   }
   void end_look(Place& place) const {
@@ -282,31 +262,6 @@ class RecordingPlaces {
     return tile == nullptr ? nullptr : tile->find(cell);
   }
 
-  // Collects the samples of the places of a tile that are near the sensor.
-  void gather(Tile& tile, Tested& tested) const {
-    constexpr auto kStep = static_cast<float>(kWorldCell / 256.0);
-    constexpr auto kRange = static_cast<float>(kPlaceRange);
-    tested.places.clear();
-    tested.begin.assign(1, 0);
-    PointBuffer& samples = tested.samples;
-    for (std::size_t i = 0; i < tile.size(); ++i) {
-      const Eigen::Vector3f corner = (corner_of(tile.keys[i]) - sensor_).cast<float>();
-      if (corner.head<2>().squaredNorm() > kRange * kRange) continue;
-      Place& place = tile.values[i];
-      std::uint32_t count = tested.begin.back();
-      samples.grow(count + 8 + detail::kPackWidth);
-      detail::for_each_bit(place.filled, [&](std::size_t octant) {
-        const std::array<std::uint8_t, 3>& within = place.samples[octant];
-        samples.x[count] = corner.x() + kStep * (static_cast<float>(within[0]) + 0.5F);
-        samples.y[count] = corner.y() + kStep * (static_cast<float>(within[1]) + 0.5F);
-        samples.z[count] = corner.z() + kStep * (static_cast<float>(within[2]) + 0.5F);
-        ++count;
-      });
-      tested.places.push_back(&place);
-      tested.begin.push_back(count);
-    }
-  }
-
   PagedTiles<Tile> tiles_;
   VoxelTile<ChangedPlace> changed_;
   std::uint32_t objects_ = 0;
@@ -318,7 +273,8 @@ class RecordingPlaces {
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, of the reference
   std::vector<Tile*> around_;                         // to be tested
   std::atomic<std::size_t> next_around_{0};           // the next one
-  std::array<Tested, 2> tested_;                      // by part
+  std::array<TestedCells, 2> tested_;                 // by part
+  std::array<std::vector<Place*>, 2> touched_;        // by the open look
 };
 
 }  // namespace dynains

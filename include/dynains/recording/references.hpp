@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
+#include "dynains/ground/ground_split.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -21,57 +21,41 @@
 
 namespace dynains {
 
-/// Room that pack_image() needs for an image of this grid. A difference has 17 bits, so that its
-/// code has three bytes at most, and four are written at once.
-inline std::size_t most_packed_bytes(const RangeImageGrid& grid) {
-  return 6 * static_cast<std::size_t>(grid.rows) * static_cast<std::size_t>(grid.columns) + 8;
-}
-
 /// Bytes of a range image: for each of the two values of Cell, the cells row by row. A value is the
 /// difference to the previous value of its row (to 0 for the first), zigzag-coded as 2d or -2d - 1,
 /// in groups of 7 bits, the lowest first; bit 7 tells that another group follows. A byte 0 is a
 /// difference of 0, and the coded number behind it counts further differences of 0.
-/// Writes to `to`, which must have room for most_packed_bytes(), and returns the end.
-inline std::uint8_t* pack_image(const RangeImage& image, std::uint8_t* to) {
+/// They are added to `bytes`.
+inline void pack_image(const RangeImage& image, std::vector<std::uint8_t>& bytes) {
   const RangeImageGrid& grid = image.grid();
-  const auto put = [&to](std::uint32_t value) {
-    constexpr std::uint32_t kMore[] = {0, 0x80U, 0x8080U};  // bit 7 of the groups before the last
-    const std::uint32_t more = (value >= 1U << 7U ? 1U : 0U) + (value >= 1U << 14U ? 1U : 0U);
-    const std::uint32_t code =
-        (value & 0x7FU) | (value & 0x3F80U) << 1U | (value & 0x1FC000U) << 2U | kMore[more];
-    std::memcpy(to, &code, sizeof(code));
-    to += more + 1;
+  const auto put = [&](std::uint32_t value) {
+    for (; value >= 0x80U; value >>= 7U) bytes.push_back(static_cast<std::uint8_t>(value | 0x80U));
+    bytes.push_back(static_cast<std::uint8_t>(value));
   };
-  std::vector<std::uint32_t> codes(static_cast<std::size_t>(grid.columns));
   std::uint32_t zeros = 0;
   const auto end_zeros = [&] {
-    *to++ = 0;
-    for (--zeros; zeros >= 0x80U; zeros >>= 7U) *to++ = static_cast<std::uint8_t>(zeros | 0x80U);
-    *to++ = static_cast<std::uint8_t>(zeros);
+    if (zeros == 0) return;
+    put(0);
+    put(zeros - 1);
     zeros = 0;
   };
   for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
     for (std::int32_t row = 0; row < grid.rows; ++row) {
       const RangeImage::Cell* const cells = &image[grid.cell(row, 0)];
-      const auto code_of = [](std::int32_t step) {
-        return static_cast<std::uint32_t>(step) << 1U ^ (step < 0 ? ~0U : 0U);
-      };
-      codes[0] = code_of(cells[0].*value_of);
-      for (std::size_t i = 1; i < codes.size(); ++i) {
-        codes[i] = code_of(cells[i].*value_of - cells[i - 1].*value_of);
-      }
-      for (const std::uint32_t code : codes) {
-        if (code == 0) {
+      std::int32_t before = 0;
+      for (std::int32_t column = 0; column < grid.columns; ++column) {
+        const std::int32_t step = cells[column].*value_of - before;
+        before = cells[column].*value_of;
+        if (step == 0) {
           ++zeros;
           continue;
         }
-        if (zeros > 0) end_zeros();
-        put(code);
+        end_zeros();
+        put(static_cast<std::uint32_t>(step) << 1U ^ (step < 0 ? ~0U : 0U));
       }
     }
   }
-  if (zeros > 0) end_zeros();
-  return to;
+  end_zeros();
 }
 
 /// Inverse of pack_image(). Returns false if `bytes` is not an image of this grid.
@@ -159,7 +143,7 @@ class RecordingReferences {
     latest_ = T_world_sensor.translation();
     reference_.scan = scan;
     reference_.T_world_beams = T_world_sensor;
-    reference_.image.build(grid_, ground(), objects(), {moving_.data(), object_count_},
+    reference_.image.build(grid_, split_.ground(), split_.non_ground(), moving_,
                            static_cast<float>(lateral_margin_), scratch_);
     forget_moving(reference_.image);
     return &reference_;
@@ -182,72 +166,52 @@ class RecordingReferences {
   }
 
   void split(PointsView points, Span<const PointLabel> verdicts) {
-    const auto put = [&](PointBuffer& to, std::size_t at, std::size_t i) {
-      to.x[at] = points.x[i];
-      to.y[at] = points.y[i];
-      to.z[at] = points.z[i];
-    };
-    ground_.grow(points.size());
-    objects_.grow(points.size());
-    detail::grow(moving_, points.size());
-    ground_count_ = object_count_ = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (verdicts[i] == PointLabel::kInvalid) continue;
-      if (verdicts[i] == PointLabel::kGround) {
-        put(ground_, ground_count_++, i);
-        continue;
+    split_.resize(points.size());
+    moving_.clear();
+    std::size_t count = 0;
+    for (const bool takes_ground : {true, false}) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const bool is_ground = verdicts[i] == PointLabel::kGround;
+        if (verdicts[i] == PointLabel::kInvalid || is_ground != takes_ground) continue;
+        split_.points.x[count] = points.x[i];
+        split_.points.y[count] = points.y[i];
+        split_.points.z[count] = points.z[i];
+        ++count;
+        if (!is_ground) moving_.push_back(verdicts[i] == PointLabel::kDynamic ? 1 : 0);
       }
-      moving_[object_count_] = verdicts[i] == PointLabel::kDynamic ? 1 : 0;
-      put(objects_, object_count_++, i);
+      if (takes_ground) split_.ground_count = count;
     }
+    split_.count = count;
   }
 
-  PointsView ground() const { return PointsView(ground_).subview(0, ground_count_); }
-  PointsView objects() const { return PointsView(objects_).subview(0, object_count_); }
-
   bool choose_grid() {
-    PointBuffer all;
-    for (const PointsView& part : {objects(), ground()}) {
-      for (std::size_t i = 0; i < part.size(); ++i) all.push_back(part.x[i], part.y[i], part.z[i]);
-    }
-    const SensorModel sensor = estimate_sensor_model(all);
-    if (!sensor.known()) return false;
-    grid_ = RangeImageGrid::for_sensor(sensor);
-    return true;
+    const SensorModel sensor =
+        estimate_sensor_model(PointsView(split_.points).subview(0, split_.count));
+    if (sensor.known()) grid_ = RangeImageGrid::for_sensor(sensor);
+    return sensor.known();
   }
 
   RecordingReferencesConfig config_;
   double lateral_margin_;  // m
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame
-  PointBuffer ground_, objects_;           // with room for more
-  std::vector<std::uint8_t> moving_;
-  std::size_t ground_count_ = 0, object_count_ = 0;
+  GroundSplit split_;
+  std::vector<std::uint8_t> moving_;  // by point above the ground
   RangeImage::Scratch scratch_;
   RecordingReference reference_;
 };
 
-/// Visibility of points from a reference, with the margins of FreeSpaceConfig.
-class ReferenceTest {
- public:
-  explicit ReferenceTest(const FreeSpaceConfig& config)
-      : margin_(static_cast<float>(config.margin)),
-        slope_(static_cast<float>(config.margin_slope)) {}
-
-  /// Tests the first `count` points (m; padded for packs). The result is valid until the next call.
-  const detail::Visibility& operator()(const RecordingReference& reference,
-                                       const PointBuffer& points, std::size_t count,
-                                       const Pose& T_world_points) {
-    detail::test_visibility(
-        reference.image,
-        detail::composed(detail::inverted(reference.T_world_beams), T_world_points), points, count,
-        margin_, slope_, visibility_);
-    return visibility_;
-  }
-
- private:
-  float margin_, slope_;
-  detail::Visibility visibility_;
-};
+/// Tests the first `count` points (m; padded for packs) by a reference, with the margins of
+/// `config`. Returns `out`.
+inline const detail::Visibility& test_visibility(const RecordingReference& reference,
+                                                 const FreeSpaceConfig& config,
+                                                 const PointBuffer& points, std::size_t count,
+                                                 const Pose& T_world_points,
+                                                 detail::Visibility& out) {
+  const Pose T = detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
+  detail::test_visibility(reference.image, T, points, count, static_cast<float>(config.margin),
+                          static_cast<float>(config.margin_slope), out);
+  return out;
+}
 
 }  // namespace dynains

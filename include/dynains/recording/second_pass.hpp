@@ -49,13 +49,11 @@ class SecondPass {
   const std::vector<ReturnToPlace>& returns() const { return returns_.found(); }
   /// Whether test() came to its end.
   bool is_decided() const { return is_decided_; }
-  std::size_t place_count() const;
+  std::size_t place_count() const { return places_; }
   /// Complete when all scans are revised, in their order. Numbers of scans count from 0.
   std::vector<Object> objects() const;
-  /// Number of points that left by revise().
-  std::uint64_t removed() const;
-  /// Number of points that came back by revise().
-  std::uint64_t restored() const;
+  /// By revise().
+  const RevisedPoints& revised() const { return revised_; }
 
  private:
   struct ScanOfVisit {
@@ -68,6 +66,8 @@ class SecondPass {
   std::vector<std::unique_ptr<Visit>> visits_;  // after test(): null if short
   std::vector<ScanOfVisit> scans_;
   std::uint32_t latest_ = 0;  // visit of the last call
+  std::size_t places_ = 0;
+  RevisedPoints revised_;
   bool is_decided_ = false;
 };
 

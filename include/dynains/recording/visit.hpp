@@ -44,6 +44,11 @@ struct SecondPassConfig {
   }
 };
 
+/// Numbers of points that left, and that came back.
+struct RevisedPoints {
+  std::uint64_t removed = 0, restored = 0;
+};
+
 /// Scans whose poses fit to each other. All of them test the places of their points above the
 /// ground. What came or went is removed (see RecordingPlaces), and the ground comes back. An
 /// instance of the first pass leaves a scan as a whole if half of its points leave. Scans of the
@@ -69,8 +74,8 @@ class Visit {
   void rest();
   /// Tests all places. Returns false, without a result, if `keep_going()` does.
   bool test(const std::function<bool()>& keep_going);
-  /// Revises the first verdict on a scan, after test(). Returns whether anything changed.
-  bool revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
+  /// Revises the first verdict on a scan, after test().
+  RevisedPoints revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
 
   std::uint32_t scans() const { return static_cast<std::uint32_t>(numbers_of_scans_.size()); }
   /// Scans of the recording from the first one of the visit to the last one.
@@ -78,9 +83,6 @@ class Visit {
   std::size_t place_count() const { return places_.size(); }
   /// Complete when all scans are revised, in their order.
   const std::vector<Object>& objects() const { return objects_; }
-  /// Number of points that left by revise(), and of those that came back.
-  std::uint64_t removed() const { return removed_; }
-  std::uint64_t restored() const { return restored_; }
 
  private:
   struct Reference {
@@ -93,8 +95,8 @@ class Visit {
   void read(const Reference& kept, RecordingReference& reference);
   void list_objects();
   bool belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point);
-  void restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
-  void remove_instances(VerdictArrays& verdict);
+  bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
+  std::uint64_t remove_instances(VerdictArrays& verdict);
   void remove(std::size_t point, VerdictArrays& verdict);
 
   SecondPassConfig config_;
@@ -109,7 +111,6 @@ class Visit {
   std::vector<std::uint8_t> packed_;
   std::vector<std::int32_t> majority_;  // by instance: points that left, less those that stay
   std::vector<Object> objects_;
-  std::uint64_t removed_ = 0, restored_ = 0;
 };
 
 }  // namespace dynains

@@ -33,11 +33,9 @@ inline VoxelKey cell_at(const Eigen::Vector3d& point) {
   return voxel_key(index(0), index(1), index(2));
 }
 
-/// The corner of a cell with the lowest coordinates, m, world frame.
-inline Eigen::Vector3d corner_of(VoxelKey cell) {
-  const auto at = [&](int axis) {
-    return kWorldCell * static_cast<double>(voxel_index(cell, axis));
-  };
+/// The corner of a cell with the lowest coordinates, m. `edge`: m, of the cells.
+inline Eigen::Vector3d corner_of(VoxelKey cell, double edge = kWorldCell) {
+  const auto at = [&](int axis) { return edge * static_cast<double>(voxel_index(cell, axis)); };
   return {at(0), at(1), at(2)};
 }
 
