@@ -83,7 +83,6 @@ void keep(detail::ScanSlot& scan, const std::vector<std::uint32_t>& cluster_of) 
 TEST_CASE("verdicts by point run equal those by point, at once and after more windows") {
   // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
-  detail::WindowVoter voter;
   detail::VerdictWriter writer;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     INFO("seed " << seed);
@@ -140,7 +139,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
 
     const std::vector<ClusterVerdict> first = random_verdicts(random);
     add(scan.windows.point_runs, first);
-    detail::WindowVoter::record_first(points, first, scan.windows);
+    detail::record_first_window(points, first, scan.windows);
     keep(scan, first_cluster);
     writer.begin(scan);
     writer.write_windows(scan, 1);
@@ -151,7 +150,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       const std::vector<PointRun> point_runs = random_runs(random, points);
       const std::vector<ClusterVerdict> verdicts = random_verdicts(random);
       add(point_runs, verdicts);
-      voter.record_again(points, point_runs, verdicts, scan.windows);
+      detail::record_later_window(point_runs, verdicts, scan.windows);
     }
     const int votes = 1 + static_cast<int>(random.index(3));
     writer.begin(scan);

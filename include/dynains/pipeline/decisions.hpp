@@ -199,11 +199,10 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
     ensure_capacity(newest.windows.point_runs, runs.size());
     newest.windows.point_runs.assign(runs.begin(), runs.end());
     assign_ids(scans);
-    WindowVoter::record_first(newest.non_ground_count(), verdicts_, newest.windows);
+    record_first_window(newest.non_ground_count(), verdicts_, newest.windows);
     if (votes_ == 0) return;
     for (std::uint64_t scan = first_scan; scan < newest.scan; ++scan) {
-      voter_.record_again(scans[scan].non_ground_count(), clusters_.point_runs(scan - first_scan),
-                          verdicts_, scans[scan].windows);
+      record_later_window(clusters_.point_runs(scan - first_scan), verdicts_, scans[scan].windows);
     }
   }
 
@@ -232,7 +231,6 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
   typename Stages::Belief belief_;
   ClusterSet clusters_;
   std::vector<ClusterVerdict> verdicts_;  // by cluster of the current window
-  WindowVoter voter_;
   InstanceIds instance_ids_;
 };
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
@@ -26,8 +25,7 @@ enum class DecisionStage : std::uint8_t {
 };
 
 /// Accumulated verdicts of all windows so far, by non-ground point of one scan in the order of its
-/// split. The array of stages is longer than the number of points, because it is written in pieces
-/// of constant length.
+/// split.
 struct WindowVotes {
   std::vector<DecisionStage> stage;  ///< latest stage reached in any window
   std::vector<std::uint8_t> votes;   ///< proposed points: number of windows with verdict dynamic
@@ -64,82 +62,43 @@ inline PointVerdict point_verdict(const WindowVotes& votes, std::size_t i, int v
   return {votes.votes[i] >= votes_needed ? Cause::kProposed : Cause::kReverted, votes.belief[i]};
 }
 
-/// Converts the verdicts of windows on clusters to votes by point.
-class WindowVoter {
- public:
-  using PointRun = ClusterSet::PointRun;
+/// Verdict of the window on the cluster of a run.
+inline ClusterVerdict verdict_on(const ClusterSet::PointRun& run,
+                                 Span<const ClusterVerdict> verdicts) {
+  return run.cluster != kNoCluster ? verdicts[run.cluster] : ClusterVerdict();
+}
 
-  /// Records the window that ends with the scan. `votes.point_runs` must be set.
-  static void record_first(std::size_t point_count, Span<const ClusterVerdict> verdicts,
-                           WindowVotes& votes) {
-    resize_with_margin(votes.votes, point_count);
-    resize_with_margin(votes.belief, point_count);
-    resize_with_margin(votes.stage, point_count + kPiece);
-    spread_stages(votes.point_runs, verdicts, votes.stage.data());
-    for (const PointRun& run : votes.point_runs) {
-      const ClusterVerdict verdict = verdict_on(run, verdicts);
-      if (verdict.stage != DecisionStage::kProposed) continue;
-      const std::size_t length = run.end - run.begin;
-      std::fill_n(votes.votes.data() + run.begin, length, verdict.is_dynamic);
-      std::fill_n(votes.belief.data() + run.begin, length, verdict.belief);
-    }
+/// Records the window that ends with the scan of `point_count` points. `votes.point_runs` must be
+/// set.
+inline void record_first_window(std::size_t point_count, Span<const ClusterVerdict> verdicts,
+                                WindowVotes& votes) {
+  resize_with_margin(votes.votes, point_count);
+  resize_with_margin(votes.belief, point_count);
+  resize_with_margin(votes.stage, point_count);
+  for (const ClusterSet::PointRun& run : votes.point_runs) {
+    const ClusterVerdict verdict = verdict_on(run, verdicts);
+    const std::size_t length = run.end - run.begin;
+    std::fill_n(votes.stage.data() + run.begin, length, verdict.stage);
+    std::fill_n(votes.votes.data() + run.begin, length, verdict.is_dynamic);
+    std::fill_n(votes.belief.data() + run.begin, length, verdict.belief);
   }
+}
 
-  /// Records a later window. `point_runs`: point runs of the scan in that window.
-  void record_again(std::size_t point_count, Span<const PointRun> point_runs,
-                    Span<const ClusterVerdict> verdicts, WindowVotes& votes) {
-    for (const PointRun& run : point_runs) {
-      const ClusterVerdict verdict = verdict_on(run, verdicts);
-      if (verdict.stage == DecisionStage::kProposed) add_vote(run, verdict, votes);
-    }
-    grow(stage_in_window_, votes.stage.size());
-    spread_stages(point_runs, verdicts, stage_in_window_.data());
-    raise_stages(stage_in_window_.data(), point_count, votes.stage.data());
-  }
-
- private:
-  static constexpr std::size_t kPiece = 16;
-  using Piece = std::array<DecisionStage, kPiece>;
-
-  static ClusterVerdict verdict_on(const PointRun& run, Span<const ClusterVerdict> verdicts) {
-    return run.cluster != kNoCluster ? verdicts[run.cluster] : ClusterVerdict();
-  }
-
-  static void add_vote(const PointRun& run, const ClusterVerdict& verdict, WindowVotes& votes) {
+/// Records a later window. `point_runs`: point runs of the scan in that window.
+inline void record_later_window(Span<const ClusterSet::PointRun> point_runs,
+                                Span<const ClusterVerdict> verdicts, WindowVotes& votes) {
+  for (const ClusterSet::PointRun& run : point_runs) {
+    const ClusterVerdict verdict = verdict_on(run, verdicts);
     for (std::size_t i = run.begin; i < run.end; ++i) {
-      const bool is_first = votes.stage[i] != DecisionStage::kProposed;
-      votes.votes[i] =
-          static_cast<std::uint8_t>((is_first ? 0 : votes.votes[i]) + verdict.is_dynamic);
-      votes.belief[i] = is_first ? verdict.belief : std::max(votes.belief[i], verdict.belief);
-    }
-  }
-
-  // Writes the stage of each run's cluster to its points. Most runs are short, so they are written
-  // in pieces of kPiece stages. The next run overwrites the excess of a piece. `stage` must have
-  // room for kPiece more values.
-  static void spread_stages(Span<const PointRun> point_runs, Span<const ClusterVerdict> verdicts,
-                            DecisionStage* stage) {
-    for (const PointRun& run : point_runs) {
-      Piece piece;
-      piece.fill(verdict_on(run, verdicts).stage);
-      for (std::size_t i = run.begin; i < run.end; i += kPiece) {
-        std::memcpy(stage + i, piece.data(), sizeof(piece));
+      if (verdict.stage == DecisionStage::kProposed) {
+        const bool is_first = votes.stage[i] != DecisionStage::kProposed;
+        votes.votes[i] =
+            static_cast<std::uint8_t>((is_first ? 0 : votes.votes[i]) + verdict.is_dynamic);
+        votes.belief[i] = is_first ? verdict.belief : std::max(votes.belief[i], verdict.belief);
       }
+      votes.stage[i] = std::max(votes.stage[i], verdict.stage);
     }
   }
-
-  // Writes the later stage of each point. A piece of kPiece stages fits one vector register.
-  static void raise_stages(const DecisionStage* other, std::size_t count, DecisionStage* stage) {
-    for (std::size_t begin = 0; begin < count; begin += kPiece) {
-      Piece a, b;
-      std::memcpy(a.data(), stage + begin, kPiece);
-      std::memcpy(b.data(), other + begin, kPiece);
-      for (std::size_t k = 0; k < kPiece; ++k) a[k] = a[k] < b[k] ? b[k] : a[k];
-      std::memcpy(stage + begin, a.data(), kPiece);
-    }
-  }
-
-  std::vector<DecisionStage> stage_in_window_;  // by point of one scan in the current window
-};
+}
 
 }  // namespace dynains::detail
