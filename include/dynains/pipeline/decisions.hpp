@@ -13,6 +13,7 @@
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
+#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/pipeline/instance_ids.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/scan_window.hpp"
@@ -244,19 +245,23 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
 
   FreeSpaceDecision(const PipelineConfig<Stages>& config, Background* other)
       : evidence_(config.evidence) {
-    share_work_of_stage(evidence_, other);
+    if_offered(evidence_,
+               [&](auto& e) -> decltype(e.share_work(other)) { return e.share_work(other); });
   }
 
   std::size_t window_length() const override { return 1; }
   std::size_t latency() const override { return evidence_.lookahead_scans(); }
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
-  void reserve(std::size_t scans) override { reserve_stage(evidence_, scans); }
+  void reserve(std::size_t scans) override {
+    if_offered(evidence_, [&](auto& e) -> decltype(e.reserve(scans)) { return e.reserve(scans); });
+  }
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
-    set_time_in_stage(evidence_, newest.time);
+    const double time = newest.time;
+    if_offered(evidence_, [&](auto& e) -> decltype(e.set_time(time)) { return e.set_time(time); });
     evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
     propagate_ids(scans);
@@ -275,9 +280,18 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     writer.flag_groups(scan, verdict);
   }
 
-  std::optional<PoseResidual> pose_residual() const override { return pose_residual_of(evidence_); }
-  std::optional<EpochReason> misfit() const override { return misfit_of(evidence_); }
-  std::optional<SurfaceCounts> surfaces() const override { return surfaces_of(evidence_); }
+  std::optional<PoseResidual> pose_residual() const override {
+    return offered<std::optional<PoseResidual>>(
+        evidence_, [](const auto& e) -> decltype(e.pose_residual()) { return e.pose_residual(); });
+  }
+  std::optional<EpochReason> misfit() const override {
+    return offered<std::optional<EpochReason>>(
+        evidence_, [](const auto& e) -> decltype(e.misfit()) { return e.misfit(); });
+  }
+  std::optional<SurfaceCounts> surfaces() const override {
+    return offered<std::optional<SurfaceCounts>>(
+        evidence_, [](const auto& e) -> decltype(e.surfaces()) { return e.surfaces(); });
+  }
 
  private:
   void propagate_ids(ScanRing& scans) {

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -12,12 +11,10 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/clusters/polar_points.hpp"
 #include "dynains/config.hpp"
-#include "dynains/evidence/surface_counts.hpp"
 #include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -105,87 +102,31 @@ struct IsMap<
                            PointsView(), Span<const std::uint8_t>(), std::declval<const Pose&>())),
                        decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
-/// Whether a stage has the optional members `needs_sensor()` and `adapt(const SensorModel&)`.
-template <class Stage, class = void>
-struct HasSensorMembers : std::false_type {};
-template <class Stage>
-struct HasSensorMembers<
-    Stage,
-    std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().adapt(SensorModel()),
-                                                    std::declval<const Stage&>().needs_sensor()),
-                                           bool>>> : std::true_type {};
+/// Calls `call(stage)` if the stage has the optional member that it calls.
+template <class Stage, class Call>
+void if_offered(Stage& stage, const Call& call) {
+  if constexpr (std::is_invocable_v<const Call&, Stage&>) call(stage);
+}
+
+/// Result of `call(stage)` if the stage has the optional member that it calls; else `Result()`.
+template <class Result, class Stage, class Call>
+Result offered(const Stage& stage, const Call& call) {
+  if constexpr (std::is_invocable_v<const Call&, const Stage&>) {
+    return call(stage);
+  } else {
+    return Result();
+  }
+}
+
+/// Whether a stage wants adapt(sensor).
 template <class Stage>
 bool needs_sensor(const Stage& stage) {
-  if constexpr (HasSensorMembers<Stage>::value) {
-    return stage.needs_sensor();
-  } else {
-    return false;
-  }
+  return offered<bool>(
+      stage, [](const auto& s) -> decltype(s.needs_sensor()) { return s.needs_sensor(); });
 }
 template <class Stage>
 void adapt_stage(Stage& stage, const SensorModel& sensor) {
-  if constexpr (HasSensorMembers<Stage>::value) stage.adapt(sensor);
-}
-
-/// Calls the optional member `reserve(std::size_t scans)` of a stage: memory for `scans` scans.
-template <class Stage>
-using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
-template <class Stage>
-void reserve_stage(Stage& stage, std::size_t scans) {
-  if constexpr (Offers<Reserve, Stage>::value) stage.reserve(scans);
-}
-
-/// Calls the optional member `set_time(double time)` of a stage: the time (s) of the next scan.
-template <class Stage>
-using SetTime = decltype(std::declval<Stage&>().set_time(0.0));
-template <class Stage>
-void set_time_in_stage(Stage& stage, double time) {
-  if constexpr (Offers<SetTime, Stage>::value) stage.set_time(time);
-}
-
-/// Calls the optional member `share_work(Background* other)` of a stage: its second thread, or
-/// null.
-template <class Stage>
-using ShareWork = decltype(std::declval<Stage&>().share_work(std::declval<Background*>()));
-template <class Stage>
-void share_work_of_stage(Stage& stage, Background* other) {
-  if constexpr (Offers<ShareWork, Stage>::value) stage.share_work(other);
-}
-
-/// Result of the optional member `pose_residual()` of a stage; empty without it.
-template <class Stage>
-using HasPoseResidual = decltype(std::declval<const Stage&>().pose_residual());
-template <class Stage>
-std::optional<PoseResidual> pose_residual_of(const Stage& stage) {
-  if constexpr (Offers<HasPoseResidual, Stage>::value) {
-    return stage.pose_residual();
-  } else {
-    return std::nullopt;
-  }
-}
-
-/// Result of the optional member `misfit()` of a stage; empty without it.
-template <class Stage>
-using HasMisfit = decltype(std::declval<const Stage&>().misfit());
-template <class Stage>
-std::optional<EpochReason> misfit_of(const Stage& stage) {
-  if constexpr (Offers<HasMisfit, Stage>::value) {
-    return stage.misfit();
-  } else {
-    return std::nullopt;
-  }
-}
-
-/// Result of the optional member `surfaces()` of a stage; empty without it.
-template <class Stage>
-using HasSurfaces = decltype(std::declval<const Stage&>().surfaces());
-template <class Stage>
-std::optional<SurfaceCounts> surfaces_of(const Stage& stage) {
-  if constexpr (Offers<HasSurfaces, Stage>::value) {
-    return stage.surfaces();
-  } else {
-    return std::nullopt;
-  }
+  if_offered(stage, [&](auto& s) -> decltype(s.adapt(sensor)) { return s.adapt(sensor); });
 }
 
 }  // namespace dynains::detail
