@@ -428,28 +428,8 @@ std::vector<float> random_angles(std::size_t count, double low, double high, Ran
   return angles;
 }
 
-TEST_CASE("percentiles of angles in bands are those of the sorted angles") {
-  Random random(21);
-  AngleBands bands;
-  for (const double width : {0.01, 0.1, 2.0}) {
-    for (const std::size_t count : {1U, 2U, 1001U, 5000U}) {
-      std::vector<float> angles = random_angles(count, -180.0, count == 5000 ? 360.0 : 1.0, random);
-      std::fill_n(angles.begin(), count / 3, 0.25F);
-      std::vector<float> sorted = angles;
-      std::sort(sorted.begin(), sorted.end());
-      bands.assign(angles, width);
-      for (const double ratio : {0.0, 0.0005, 0.5, 0.9995, 1.0}) {
-        CAPTURE(width, count, ratio);
-        const auto rank = static_cast<std::size_t>(ratio * static_cast<double>(count - 1));
-        CHECK(bands.percentile(angles, ratio) == static_cast<double>(sorted[rank]));
-      }
-    }
-  }
-}
-
 TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter of the points") {
   Random random(22);
-  AngleBands bands;
   for (const std::size_t count : {1U, 600U, 20000U}) {
     const std::vector<float> across = random_angles(count, -180.0, 180.0, random);
     std::vector<float> along = random_angles(count, -180.0, 180.0, random);
@@ -469,16 +449,14 @@ TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter
         if (angles[k] - angles[k - 1] > 0.25F) expected.push_back(angles[k] - angles[k - 1]);
       }
     }
-    bands.assign(across, 0.5);
-    CHECK(bands.gaps(along, 0.25) == expected);
+    CHECK(gaps_in_bands(across, along, 0.5, 0.25) == expected);
   }
 }
 
 TEST_CASE("a gap between angles counts if it is larger than the smallest one") {
-  AngleBands bands;
-  bands.assign({1.0F, 1.0F, 1.0F}, 0.1);
-  CHECK(bands.gaps({0.5F, -180.0F, 180.0F}, 179.5) == std::vector<float>{180.5F});
-  CHECK(bands.gaps({0.5F, -180.0F, 180.0F}, 179.49) == std::vector<float>{180.5F, 179.5F});
+  const std::vector<float> across = {1.0F, 1.0F, 1.0F}, along = {0.5F, -180.0F, 180.0F};
+  CHECK(gaps_in_bands(across, along, 0.1, 179.5) == std::vector<float>{180.5F});
+  CHECK(gaps_in_bands(across, along, 0.1, 179.49) == std::vector<float>{180.5F, 179.5F});
 }
 
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {

@@ -127,9 +127,7 @@ class MountingEstimator {
   static constexpr double kBelow = 0.4;          // m; cells farther below contradict a plane
   static constexpr std::size_t kFewestCells = 60;
   static constexpr int kTrials = 3000;
-  static constexpr std::size_t kScreened = 200;  // cells that score every hypothesis
-  static constexpr std::size_t kFinalists = 40;
-  static constexpr std::size_t kScored = 2000;  // cells that score the finalists
+  static constexpr std::size_t kScored = 2000;  // cells that score a plane
 
   static bool is_near(PointsView points, std::size_t i) {
     const float x = points.x[i], y = points.y[i], z = points.z[i];
@@ -186,15 +184,8 @@ class MountingEstimator {
 
   // RANSAC: the plane with the best score among planes through three random cells.
   std::optional<GroundHypothesis> search(double side) const {
-    struct Candidate {
-      GroundHypothesis ground;
-      float score;
-      int trial;
-    };
-    const auto is_better = [](const Candidate& a, const Candidate& b) {
-      return a.score > b.score || (a.score == b.score && a.trial < b.trial);
-    };
-    std::vector<Candidate> candidates;
+    std::optional<GroundHypothesis> best;
+    float best_score = 0.0F;
     std::mt19937_64 random(2);
     for (int trial = 0; trial < kTrials; ++trial) {
       const Eigen::Vector3d& a = cells_[random() % cells_.size()];
@@ -206,24 +197,17 @@ class MountingEstimator {
       GroundHypothesis ground;
       ground.up = scaled((normal.z() * side > 0.0 ? 1.0 : -1.0) / area, normal);
       ground.height = -dot(ground.up, a);
-      if (is_possible(ground, side))
-        candidates.push_back({ground, score(ground, kScreened), trial});
+      if (!is_possible(ground, side)) continue;
+      const float found = score(ground);
+      if (found <= best_score) continue;
+      best_score = found;
+      best = ground;
     }
-    const std::size_t finalists = std::min(kFinalists, candidates.size());
-    const auto end = candidates.begin() + static_cast<std::ptrdiff_t>(finalists);
-    std::partial_sort(candidates.begin(), end, candidates.end(), is_better);
-    candidates.erase(end, candidates.end());
-    for (Candidate& candidate : candidates) candidate.score = score(candidate.ground, kScored);
-    const auto best =
-        std::max_element(candidates.begin(), candidates.end(),
-                         [](const Candidate& a, const Candidate& b) { return a.score < b.score; });
-    if (best == candidates.end() || !(best->score > 0.0F)) return std::nullopt;
-    return best->ground;
+    return best;
   }
 
-  // Score of a plane by the first `count_limit` cells: the weighted number of cells on it, minus
-  // half the number of cells below it.
-  float score(const GroundHypothesis& ground, std::size_t count_limit) const {
+  // Score of a plane: the weighted number of cells on it, minus half the number of cells below it.
+  float score(const GroundHypothesis& ground) const {
     const Float8 x(static_cast<float>(ground.up.x()));
     const Float8 y(static_cast<float>(ground.up.y()));
     const Float8 z(static_cast<float>(ground.up.z()));
@@ -233,7 +217,7 @@ class MountingEstimator {
     const Float8 below(static_cast<float>(-kBelow));
     Float8 total(0.0F);
     // Ignores the cells of the last, incomplete pack.
-    const std::size_t count = std::min(count_limit, cells_.size()) / kPackWidth * kPackWidth;
+    const std::size_t count = std::min(kScored, cells_.size()) / kPackWidth * kPackWidth;
     for (std::size_t i = 0; i < count; i += kPackWidth) {
       const Float8 distance = (x * Float8::load(&scored_.x[i]) + y * Float8::load(&scored_.y[i])) +
                               (z * Float8::load(&scored_.z[i]) + height);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/median.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -29,14 +30,6 @@ struct OwnBody {
 };
 
 namespace detail {
-
-/// The value in the middle of `values`, which it reorders and which must not be empty.
-template <class Value>
-Value middle_of(std::vector<Value>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The nearest return of each direction, scan by scan, and the nearest ground of each azimuth, as
 /// far from the sensor as a body may reach.
@@ -93,7 +86,7 @@ class NearestReturns {
   template <class Visit>
   void for_each_direction(Visit&& visit) {
     for (std::size_t d = 0; d < by_direction_.size(); ++d) {
-      if (!by_direction_[d].empty()) visit(by_direction_[d], middle_of(ground_[d / kRows]));
+      if (!by_direction_[d].empty()) visit(by_direction_[d], median(ground_[d / kRows]));
     }
   }
 
@@ -132,7 +125,7 @@ SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::si
   constexpr double kOverGround = 0.4;  // m; the height of the sensor is known to 0.3 m
   constexpr double kBehind = 0.3;      // m, behind visible ground
   constexpr float kTolerance = 0.03F;  // m, and as a ratio of the range
-  const NearestReturns::Return usual = middle_of(returns);
+  const NearestReturns::Return usual = median(returns);
   const auto distance = static_cast<double>(usual.point.head<2>().norm());
   if (distance > ground + kBehind || height(usual.point) < kOverGround) return {};
   std::size_t alike = 0;
@@ -160,7 +153,7 @@ inline Mounting usual_mounting(const std::vector<PointBuffer>& scans) {
     result.up_sensor += one.up_sensor;
   }
   if (heights.empty()) return {};
-  return {middle_of(heights), result.up_sensor.normalized(), true};
+  return {median(heights), result.up_sensor.normalized(), true};
 }
 
 /// Largest horizontal distance (m) of the returns of the body: steady ones, and less steady ones

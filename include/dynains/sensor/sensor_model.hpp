@@ -77,118 +77,48 @@ inline BeamAngles beam_angles(PointsView points) {
   return angles;
 }
 
-/// Values of an angle in bands of equal width.
-class AngleBands {
- public:
-  /// `angles`: deg, [-180, 360]. `width`: of a band, deg, at least 0.01.
-  void assign(const std::vector<float>& angles, double width) {
-    const auto band_of = [&](float angle) {
-      return static_cast<std::uint16_t>(
-          static_cast<std::int32_t>((static_cast<double>(angle) + 181.0) / width));
-    };
-    band_.resize(angles.size());
-    for (std::size_t i = 0; i < angles.size(); ++i) band_[i] = band_of(angles[i]);
-    begin_.assign(band_of(361.0F) + std::size_t{2}, 0);
-    // Consecutive angles mostly share a band, whose count waits for the last one: two counts at
-    // once.
-    const std::size_t half = band_.size() / 2;
-    for (std::size_t i = 0; i < half; ++i) {
-      ++begin_[band_[i] + std::size_t{1}];
-      ++begin_[band_[half + i] + std::size_t{1}];
-    }
-    if (band_.size() % 2 != 0) ++begin_[band_.back() + std::size_t{1}];
-    accumulate(begin_);
-  }
+/// The value above the ratio `ratio` ([0, 1]) of the other ones. `values` must not be empty.
+inline double percentile(std::vector<float> values, double ratio) {
+  const auto rank = static_cast<std::ptrdiff_t>(ratio * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return static_cast<double>(values[static_cast<std::size_t>(rank)]);
+}
 
-  /// The angle above the ratio `ratio` ([0, 1]) of the other ones. `angles`: as assigned, not
-  /// empty.
-  double percentile(const std::vector<float>& angles, double ratio) const {
-    const auto rank = static_cast<std::uint32_t>(ratio * static_cast<double>(angles.size() - 1));
-    const auto above = std::upper_bound(begin_.begin(), begin_.end(), rank) - 1;
-    std::vector<float> inside;
-    for (std::size_t i = 0; i < angles.size(); ++i) {
-      if (band_[i] == above - begin_.begin()) inside.push_back(angles[i]);
-    }
-    const auto at = inside.begin() + static_cast<std::ptrdiff_t>(rank - *above);
-    std::nth_element(inside.begin(), at, inside.end());
-    return static_cast<double>(*at);
-  }
-
-  /// Gaps (deg) larger than `smallest` (deg) between consecutive values of another angle of the
-  /// same points, `along` (deg, [-180, 180]), within each band. Valid until the next call. Skips
-  /// bands: sorts only about a quarter of the points.
-  const std::vector<float>& gaps(const std::vector<float>& along, double smallest) {
-    choose_bands();
-    sort_roughly(along);
-    for (const Point& point : rough_) sorted_[end_[point.band]++] = point.along;
-    std::size_t begin = 0, count = 0;
-    for (std::size_t band = 0; band < end_.size(); ++band) {
-      if (is_sorted_[band] == 0) continue;
-      std::sort(sorted_.data() + begin, sorted_.data() + end_[band]);
-      for (std::size_t k = begin + 1; k < end_[band]; ++k) {
-        const float gap = sorted_[k] - sorted_[k - 1];
-        sorted_[count] = gap;
-        count += static_cast<double>(gap) > smallest ? 1U : 0U;
-      }
-      begin = end_[band];
-    }
-    sorted_.resize(count);
-    return sorted_;
-  }
-
- private:
-  struct Point {
-    std::uint32_t band;
-    float along;  // deg
+/// Gaps (deg) larger than `smallest` between consecutive angles `along` of the points whose angles
+/// `across` lie in one band of `width` (deg, at least 0.01). All angles lie in [-180, 180]. Skips
+/// bands: sorts only about a quarter of the points.
+inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
+                                        const std::vector<float>& along, double width,
+                                        double smallest) {
+  constexpr std::size_t kPointsPerSorted = 4;
+  const auto band_of = [&](float angle) {
+    return static_cast<std::size_t>((static_cast<double>(angle) + 181.0) / width);
   };
-
-  static void accumulate(std::vector<std::uint32_t>& values) {
-    for (std::size_t i = 1; i < values.size(); ++i) values[i] += values[i - 1];
-  }
-
-  void choose_bands() {
-    constexpr std::uint32_t kPointsPerSorted = 4;
-    end_.resize(begin_.size() - 1);
-    is_sorted_.assign(end_.size(), 0);
-    std::uint32_t sorted = 0;
-    for (std::size_t band = 0; band < end_.size(); ++band) {
-      end_[band] = sorted;
-      if (sorted * kPointsPerSorted > begin_[band]) continue;
-      is_sorted_[band] = 1;
-      sorted += begin_[band + 1] - begin_[band];
+  std::vector<std::uint32_t> counts(band_of(181.0F) + 1, 0);  // 180 deg may be rounded up
+  for (const float angle : across) ++counts[band_of(angle)];
+  std::vector<std::vector<float>> bands(counts.size());
+  std::size_t sorted = 0, lower = 0;
+  for (std::size_t band = 0; band < bands.size(); ++band) {
+    if (kPointsPerSorted * sorted <= lower) {
+      bands[band].reserve(counts[band]);
+      sorted += counts[band];
     }
-    sorted_.resize(sorted);
+    lower += counts[band];
   }
-
-  // The points of the chosen bands, sorted by steps of the angle `along`: std::sort() is faster if
-  // its input is nearly sorted, for it can be predicted.
-  void sort_roughly(const std::vector<float>& along) {
-    chosen_.resize(sorted_.size() + 1);
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < along.size(); ++i) {
-      chosen_[count] = {band_[i], along[i]};
-      count += is_sorted_[band_[i]];
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    std::vector<float>& band = bands[band_of(across[i])];
+    if (band.capacity() > 0) band.push_back(along[i]);
+  }
+  std::vector<float> gaps;
+  for (std::vector<float>& band : bands) {
+    std::sort(band.begin(), band.end());
+    for (std::size_t k = 1; k < band.size(); ++k) {
+      const float gap = band[k] - band[k - 1];
+      if (static_cast<double>(gap) > smallest) gaps.push_back(gap);
     }
-    chosen_.resize(count);
-    constexpr std::size_t kSteps = 2048;
-    const auto step_of = [](const Point& point) {
-      return static_cast<std::size_t>((point.along + 181.0F) * (kSteps / 362.0F));
-    };
-    next_.assign(kSteps + 1, 0);
-    for (const Point& point : chosen_) ++next_[step_of(point) + 1];
-    accumulate(next_);
-    rough_.resize(count);
-    for (const Point& point : chosen_) rough_[next_[step_of(point)]++] = point;
   }
-
-  std::vector<std::uint16_t> band_;      // by point
-  std::vector<std::uint32_t> begin_;     // by band: number of points in lower bands
-  std::vector<std::uint8_t> is_sorted_;  // by band: 1 or 0
-  std::vector<std::uint32_t> end_;       // by band, in sorted_
-  std::vector<std::uint32_t> next_;      // by step, in rough_
-  std::vector<Point> chosen_, rough_;
-  std::vector<float> sorted_;
-};
+  return gaps;
+}
 
 }  // namespace detail
 
@@ -202,24 +132,19 @@ inline SensorModel estimate_sensor_model(PointsView points) {
   constexpr double kBeamBand = 0.1;    // deg, range of the elevations of one beam
   constexpr double kLeastStep = 0.01;  // deg
   constexpr double kLeastGap = 0.08;   // deg, between beams
-  constexpr double kGapBand = 0.01;    // deg
   const detail::BeamAngles angles = detail::beam_angles(points);
   SensorModel model;
   model.height = SensorModel::typical().height;
-  detail::AngleBands bands, gap_bands;
-  bands.assign(angles.elevation, kBeamBand);
-  model.elevation_min = bands.percentile(angles.elevation, 0.0005);
-  model.elevation_max = bands.percentile(angles.elevation, 0.9995);
-  const std::vector<float>& steps = bands.gaps(angles.azimuth, kLeastStep);
+  model.elevation_min = detail::percentile(angles.elevation, 0.0005);
+  model.elevation_max = detail::percentile(angles.elevation, 0.9995);
+  const std::vector<float> steps =
+      detail::gaps_in_bands(angles.elevation, angles.azimuth, kBeamBand, kLeastStep);
   if (steps.empty()) return {};
-  gap_bands.assign(steps, kGapBand);
-  model.azimuth_step = std::clamp(gap_bands.percentile(steps, 0.5), 0.05, 2.0);
-
-  bands.assign(angles.azimuth, model.azimuth_step);
-  const std::vector<float>& gaps = bands.gaps(angles.elevation, kLeastGap);
-  gap_bands.assign(gaps, kGapBand);
+  model.azimuth_step = std::clamp(detail::percentile(steps, 0.5), 0.05, 2.0);
+  const std::vector<float> gaps =
+      detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, kLeastGap);
   const auto gap_at = [&](double ratio) {
-    return gaps.empty() ? 1.0 : std::clamp(gap_bands.percentile(gaps, ratio), 0.1, 5.0);
+    return gaps.empty() ? 1.0 : std::clamp(detail::percentile(gaps, ratio), 0.1, 5.0);
   };
   model.elevation_gap = gap_at(0.3);
   model.elevation_gap_wide = gap_at(0.9);
