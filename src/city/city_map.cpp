@@ -23,7 +23,7 @@ class Candidates {
   /// Adds a point that stands in both states.
   void add_standing(std::size_t session, std::size_t i) { standing_.insert(block(session, i)); }
 
-  /// The points of clusters that are objects: larger than 0.5 m, seen standing by their own session
+  /// The points of clusters that are objects: higher than 0.4 m, seen standing by their own session
   /// all the time, and not a part of something that stands in both states.
   std::vector<CityPoint> objects() const {
     std::vector<CityPoint> result;
@@ -45,7 +45,6 @@ class Candidates {
   }
 
   bool is_object(const std::vector<std::uint32_t>& members) const {
-    constexpr float kLeastExtent = 0.5F;  // m
     constexpr float kLeastHeight = 0.4F;  // m
     constexpr std::size_t kLeastBlocks = 8;
     constexpr float kLeastHits = 3.0F;    // references of the own session, mean of the points
@@ -67,9 +66,8 @@ class Candidates {
         passed += history_.own_beams_passed(session, i) ? 1.0F : 0.0F;
       }
     }
-    return members.size() >= kLeastBlocks && box.sizes().maxCoeff() > kLeastExtent &&
-           box.sizes().z() > kLeastHeight && hits >= kLeastHits * points &&
-           passed <= kMostPassed * points &&
+    return members.size() >= kLeastBlocks && box.sizes().z() > kLeastHeight &&
+           hits >= kLeastHits * points && passed <= kMostPassed * points &&
            contacts <= kMostContact * static_cast<float>(members.size());
   }
 
@@ -154,7 +152,7 @@ void CityMap::revise(TileHistory& history, const TileIndex& tile,
   const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
   const Eigen::Vector3d middle = corner + Eigen::Vector3d(0.5 * edge, 0.5 * edge, 0.0);
   // Beyond this distance, no point of the tile is in range.
-  const double reach = TestedCells::kRange + std::sqrt(0.5) * edge;
+  const double reach = kLookRange + std::sqrt(0.5) * edge;
   for (const SessionReference& which : session.references) {
     if ((which.sensor - middle).head<2>().norm() > reach) continue;
     city_.read_reference(session, which, reference);

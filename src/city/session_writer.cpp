@@ -1,7 +1,7 @@
 #include "dynains/city/session_writer.hpp"
 
+#include <Eigen/Geometry>
 #include <filesystem>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -90,19 +90,16 @@ void SessionWriter::prepare() {
   remove_temporaries(city_);
   file_ = std::make_unique<AtomicFile>(city_.session_file(session_.name));
   SessionFileWriter writer(file_->stream());
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  session_.points = points_.size();
-  session_.lowest.setConstant(session_.points == 0 ? 0.0 : kInfinity);
-  session_.highest = -session_.lowest;
+  Eigen::AlignedBox3d box;
   points_.for_each_tile([&](const TileIndex& tile, const std::vector<SessionPoint>& points) {
-    for (const SessionPoint& point : points) {
-      const Eigen::Vector3d position = position_of(session_.grid, tile, point);
-      session_.lowest = session_.lowest.cwiseMin(position);
-      session_.highest = session_.highest.cwiseMax(position);
-    }
+    for (const SessionPoint& point : points) box.extend(position_of(session_.grid, tile, point));
     session_.tiles[tile] = writer.add(
         {reinterpret_cast<const char*>(points.data()), points.size() * sizeof(SessionPoint)});
   });
+  session_.points = points_.size();
+  if (box.isEmpty()) box.extend(Eigen::Vector3d::Zero());
+  session_.lowest = box.min();
+  session_.highest = box.max();
   for (SessionReference& reference : session_.references) {
     store_.read(reference.block.offset, reference.block.size, bytes_);
     reference.block = writer.add({reinterpret_cast<const char*>(bytes_.data()), bytes_.size()});

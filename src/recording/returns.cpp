@@ -5,16 +5,16 @@
 #include <cmath>
 #include <cstring>
 
+#include "dynains/recording/world_cells.hpp"
+
 namespace dynains {
 namespace {
 
 constexpr double kKeyWay = 2.0;         // m, between two key scans
-constexpr double kLookReach = 60.0;     // m, between two sensors: that of looks at places
 constexpr double kNearby = 8.0;         // m, between two sensors that see the same surfaces
 constexpr double kLeastInliers = 0.6;   // share of points
 constexpr double kMostMovement = 0.05;  // m, of points 10 m away, of scans that fit
 constexpr double kMapDeviation = 0.03;  // m, of the earlier poses around, at 10 m
-constexpr float kFarthest = 60.0F;      // m, of points that count
 constexpr float kStoredStep = 0.002F;   // m, of stored coordinates
 constexpr std::size_t kMostPoints = 12000;
 constexpr std::size_t kMostScans = 16;
@@ -40,7 +40,8 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
   for (std::size_t i = 0; i < points.size(); i += stride) {
     const float x = points.x[i], y = points.y[i], z = points.z[i];
     if (!is_static(verdicts[i])) continue;
-    if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > kFarthest) continue;
+    if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > static_cast<float>(kLookRange))
+      continue;
     kept_.points.push_back(x, y, z);
     const auto steps = [](float metres) {
       return static_cast<std::int16_t>(std::lround(metres / kStoredStep));
@@ -136,7 +137,7 @@ void Returns::choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor) {
   near_.clear();
   for (const KeyScan& key : keys_) {
     const bool is_old = key.scan + compared_ < scans_;
-    if (key.visit == visit && is_old && distance(&key) < kLookReach) near_.push_back(&key);
+    if (key.visit == visit && is_old && distance(&key) < kLookRange) near_.push_back(&key);
   }
   std::stable_sort(near_.begin(), near_.end(),
                    [&](const KeyScan* a, const KeyScan* b) { return distance(a) < distance(b); });

@@ -11,7 +11,6 @@
 
 #include "dynains/belief/log_odds.hpp"
 #include "dynains/city/session.hpp"
-#include "dynains/points.hpp"
 #include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/simd/bits.hpp"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/recording/world_cells.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
@@ -38,8 +39,6 @@ struct CellSamples {
 
 /// Cells whose samples a reference tests.
 struct TestedCells {
-  static constexpr double kRange = 60.0;  ///< m, horizontal, from the sensor
-
   std::vector<std::uint32_t> cells;  ///< their numbers
   std::vector<std::uint32_t> begin;  ///< by cell: first sample, and the end
   PointBuffer samples;               ///< m, relative to the sensor; padded for packs
@@ -52,7 +51,7 @@ struct TestedCells {
   /// m.
   void add(std::uint32_t number, const CellSamples& cell, const Eigen::Vector3d& corner,
            double edge) {
-    if (corner.head<2>().squaredNorm() > kRange * kRange) return;
+    if (corner.head<2>().squaredNorm() > kLookRange * kLookRange) return;
     std::uint32_t count = begin.back();
     samples.grow(count + cell.samples.size() + detail::kPackWidth);
     for (std::size_t i = 0; i < cell.count; ++i, ++count) {

@@ -23,22 +23,23 @@ class RecordingGround {
 
   /// Adds the ground points of a scan (m, sensor frame).
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
+    Column* sum = nullptr;
+    VoxelKey column = 0;  // of the point before
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (verdicts[i] != PointLabel::kGround) continue;
       const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
-      const VoxelKey column = column_at(point);
-      Tile& tile = tiles_.at(tile_of(column));
-      Column& sum = tile.values[tile.add(column)];
-      sum.mean += (point.z() - sum.mean) / static_cast<double>(++sum.count);
+      if (const VoxelKey next = column_at(point); sum == nullptr || next != column) {
+        column = next;
+        Tile& tile = tiles_.at(tile_of(column));
+        sum = &tile.values[tile.add(column)];
+      }
+      sum->mean += (point.z() - sum->mean) / static_cast<double>(++sum->count);
     }
     free_far(T_world_sensor.translation());
   }
 
   /// Keeps to the budget, while points around a sensor (m, world frame) are asked for.
-  void free_far(const Eigen::Vector3d& sensor) {
-    constexpr double kNear = 60.0;  // m
-    tiles_.free_far(sensor, kNear);
-  }
+  void free_far(const Eigen::Vector3d& sensor) { tiles_.free_far(sensor, kLookRange); }
 
   /// Puts all columns into the store.
   void rest() { tiles_.rest(); }

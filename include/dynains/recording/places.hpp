@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "dynains/belief/log_odds.hpp"
@@ -78,8 +77,7 @@ class RecordingPlaces {
       }
       if (!is_removed) place->kept.add(scan);
       // The first verdicts on points that are too far for looks say little of their place.
-      const bool is_near =
-          std::hypot(points.x[i], points.y[i]) <= static_cast<float>(TestedCells::kRange);
+      const bool is_near = std::hypot(points.x[i], points.y[i]) <= static_cast<float>(kLookRange);
       if (is_near) place->first.add(is_removed, epoch_, scan);
       place->samples.add((point - corner_of(cell)) / kWorldCell);
     }
@@ -99,8 +97,7 @@ class RecordingPlaces {
     around_.clear();
     next_around_ = 0;
     tiles_.for_each_index([&](const TileIndex& index) {
-      if (tiles_.distance(index, sensor) <= TestedCells::kRange)
-        around_.push_back(&tiles_.at(index));
+      if (tiles_.distance(index, sensor) <= kLookRange) around_.push_back(&tiles_.at(index));
     });
   }
 
@@ -203,9 +200,7 @@ class RecordingPlaces {
   };
 
   // Places of the open look stay in memory.
-  void free_far(const Eigen::Vector3d& sensor) {
-    tiles_.free_far(sensor, TestedCells::kRange + kLookWay);
-  }
+  void free_far(const Eigen::Vector3d& sensor) { tiles_.free_far(sensor, kLookRange + kLookWay); }
 
   // Adds the open look to the states of the places that it saw.
   void end_look() {

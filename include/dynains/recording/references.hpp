@@ -2,14 +2,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
-#include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
