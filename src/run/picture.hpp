@@ -35,9 +35,6 @@ class Picture {
     return {bytes[0], bytes[1], bytes[2]};
   }
 
-  /// Red, green and blue of the `width()` pixels of a row.
-  const std::uint8_t* row(int y) const { return bytes_.data() + index(0, y); }
-
   /// Writes a PNG file, whole or not at all. Throws IoError.
   void write_png(const std::filesystem::path& path) const;
 
