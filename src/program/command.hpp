@@ -16,6 +16,8 @@ void add_fleet_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_simulate_command(CLI::App& app);
+void add_eval_command(CLI::App& app);
+void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 
 /// Exit codes; an interrupted run exits with 128 + the number of the signal.

@@ -1,11 +1,10 @@
-#include "eval.hpp"
-
 #include <iostream>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/evaluation/report.hpp"
@@ -13,10 +12,10 @@
 #include "evaluation_options.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/finished_run.hpp"
 #include "run/input_files.hpp"
 #include "run/labelled_sequence.hpp"
 #include "run/output_folder.hpp"
+#include "run/write_view.hpp"
 
 namespace dynains::program {
 namespace {
@@ -43,8 +42,7 @@ void check_targets(const EvalOptions& options, const Recording& recording) {
       whole_path(options.json) == whole_path(options.csv)) {
     throw ConfigError("--json and --csv name one file: " + options.json);
   }
-  InputFiles inputs;
-  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
+  InputFiles inputs(recording);
   for (const std::string& map : options.maps) inputs.add(map);
   for (const std::filesystem::path run : options.runs) {
     inputs.add(run / "report.json");

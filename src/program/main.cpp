@@ -11,8 +11,6 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
-#include "eval.hpp"
-#include "experiment.hpp"
 #include "help_formatter.hpp"
 #include "odometry_command.hpp"
 #include "run/interrupt.hpp"

@@ -12,8 +12,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
-#include "program/eval.hpp"
-#include "program/experiment.hpp"
+#include "program/command.hpp"
 #include "program/variants.hpp"
 #include "run/labelled_sequence.hpp"
 #include "sequences.hpp"
@@ -109,7 +108,7 @@ TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
   fs::remove(run / "report.json");
   fs::create_directory(run / "report.json");
   CHECK_THROWS_WITH(call({"eval", sequence, run.string()}),
-                    ContainsSubstring("report.json: is a folder; expected a JSON file"));
+                    ContainsSubstring("report.json: cannot be read: is a folder; expected a file"));
 }
 
 TEST_CASE("eval scores a run beside identity and oracle") {
