@@ -35,42 +35,29 @@ std::string describe_rate(std::size_t done, std::size_t total, double seconds,
 Progress::Progress(std::size_t total, std::string unit, bool quiet)
     : total_(total),
       unit_(std::move(unit)),
-      style_(quiet                          ? Style::kNone
-             : ::isatty(STDERR_FILENO) == 1 ? Style::kBar
-                                            : Style::kLines) {}
+      is_quiet_(quiet),
+      is_terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
-  if (drawn_) std::clog << std::endl;
+  if (is_terminal_ && is_shown_) std::clog << std::endl;
 }
 
 void Progress::update(std::size_t done) {
-  if (style_ == Style::kBar) draw_bar(done);
-  if (style_ != Style::kLines || total_ == 0) return;
-  const std::size_t tenths = done * 10 / total_;
-  if (tenths == tenths_) return;
-  tenths_ = tenths;
-  std::cerr << state(done) << std::endl;
-}
-
-void Progress::draw_bar(std::size_t done) {
-  using std::chrono::steady_clock;
-  constexpr auto kPeriod = std::chrono::milliseconds(100);
-  const auto now = steady_clock::now();
-  if (drawn_ && done != total_ && now - last_ < kPeriod) return;
-  last_ = now;
-  drawn_ = true;
-  constexpr std::size_t kBarWidth = 30;
-  constexpr const char* kClearLine = "\x1b[K";  // the text may be shorter than the one before
-  const std::size_t filled = total_ == 0 ? kBarWidth : done * kBarWidth / total_;
-  // The bar needs carriage returns, which the filter of std::cerr escapes.
-  std::clog << "\r[" << std::string(filled, '#') << std::string(kBarWidth - filled, ' ') << "] "
-            << state(done) << kClearLine << std::flush;
-}
-
-std::string Progress::state(std::size_t done) const {
+  if (is_quiet_ || total_ == 0) return;
+  const std::size_t part = done * (is_terminal_ ? 1000 : 10) / total_;
+  if (part == part_) return;
+  part_ = part;
+  is_shown_ = true;
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
-  return std::to_string(done) + " of " + std::to_string(total_) + ' ' + unit_ +
-         describe_rate(done, total_, elapsed.count(), unit_);
+  const std::string state = std::to_string(done) + " of " + std::to_string(total_) + ' ' + unit_ +
+                            describe_rate(done, total_, elapsed.count(), unit_);
+  if (is_terminal_) {
+    constexpr const char* kClearLine = "\x1b[K";  // the text may be shorter than the one before
+    // The filter of std::cerr escapes carriage returns.
+    std::clog << '\r' << state << kClearLine << std::flush;
+  } else {
+    std::cerr << state << std::endl;
+  }
 }
 
 }  // namespace dynains::program

@@ -15,8 +15,8 @@ void print_warning(const std::string& text);
 std::string describe_rate(std::size_t done, std::size_t total, double seconds,
                           const std::string& unit);
 
-/// On standard error: a bar if it is a terminal, else a plain line for each tenth of the work; with
-/// the rate since the start, and the remaining time at that rate.
+/// On standard error: a line that is written again and again if it is a terminal, else one for each
+/// tenth of the work; with the rate since the start, and the remaining time at that rate.
 class Progress {
  public:
   /// `unit`: name of the counted items, for example "scans".
@@ -28,17 +28,13 @@ class Progress {
   void update(std::size_t done);
 
  private:
-  enum class Style { kNone, kBar, kLines };
-  void draw_bar(std::size_t done);
-  std::string state(std::size_t done) const;
-
   std::size_t total_;
   std::string unit_;
-  Style style_;
+  bool is_quiet_;
+  bool is_terminal_;
+  bool is_shown_ = false;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::size_t tenths_ = 0;
-  bool drawn_ = false;
-  std::chrono::steady_clock::time_point last_;
+  std::size_t part_ = 0;
 };
 
 }  // namespace dynains::program
