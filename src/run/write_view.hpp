@@ -1,4 +1,4 @@
-// The page that shows the results of a run, written into their folder.
+// Finished results of a run, and the page that shows them, written into their folder.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +13,10 @@ namespace dynains::program {
 
 /// Points on a page: for 1 million, it has some 10 MB.
 inline constexpr std::size_t kDefaultViewPoints = 1000000;
+
+/// Throws IoError if report.json in `folder` is a report of `dynains run` that is not complete, or
+/// cannot be read as JSON. Folders of other tools, and folders without report.json, pass.
+void check_run_is_finished(const std::filesystem::path& folder);
 
 /// The complete results of a run. Throws IoError, and UsageError if another command uses the
 /// folder.

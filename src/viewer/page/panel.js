@@ -1,5 +1,8 @@
 // Texts: the card of a point, the filter by cause, the legend.
 
+const count = (number) => number.toLocaleString('en-US');
+const element = (id) => document.getElementById(id);
+
 const CAUSE_COLOURS = [
   [0.40, 0.42, 0.46], [0.55, 0.47, 0.38], [0.45, 0.62, 0.80], [0.30, 0.75, 0.70],
   [0.50, 0.50, 0.62], [0.60, 0.56, 0.70], [0.33, 0.35, 0.40], [0.95, 0.35, 0.65],

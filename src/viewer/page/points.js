@@ -56,9 +56,12 @@ function pointAt(points, i) {
   };
 }
 
+// What most heights lie between; at least 1 m apart.
 function heightRange(points) {
   const heights = [];
   const step = Math.max(1, Math.floor(points.total / 20000));
   for (let i = 0; i < points.total; i += step) heights.push(pointAt(points, i).local[2]);
-  return rangeOf(heights);
+  heights.sort((a, b) => a - b);
+  const at = (share) => heights[Math.floor(share * (heights.length - 1))] ?? 0;
+  return [at(0.02), Math.max(at(0.98), at(0.02) + 1)];
 }

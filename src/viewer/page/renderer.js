@@ -29,7 +29,14 @@ class Renderer {
     this.screen.begin();
     gl.useProgram(program);
     gl.bindVertexArray(this.array);
-    this.screen.setView(u, view, state);
+    const metresAtOne = 2 * Math.tan(FIELD_OF_VIEW / 2) * (view.isFlat ? state.camera.distance : 1);
+    gl.uniformMatrix4fv(u.matrix, false, view.matrix);
+    gl.uniform1f(u.point_size, 0.1 * state.size);
+    gl.uniform1f(u.pixels, canvas.height / metresAtOne);
+    gl.uniform1f(u.least_size, state.size * (window.devicePixelRatio || 1));
+    gl.uniform1i(u.is_flat, view.isFlat);
+    gl.uniform1i(u.colour_mode, state.colour);
+    gl.uniform2fv(u.heights, state.heights);
     gl.uniform1f(u.unit, points.unit);
     gl.uniform1f(u.split, 2 * state.split - 1);
     gl.uniform1i(u.current_scan, state.allScans ? -1 : state.scan);

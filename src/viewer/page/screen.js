@@ -115,19 +115,6 @@ class Screen {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  // Uniforms that all programs of points have.
-  setView(u, view, state) {
-    const {gl, canvas} = this;
-    gl.uniformMatrix4fv(u.matrix, false, view.matrix);
-    gl.uniform1f(u.point_size, 0.1 * state.size);
-    const metresAtOne = 2 * Math.tan(FIELD_OF_VIEW / 2) * (view.isFlat ? state.camera.distance : 1);
-    gl.uniform1f(u.pixels, canvas.height / metresAtOne);
-    gl.uniform1f(u.least_size, state.size * (window.devicePixelRatio || 1));
-    gl.uniform1i(u.is_flat, view.isFlat);
-    gl.uniform1i(u.colour_mode, state.colour);
-    gl.uniform2fv(u.heights, state.heights);
-  }
-
   // Eye-dome lighting onto the canvas.
   shade(view, strength) {
     const {gl} = this;

@@ -6,6 +6,12 @@ precision highp int;
 layout(location = 0) in uvec4 position_instance;
 layout(location = 1) in uint scan;
 layout(location = 2) in uvec4 bytes;  // intensity, belief, cause, label + 4 * truth
+uniform mat4 matrix;
+uniform vec3 origin;
+uniform float point_size;  // m, about
+uniform float pixels;      // per metre at distance 1
+uniform float least_size;  // pixels
+uniform bool is_flat;
 uniform float unit;
 uniform float split;         // border between before and after, from -1 to 1
 uniform bool is_moving_layer;
@@ -17,8 +23,25 @@ uniform vec3 cause_colours[19];
 uniform bool is_picking;
 flat out vec4 colour;
 
-${PLACE}
-${COLOURS}
+// The size falls with the distance.
+void place(vec3 local) {
+  gl_Position = matrix * vec4(local, 1.0);
+  float depth = is_flat ? 1.0 : gl_Position.w;
+  gl_PointSize = clamp(point_size * pixels / depth, least_size, 24.0);
+}
+
+// From 0 to 1.
+vec3 ramp(float t) {
+  t = clamp(t, 0.0, 1.0);
+  vec3 low = mix(vec3(0.16, 0.23, 0.55), vec3(0.14, 0.62, 0.62), smoothstep(0.0, 0.4, t));
+  vec3 high = mix(vec3(0.55, 0.78, 0.35), vec3(0.98, 0.86, 0.30), smoothstep(0.6, 1.0, t));
+  return mix(low, high, smoothstep(0.25, 0.75, t));
+}
+
+vec3 hue(float h) {
+  vec3 k = abs(fract(h + vec3(0.0, 0.667, 0.333)) * 6.0 - 3.0) - 1.0;
+  return mix(vec3(1.0), clamp(k, 0.0, 1.0), 0.75);
+}
 
 vec3 colour_of(float height) {
   uint instance = position_instance.w;
