@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -12,7 +10,6 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/city_map.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "run/map_file.hpp"
 #include "run/output_folder.hpp"
@@ -30,12 +27,32 @@ struct MapOptions {
   bool force = false;
 };
 
-/// Throws ConfigError if `name` lies in the map.
-void check_is_outside(const fs::path& city, const std::string& name) {
-  const fs::path inner = fs::relative(whole_path(name), whole_path(city));
+/// Where points of a city go. Throws ConfigError for a place in the map.
+fs::path target_of(const fs::path& city, const std::string& name) {
+  const fs::path path = whole_path(name);
+  if (!is_map_name(name) || !is_map_name(path)) {
+    throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
+  }
+  const fs::path inner = fs::relative(path, whole_path(city));
   if (!inner.empty() && *inner.begin() != "..") {
     throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
   }
+  return path;
+}
+
+MapFileOptions file_options(const CityMap& map) {
+  double most = 0.0;
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
+  for (const SessionInfo& session : map.sessions()) {
+    most = std::max(
+        {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
+    lowest = session.lowest;
+  }
+  MapFileOptions options;
+  options.las = las_options_near(lowest);
+  options.columns.label = options.columns.time = options.columns.session = true;
+  options.columns.double_xyz = most > kFloatCoordinateLimit;
+  return options;
 }
 
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
@@ -44,62 +61,29 @@ class CityPointFile {
  public:
   /// Throws ConfigError, IoError.
   CityPointFile(const CityMap& map, const fs::path& city, const std::string& name, bool force)
-      : map_(map) {
-    const fs::path path = whole_path(name);
-    if (!is_map_name(name) || !is_map_name(path)) {
-      throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
-    }
-    check_is_outside(city, name);
-    output_.emplace(path, force, InputFiles());
-    double most = 0.0;
-    Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
-    for (const SessionInfo& session : map.sessions()) {
-      most = std::max(
-          {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
-      lowest = session.lowest;
-    }
-    if (is_las(path)) {
-      las_ = std::make_unique<LasWriter>(output_->path(), las_options_near(lowest));
-      return;
-    }
-    PointColumns columns;
-    columns.label = columns.time = columns.session = true;
-    columns.double_xyz = most > kFloatCoordinateLimit;
-    points_ = std::make_unique<PointFileWriter>(output_->path(), columns);
-  }
+      : map_(map),
+        output_(target_of(city, name), force, InputFiles()),
+        file_(MapFile::open(output_.path(), file_options(map))) {}
 
   void add(const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
-    ++size_;
-    if (las_) {
-      LasPoint las;
-      las.position = position;
-      las.time = map_.sessions()[session].begin;
-      las.instance = point.label;
-      if (point.is_ground != 0) las.classification = LasClass::kGround;
-      las_->add(las);
-      return;
-    }
-    FilePoint file_point;
-    file_point.position = position;
-    file_point.label = point.label;
-    file_point.time = map_.sessions()[session].begin;
-    file_point.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-    points_->add(file_point);
+    MapAttributes attributes;
+    attributes.time = attributes.scan_time = map_.sessions()[session].begin;
+    attributes.label = attributes.instance = point.label;
+    attributes.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+    attributes.is_ground = point.is_ground != 0;
+    file_->add(position, attributes);
   }
 
-  std::size_t size() const { return size_; }
+  std::size_t size() const { return file_->size(); }
   void commit() {
-    if (las_) las_->commit();
-    if (points_) points_->commit();
-    output_->put_in_place();
+    file_->commit();
+    output_.put_in_place();
   }
 
  private:
   const CityMap& map_;
-  std::optional<OutputFile> output_;
-  std::unique_ptr<LasWriter> las_;
-  std::unique_ptr<PointFileWriter> points_;
-  std::size_t size_ = 0;
+  OutputFile output_;
+  std::unique_ptr<MapFile> file_;
 };
 
 void list(const MapOptions& options) {

@@ -19,6 +19,7 @@ struct MapAttributes {
   float belief = 0.0F;
   std::uint32_t label = 0;  ///< of the recording
   std::uint32_t instance = 0;
+  std::uint16_t session = 0;  ///< of a map of many sessions
   Cause cause{};
   bool is_ground = false;
 };

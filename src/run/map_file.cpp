@@ -19,6 +19,7 @@ class PointMapFile final : public MapFile {
     point.intensity = attributes.intensity;
     point.label = attributes.label;
     point.time = attributes.time;
+    point.session = attributes.session;
     writer_.add(point);
   }
   std::size_t size() const override { return writer_.size(); }
