@@ -2,28 +2,18 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <iomanip>
-#include <locale>
-#include <sstream>
 #include <vector>
 
+#include "dynains/evaluation/text_table.hpp"
 #include "io/finite_points.hpp"
 
 namespace dynains::program {
 namespace {
 
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
-
-std::ostringstream plain_text() {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::fixed;
-  return text;
-}
 
 /// Whether nearly all coordinates of an axis in the frame `file` lie multiples of `step` (m) apart.
 bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::Index axis,
@@ -96,13 +86,12 @@ std::optional<Eigen::Vector3d> common_normal(const Recording& recording) {
 std::optional<std::string> remark_on_tilt(const Recording& recording) {
   const auto up = common_normal(recording);
   if (!up) return std::nullopt;
-  const auto rounded = [](double radians) { return std::round(kDegrees * radians) + 0.0; };
-  std::ostringstream text = plain_text();
-  text << std::setprecision(0) << "the sensor seems to be tilted by "
-       << rounded(std::acos(std::clamp(up->z(), -1.0, 1.0))) << " deg: pass --mounting-pitch "
-       << rounded(std::asin(std::clamp(-up->x(), -1.0, 1.0))) << " --mounting-roll "
-       << rounded(std::atan2(up->y(), up->z()));
-  return text.str();
+  const auto degrees = [](double radians) {
+    return std::to_string(std::lround(kDegrees * radians));
+  };
+  return "the sensor seems to be tilted by " + degrees(std::acos(std::clamp(up->z(), -1.0, 1.0))) +
+         " deg: pass --mounting-pitch " + degrees(std::asin(std::clamp(-up->x(), -1.0, 1.0))) +
+         " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
 }
 
 /// A remark if the points of a scan lie on a grid of 5 cm or more.
@@ -112,10 +101,8 @@ std::optional<std::string> remark_on_grid(const RecordedScan& scan, const Pose& 
         !are_multiples(scan, T_file_sensor, 1, step)) {
       continue;
     }
-    std::ostringstream text = plain_text();
-    text << std::setprecision(2) << "points lie on a grid of " << step
-         << " m, as after a voxel filter or a coarse conversion: record the clouds before it";
-    return text.str();
+    return "points lie on a grid of " + evaluation::format_number(step, 2) +
+           " m, as after a voxel filter or a coarse conversion: record the clouds before it";
   }
   return std::nullopt;
 }
@@ -148,12 +135,10 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
     far = std::max(far, place);
   }
   if (widest == 0.0) return remark_on_grid(scan, T_world_sensor);
-  std::ostringstream text = plain_text();
-  text << "points were stored as float32 " << std::setprecision(0) << far
-       << " m from the origin of the world, and lie in stripes of " << std::setprecision(2)
-       << widest
-       << " m: store float64, or subtract an offset from points and poses before they are stored";
-  return text.str();
+  return "points were stored as float32 " + evaluation::format_number(far, 0) +
+         " m from the origin of the world, and lie in stripes of " +
+         evaluation::format_number(widest, 2) +
+         " m: store float64, or subtract an offset from points and poses before they are stored";
 }
 
 std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {

@@ -1,28 +1,23 @@
 #include "recording_check.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <iomanip>
 #include <optional>
 #include <sstream>
 #include <string>
-#include <system_error>
-#include <vector>
 
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "lone_scans.hpp"
+#include "dynains/evaluation/text_table.hpp"
 #include "pose_advice.hpp"
+#include "start_check.hpp"
 
 namespace dynains::program {
 namespace {
 
 std::string fixed(double value, int digits, const char* unit = "") {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value << unit;
-  return text.str();
+  return evaluation::format_number(value, digits) + unit;
 }
 
 void add_line(std::ostream& text, const std::string& what, const std::string& value) {
@@ -129,7 +124,7 @@ RecordingCheck check_recording(const Recording& recording) {
   check.findings = describe(recording, check.diagnosis);
   std::optional<std::string> lone;
   if (recording.size() > 1) {
-    lone = remark_on_lone_scans(recording, 0, recording.size() - 1, RemoverConfig());
+    lone = remark_on_lone_scans(recording, {0, recording.size() - 1}, RemoverConfig());
   }
   check.passed = sound && !lone;
   if (!lone || !sound) check.advice = advice(recording, check.diagnosis) + '\n';

@@ -1,9 +1,16 @@
 #include "start_check.hpp"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "cloud_remarks.hpp"
-#include "lone_scans.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/evaluation/text_table.hpp"
 #include "pose_advice.hpp"
 
 namespace dynains::program {
@@ -23,7 +30,66 @@ void check_poses(const Recording& recording, bool accepts_poses, StartCheck& res
   }
 }
 
+/// Ranges in the x-y plane of the points with a return.
+void add_ranges(const RecordedScan& scan, std::vector<double>& ranges) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const float* p = scan.xyzi.data() + 4 * i;
+    const double range = std::hypot(p[0], p[1]);
+    if (std::isfinite(range) && std::isfinite(p[2]) && range > 0.0) ranges.push_back(range);
+  }
+}
+
 }  // namespace
+
+void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
+                  bool unit_is_given) {
+  constexpr double kFarthestReturn = 250.0;  // m, of most points of a LiDAR
+  std::vector<double> ranges;
+  for (const std::size_t i : {range.first, range.first + range.size() / 2, range.last}) {
+    add_ranges(recording.read_scan(i), ranges);
+  }
+  if (ranges.empty()) return;
+  std::sort(ranges.begin(), ranges.end());
+  const auto count_within = [&](double most) {
+    return static_cast<double>(std::upper_bound(ranges.begin(), ranges.end(), most) -
+                               ranges.begin());
+  };
+  const auto count = static_cast<double>(ranges.size());
+  const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
+  const bool is_far = !unit_is_given && count_within(kFarthestReturn) < 0.1 * count;
+  if (judged >= 0.01 && !is_far) return;
+  const auto number = [](double value) { return evaluation::format_number(value, 1); };
+  throw ConfigError(
+      recording.folder().string() + ": " + number(100.0 * judged) +
+      " % of the points can be judged, those from " + number(config.min_range) +
+      " m (--min-range) to " + number(config.max_range) +
+      " m (--max-range) from the sensor; half of the points are beyond " +
+      number(ranges[ranges.size() / 2]) +
+      " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units cm; "
+      "in "
+      "the frame of the world: --frame world; else --point-units m runs unless nothing can be "
+      "judged");
+}
+
+std::optional<std::string> remark_on_lone_scans(const Recording& recording, const ScanRange& range,
+                                                const RemoverConfig& config) {
+  const auto [first, last] = range;
+  if (first == last) {
+    return "one scan alone is compared with no other, and nothing is removed from it";
+  }
+  std::size_t breaks = 0;
+  for (std::size_t i = first + 1; i <= last; ++i) {
+    const Eigen::Vector3d step =
+        recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation();
+    const double pause = recording.time(i) - recording.time(i - 1);
+    breaks += config.starts_epoch(pause, step.norm()) ? 1 : 0;
+  }
+  if (2 * breaks <= last - first) return std::nullopt;
+  return std::to_string(breaks) + " of " + std::to_string(last - first + 1) +
+         " scans come so long after the one before, or so far from it, that they are not compared, "
+         "and nothing is removed from scans that stand alone; are times in seconds and poses in "
+         "metres? If so, see --max-gap and --max-speed";
+}
 
 StartCheck check_start(const Recording& recording, const ScanRange& range,
                        const RemoverConfig& config, bool accepts_poses) {
@@ -36,7 +102,7 @@ StartCheck check_start(const Recording& recording, const ScanRange& range,
   const auto warn_if = [&](const std::optional<std::string>& remark) {
     if (remark) result.warnings.push_back(*remark);
   };
-  warn_if(remark_on_lone_scans(recording, range.first, range.last, config));
+  warn_if(remark_on_lone_scans(recording, range, config));
   warn_if(remark_on_stripes(recording));
   warn_if(remark_on_copies(recording, range));
   if (config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0) {

@@ -1,6 +1,7 @@
 // The judgement of poses and clouds before the first scan of a run.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,17 @@
 #include "scan_range.hpp"
 
 namespace dynains::program {
+
+/// Reads a few scans. Throws ConfigError if less than 1 % of their points are within `min_range`
+/// and `max_range`, or, unless `unit_is_given`, if more than 90 % are farther than any LiDAR sees:
+/// their coordinates are not in metres.
+void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
+                  bool unit_is_given);
+
+/// A remark for the user if most of the scans begin a new window,
+/// because the time or distance from the scan before is too large, or if there is only one.
+std::optional<std::string> remark_on_lone_scans(const Recording& recording, const ScanRange& range,
+                                                const RemoverConfig& config);
 
 struct StartCheck {
   Agreement agreement;  ///< of a sample of scans; of no points if poses are not judged

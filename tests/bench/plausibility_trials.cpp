@@ -26,7 +26,6 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
-#include "run/range_check.hpp"
 #include "run/start_check.hpp"
 #include "support/simulated_runs.hpp"
 
