@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 #include "dynains/errors.hpp"
 
@@ -24,24 +25,22 @@ std::string to_text(const nlohmann::ordered_json& json);
 
 /// The field of `json` that `pointer` ("/static_map/file") names; nothing if there is none or if it
 /// is null. Throws IoError with path, pointer and expected type for a value of another type. T is
-/// bool, std::uint64_t, double or std::string. `path` is the file that `json` was read from.
+/// bool, double or std::string. `path` is the file that `json` was read from.
 template <class T>
 std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
-                            const std::string& pointer);
-template <>
-std::optional<bool> json_field(const std::filesystem::path& path,
-                               const nlohmann::ordered_json& json, const std::string& pointer);
-template <>
-std::optional<std::uint64_t> json_field(const std::filesystem::path& path,
-                                        const nlohmann::ordered_json& json,
-                                        const std::string& pointer);
-template <>
-std::optional<double> json_field(const std::filesystem::path& path,
-                                 const nlohmann::ordered_json& json, const std::string& pointer);
-template <>
-std::optional<std::string> json_field(const std::filesystem::path& path,
-                                      const nlohmann::ordered_json& json,
-                                      const std::string& pointer);
+                            const std::string& pointer) {
+  const nlohmann::ordered_json::json_pointer where(pointer);
+  if (!json.contains(where) || json[where].is_null()) return std::nullopt;
+  const nlohmann::ordered_json& value = json[where];
+  constexpr bool kIsBool = std::is_same_v<T, bool>, kIsNumber = std::is_same_v<T, double>;
+  const bool fits = kIsBool     ? value.is_boolean()
+                    : kIsNumber ? value.is_number()
+                                : value.is_string();
+  if (fits) return value.get<T>();
+  const char* const expected = kIsBool ? "true or false" : kIsNumber ? "a number" : "a string";
+  throw IoError(path.string() + ": " + pointer + ": expected " + expected + ", found " +
+                value.type_name());
+}
 
 /// A field that must exist; see json_field.
 template <class T>

@@ -1,7 +1,6 @@
 #include "parameter_values.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdint>
 #include <limits>
 #include <locale>
@@ -13,25 +12,6 @@
 namespace dynains::program {
 namespace {
 
-template <class Integer>
-std::optional<Integer> parse_integer(const std::string& text) {
-  Integer value = 0;
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (text.empty() || error != std::errc{} || stop != end) return std::nullopt;
-  return value;
-}
-
-template <class Real>
-std::optional<Real> parse_real(const std::string& text) {
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  Real value = 0;
-  if (!(stream >> std::noskipws >> value)) return std::nullopt;
-  if (stream.peek() != std::istringstream::traits_type::eof()) return std::nullopt;
-  return value;
-}
-
 template <class Real>
 std::string format_real(Real value) {
   for (int digits = 6;; ++digits) {
@@ -40,7 +20,7 @@ std::string format_real(Real value) {
     text.precision(digits);
     text << value;
     const bool exact = digits >= std::numeric_limits<Real>::max_digits10;
-    if (exact || parse_real<Real>(text.str()) == value) return text.str();
+    if (exact || parse_value<Real>(text.str()) == value) return text.str();
   }
 }
 
@@ -58,35 +38,12 @@ std::string flag_name(std::string parameter_name) {
   return parameter_name;
 }
 
-template <>
-std::optional<bool> parse_value(const std::string& text) {
-  if (text == "true" || text == "on" || text == "1") return true;
-  if (text == "false" || text == "off" || text == "0") return false;
-  return std::nullopt;
-}
-template <>
-std::optional<int> parse_value(const std::string& text) {
-  return parse_integer<int>(text);
-}
-template <>
-std::optional<std::uint64_t> parse_value(const std::string& text) {
-  return parse_integer<std::uint64_t>(text);
-}
-template <>
-std::optional<float> parse_value(const std::string& text) {
-  return parse_real<float>(text);
-}
-template <>
-std::optional<double> parse_value(const std::string& text) {
-  return parse_real<double>(text);
-}
-
 std::string format_value(double value) { return format_real(value); }
 std::string format_value(float value) { return format_real(value); }
 
 ParameterValues read_config_file(const std::filesystem::path& path) {
   constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20U;
-  std::istringstream file(read_text_file(path, kMaxBytes, "a config file, see dynains config"));
+  std::istringstream file(read_text_file(path, kMaxBytes));
   ParameterValues values;
   std::map<std::string, std::size_t> seen;
   std::size_t number = 0;

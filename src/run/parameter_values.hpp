@@ -1,16 +1,18 @@
 // Parameters as text, and as lines of a config file: all from Config::visit.
 #pragma once
 
+#include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <type_traits>
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
+#include "io/text.hpp"
 
 namespace dynains::program {
 
@@ -20,18 +22,24 @@ std::string flag_name(std::string parameter_name);
 /// Value of a parameter as text; nothing if it is none of that type.
 template <class T>
 std::optional<T> parse_value(const std::string& text) {
-  return value_of_name<T>(text);
+  if constexpr (std::is_enum_v<T>) {
+    return value_of_name<T>(text);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    if (text == "true" || text == "on" || text == "1") return true;
+    if (text == "false" || text == "off" || text == "0") return false;
+    return std::nullopt;
+  } else if constexpr (std::is_integral_v<T>) {
+    T value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (text.empty() || error != std::errc{} || stop != end) return std::nullopt;
+    return value;
+  } else {
+    const std::optional<double> value = text::parse_number(text);
+    if (!value || !std::isfinite(*value)) return std::nullopt;
+    return static_cast<T>(*value);
+  }
 }
-template <>
-std::optional<bool> parse_value(const std::string& text);
-template <>
-std::optional<int> parse_value(const std::string& text);
-template <>
-std::optional<std::uint64_t> parse_value(const std::string& text);
-template <>
-std::optional<float> parse_value(const std::string& text);
-template <>
-std::optional<double> parse_value(const std::string& text);
 
 /// The shortest text that reads back to the same value.
 std::string format_value(double value);

@@ -120,13 +120,13 @@ TEST_CASE("Config files are refused by line") {
              ContainsSubstring("a.cfg:3: use-belief stands on line 1 already"));
   TemporaryFolder folder;
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder / "none.cfg"); }),
-             ContainsSubstring("none.cfg: does not exist"));
+             ContainsSubstring("none.cfg: cannot be read: No such file"));
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder.path()); }),
-             ContainsSubstring(": is a folder; expected a config file"));
+             ContainsSubstring(": cannot be read: is a folder; expected a file"));
   REQUIRE(::mkfifo((folder / "pipe").c_str(), 0600) == 0);
   for (const std::string& endless : {std::string("/dev/zero"), std::string(folder / "pipe")}) {
     CHECK_THAT(message_of<IoError>([&] { read_config_file(endless); }),
-               StartsWith(endless + ": is not a regular file; expected a config file"));
+               StartsWith(endless + ": cannot be read: is a device or a pipe"));
   }
 }
 
