@@ -2,6 +2,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -59,18 +61,23 @@ std::string help_of(const TextParameter<T, Read>& parameter) {
 struct SettingFlags {
   CLI::App& command;
   const char* group = "";  ///< empty: that of other options
+  /// Called with flag and text of each setting that is set.
+  std::function<void(const std::string&, const std::string&)> note = [](const std::string&,
+                                                                        const std::string&) {};
 
   template <class Setting>
   void operator()(const Setting& setting) const {
     const std::string flag = "--" + flag_name(setting.name);
     using Value = std::remove_reference_t<decltype(setting.value)>;
     CLI::Option* option = nullptr;
+    const auto assign = [setting, flag, note = note](const std::string& text) {
+      assign_parameter(setting, text, flag);
+      note(flag, text);
+    };
     if constexpr (std::is_same_v<Value, bool>) {
-      option = command.add_flag(flag, setting.value, setting.help);
+      const auto set = [assign](std::int64_t count) { assign(count > 0 ? "true" : "false"); };
+      option = command.add_flag_function(flag, set, setting.help);
     } else {
-      const auto assign = [setting, flag](const std::string& text) {
-        assign_parameter(setting, text, flag);
-      };
       option = command.add_option_function<std::string>(flag, assign, help_of(setting));
       option->type_name(describe_range(setting));
     }

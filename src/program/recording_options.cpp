@@ -1,7 +1,5 @@
 #include "recording_options.hpp"
 
-#include <utility>
-
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
@@ -12,20 +10,9 @@ namespace {
 
 constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
 
-/// `word` as a shell reads it back.
-std::string quoted(const std::string& word) {
-  constexpr const char* kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:@%";
-  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
 }  // namespace
 
-RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required)
-    : command_(&command) {
+RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required) {
   command
       .add_option("SEQ", folder_,
                   what +
@@ -35,51 +22,19 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
                       "or a folder with metadata.yaml)")
       ->required(required)
       ->type_name("");
-  RecordingSettings::visit(settings_, SettingFlags{command, kGroup});
-}
-
-nlohmann::ordered_json RecordingFlags::given_flags() const {
-  auto flags = nlohmann::ordered_json::object();
-  for (const CLI::Option* option : std::as_const(*command_).get_options()) {
-    if (option->get_group() == kGroup && option->count() > 0) {
-      flags[option->get_name()] = option->results().front();
-    }
-  }
-  return flags;
-}
-
-void RecordingFlags::complete(const std::string& folder, const nlohmann::ordered_json& flags) {
-  if (folder_.empty()) folder_ = folder;
-  for (const auto& [name, value] : flags.items()) {
-    CLI::Option* const option = command_->get_option(name);
-    if (option->get_group() != kGroup) throw CLI::OptionNotFound(name);
-    if (option->count() > 0 || !value.is_string()) continue;
-    option->add_result(value.get<std::string>());
-    option->run_callback();
-  }
-}
-
-std::string RecordingFlags::as_given(const std::string& further) const {
-  std::string text = quoted(folder_);
-  for (const CLI::Option* option : command_->get_options()) {
-    const std::string flag = option->get_name();
-    const bool is_replaced = (' ' + further + ' ').find(' ' + flag + ' ') != std::string::npos;
-    if (option->get_group() != kGroup || option->count() == 0 || is_replaced) continue;
-    text += ' ' + flag;
-    if (option->get_expected_max() == 0) continue;
-    for (const std::string& value : option->results()) text += ' ' + quoted(value);
-  }
-  return further.empty() ? text : text + ' ' + further;
+  RecordingSettings::visit(
+      settings_, SettingFlags{command, kGroup, [this](const auto& flag, const auto& text) {
+                                settings_.flags[flag] = text;
+                              }});
 }
 
 Recording RecordingFlags::open_of_run(const std::filesystem::path& report_file,
                                       const nlohmann::ordered_json& report,
                                       const std::string& command) {
+  const auto folder = required_json_field<std::string>(report_file, report, "/sequence");
+  if (folder_.empty()) folder_ = folder;
   try {
-    complete(required_json_field<std::string>(report_file, report, "/sequence"),
-             report.value("sequence_flags", nlohmann::ordered_json::object()));
-  } catch (const CLI::Error& error) {
-    throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
+    complete(report.value("sequence_flags", nlohmann::ordered_json::object()));
   } catch (const ConfigError& error) {
     throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
   }
@@ -101,7 +56,7 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
        {"--poses", "--invert-poses", "--pose-units", "--pose-scale", "--quaternion-order",
         "--pose-frame", "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset",
         "--pose-gap", "--pose-topic", "--pose-frame-id"}) {
-    if (command_->get_option(flag)->count() == 0) continue;
+    if (!settings_.flags.contains(flag)) continue;
     throw ConfigError(std::string(flag) + " tells of given poses, which the odometry does not use");
   }
   RecordingOptions options = settings_.checked();

@@ -23,14 +23,13 @@ class RecordingFlags {
   const std::string& folder() const { return folder_; }
   /// Throws ConfigError.
   const RecordingOptions& options() const { return settings_.checked(); }
-  /// SEQ and the flags as a shell reads them, so that a message can propose a command. Flags in
-  /// `further` replace those that were given.
-  std::string as_given(const std::string& further = "") const;
   /// The flags on the command line that describe the files of the recording, with their values.
-  nlohmann::ordered_json given_flags() const;
-  /// Takes the folder and given_flags() of an earlier command, as far as the command line does not
-  /// have them. Throws CLI::Error for flags or values that do not exist.
-  void complete(const std::string& folder, const nlohmann::ordered_json& flags);
+  const nlohmann::ordered_json& given_flags() const { return settings_.flags; }
+  /// See RecordingSettings.
+  std::string as_given(const std::string& further = "") const {
+    return settings_.as_given(folder_, further);
+  }
+  void complete(const nlohmann::ordered_json& flags) { settings_.complete(flags); }
   /// Whether a file is named that belongs to one recording only.
   bool names_files() const {
     return !settings_.options.poses.empty() || !settings_.options.times.empty();
@@ -50,7 +49,6 @@ class RecordingFlags {
   Recording open_without_poses(bool is_compensated) const;
 
  private:
-  CLI::App* command_;
   std::string folder_;
   RecordingSettings settings_;
 };

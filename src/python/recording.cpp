@@ -4,7 +4,6 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <sstream>
@@ -24,13 +23,13 @@ namespace {
 using RecordingPointer = std::shared_ptr<SharedRecording>;
 
 RecordingPointer open(const std::filesystem::path& path, const py::dict& values) {
-  const RecordingOptions options = to_recording_options(values);
+  const program::RecordingSettings settings = to_recording_settings(values);
   std::optional<Recording> recording;
   {
     const py::gil_scoped_release release;
-    recording.emplace(path, options);
+    recording.emplace(path, settings.checked());
   }
-  return std::make_shared<SharedRecording>(std::move(*recording), values);
+  return std::make_shared<SharedRecording>(std::move(*recording), values, settings);
 }
 
 /// One scan, whose labels are read when they are asked for.

@@ -5,13 +5,10 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
@@ -87,25 +84,6 @@ RunArguments take_arguments(py::dict& values) {
   return run;
 }
 
-nlohmann::ordered_json to_json(const py::dict& flags) {
-  auto json = nlohmann::ordered_json::object();
-  for (const auto& [flag, value] : flags) {
-    json[py::str(flag).cast<std::string>()] = py::str(value).cast<std::string>();
-  }
-  return json;
-}
-
-/// The recording and its flags as a shell reads them.
-std::string as_given(const std::string& path, const py::dict& flags) {
-  py::list words;
-  words.append(path);
-  for (const auto& [flag, value] : flags) {
-    words.append(flag);
-    if (py::str(value).cast<std::string>() != "true") words.append(value);
-  }
-  return py::module_::import("shlex").attr("join")(words).cast<std::string>();
-}
-
 void take_config(RunArguments& run) {
   if (run.config && run.preset) throw ConfigError("run: give preset or config, not both");
   RunSettings& settings = run.settings;
@@ -165,14 +143,13 @@ PreparedRun prepare(const py::object& recording, const fs::path& out, const py::
   RunArguments arguments = take_arguments(options);
   take_config(arguments);
   RunSettings& settings = arguments.settings;
-  settings.out = out.string();
+  settings.outputs.folder = out;
   program::check_settings(settings);
   const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
   if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared->get());
   settings.recording = shared->get().folder().string();
-  const py::dict flags = to_flags(shared->options());
-  settings.recording_flags = to_json(flags);
-  settings.recording_as_given = as_given(settings.recording, flags);
+  settings.recording_flags = shared->settings().flags;
+  settings.recording_as_given = shared->settings().as_given(settings.recording);
   return {std::move(arguments), shared};
 }
 
@@ -204,15 +181,14 @@ std::string represent(const RunResult& result) {
 /// they are given.
 fs::path write_page(const fs::path& out, const py::object& recording, std::size_t max_points) {
   const auto open = [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
-    const py::gil_scoped_acquire acquire;
-    if (!recording.is_none()) return to_recording(recording, py::dict())->get();
-    const auto path = program::required_json_field<std::string>(report_file, report, "/sequence");
-    py::dict flags;
-    const auto given = report.value("sequence_flags", nlohmann::ordered_json::object());
-    for (const auto& [flag, value] : given.items()) {
-      if (value.is_string()) flags[flag.c_str()] = value.get<std::string>();
+    if (!recording.is_none()) {
+      const py::gil_scoped_acquire acquire;
+      return to_recording(recording, py::dict())->get();
     }
-    return to_recording(py::cast(path), from_flags(flags))->get();
+    program::RecordingSettings settings;
+    settings.complete(report.value("sequence_flags", nlohmann::ordered_json::object()));
+    return Recording(program::required_json_field<std::string>(report_file, report, "/sequence"),
+                     settings.checked());
   };
   const py::gil_scoped_release release;
   return program::add_page(out, open, max_points);

@@ -1,9 +1,6 @@
 #include "settings.hpp"
 
-#include <algorithm>
-
 #include "arrays.hpp"
-#include "run/recording_settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -38,36 +35,14 @@ std::string to_text(const py::handle& value) {
   return text == "False" ? "false" : text;
 }
 
-RecordingOptions to_recording_options(const py::dict& values) {
+RecordingSettings to_recording_settings(const py::dict& values) {
   RecordingSettings settings;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (!assign_setting(settings, name, value)) throw ConfigError("unknown parameter " + name);
+    if (!has_setting<RecordingSettings>(name)) throw ConfigError("unknown parameter " + name);
+    if (!value.is_none()) settings.assign("--" + program::flag_name(name), to_text(value), name);
   }
-  return settings.checked();
-}
-
-py::dict to_flags(const py::dict& values) {
-  py::dict flags;
-  for (const auto& [key, value] : values) {
-    const std::string text = to_text(value);
-    if (value.is_none() || text == "false") continue;
-    std::string flag = "--" + py::str(key).cast<std::string>();
-    std::replace(flag.begin(), flag.end(), '_', '-');
-    flags[flag.c_str()] = text;
-  }
-  return flags;
-}
-
-py::dict from_flags(const py::dict& flags) {
-  py::dict values;
-  for (const auto& [flag, value] : flags) {
-    std::string name = py::str(flag);
-    if (name.rfind("--", 0) == 0) name.erase(0, 2);
-    std::replace(name.begin(), name.end(), '-', '_');
-    values[name.c_str()] = value;
-  }
-  return values;
+  return settings;
 }
 
 }  // namespace dynains::python

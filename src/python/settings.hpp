@@ -6,9 +6,9 @@
 
 #include <string>
 
-#include "dynains/io/recording.hpp"
 #include "parameters.hpp"
 #include "run/parameter_values.hpp"
+#include "run/recording_settings.hpp"
 
 namespace dynains::python {
 
@@ -49,14 +49,8 @@ std::string describe_settings() {
   return text;
 }
 
-/// Options with the keyword arguments `values`. Throws ConfigError, also for an unknown name,
+/// Settings with the keyword arguments `values`. Throws ConfigError, also for an unknown name,
 /// IoError for a file of an extrinsic calibration.
-RecordingOptions to_recording_options(const py::dict& values);
-
-/// The keyword arguments as flags of the program, {"--pose-shift": "1"}, which reports of runs
-/// hold.
-py::dict to_flags(const py::dict& values);
-/// The keyword arguments that flags stand for; their values are text.
-py::dict from_flags(const py::dict& flags);
+program::RecordingSettings to_recording_settings(const py::dict& values);
 
 }  // namespace dynains::python

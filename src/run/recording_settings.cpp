@@ -8,6 +8,19 @@
 #include "parameter_values.hpp"
 
 namespace dynains::program {
+namespace {
+
+/// `word` as a shell reads it back.
+std::string quoted(const std::string& word) {
+  constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:@%";
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+}  // namespace
 
 double read_length_unit(const std::string& text) {
   if (text == "m") return 1.0;
@@ -32,6 +45,36 @@ const RecordingOptions& RecordingSettings::checked() const {
     throw ConfigError("sensor origin and sensor frame exclude each other");
   }
   return options;
+}
+
+bool RecordingSettings::assign(const std::string& flag, const std::string& text,
+                               const std::string& name) {
+  bool is_known = false;
+  visit(*this, [&](const auto& setting) {
+    if (flag != "--" + flag_name(setting.name)) return;
+    is_known = true;
+    assign_parameter(setting, text, name);
+  });
+  if (is_known && text != "false") flags[flag] = text;
+  return is_known;
+}
+
+void RecordingSettings::complete(const nlohmann::ordered_json& earlier) {
+  for (const auto& [flag, text] : earlier.items()) {
+    if (flags.contains(flag) || !text.is_string()) continue;
+    if (!assign(flag, text, flag)) throw ConfigError("unknown parameter " + flag);
+  }
+}
+
+std::string RecordingSettings::as_given(const std::string& recording,
+                                        const std::string& further) const {
+  std::string text = quoted(recording);
+  for (const auto& [flag, value] : flags.items()) {
+    if ((' ' + further + ' ').find(' ' + flag + ' ') != std::string::npos) continue;
+    text += ' ' + flag;
+    if (value != "true") text += ' ' + quoted(value);
+  }
+  return further.empty() ? text : text + ' ' + further;
 }
 
 }  // namespace dynains::program

@@ -2,6 +2,7 @@
 // of Python.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "dynains/io/extrinsic.hpp"
@@ -23,12 +24,24 @@ double read_time_unit(const std::string& text);
 
 struct RecordingSettings {
   RecordingOptions options;
+  /// Flag -> text of what was assigned by flag, such as {"--pose-shift": "1"}.
+  nlohmann::ordered_json flags = nlohmann::ordered_json::object();
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor);
 
   /// The options. Throws ConfigError for settings that exclude each other.
   const RecordingOptions& checked() const;
+
+  /// Assigns the setting of a flag; false if none has it. `name` starts the message of a
+  /// ConfigError for a text that is none of its values.
+  bool assign(const std::string& flag, const std::string& text, const std::string& name);
+  /// Assigns `flags` of an earlier command, unless they are assigned. Throws ConfigError, also for
+  /// a flag that none has.
+  void complete(const nlohmann::ordered_json& earlier);
+  /// `recording` and the flags as a shell reads them, so that a message can propose a command.
+  /// Flags in `further` replace those that were given.
+  std::string as_given(const std::string& recording, const std::string& further = "") const;
 };
 
 template <class Self, class Visitor>
