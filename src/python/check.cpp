@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -22,8 +23,6 @@ struct CheckedRecording {
   RecordingCheck check;
   std::string path;
   py::dict options;
-
-  const Diagnosis& diagnosis() const { return check.diagnosis; }
 };
 
 const char* name_of(PoseVerdict verdict) {
@@ -33,20 +32,18 @@ const char* name_of(PoseVerdict verdict) {
   return kNames.at(static_cast<std::size_t>(verdict));
 }
 
-/// The keyword arguments of a proposal such as `--invert-poses --pose-units mm`.
-py::dict to_options(const std::string& proposal) {
-  py::dict flags;
-  std::string flag;
+/// Adds the keyword arguments of a proposal such as `--invert-poses --pose-units mm`.
+void add_options(py::dict& options, const std::string& proposal) {
+  std::string name;
   for (const py::handle& word : py::module_::import("shlex").attr("split")(proposal)) {
     const std::string text = py::str(word);
-    if (text.rfind("--", 0) == 0) {
-      flag = text;
-      flags[flag.c_str()] = true;
-    } else {
-      flags[flag.c_str()] = text;
+    const bool is_flag = text.rfind("--", 0) == 0;
+    if (is_flag) {
+      name = text.substr(2);
+      std::replace(name.begin(), name.end(), '-', '_');
     }
+    options[name.c_str()] = is_flag ? py::object(py::bool_(true)) : py::str(text);
   }
-  return from_flags(flags);
 }
 
 CheckedRecording check_by_name(const py::object& recording, const py::kwargs& options) {
@@ -55,9 +52,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
   result.check = shared->read(program::check_recording);
   result.path = shared->get().folder().string();
   result.options = shared->options().attr("copy")();
-  for (const auto& [name, value] : to_options(result.check.flags)) {
-    result.options[name] = value;
-  }
+  add_options(result.options, result.check.flags);
   return result;
 }
 
@@ -77,22 +72,36 @@ std::string represent(const CheckedRecording& checked) {
   return text.substr(0, text.find_last_not_of('\n') + 1);
 }
 
+std::optional<double> if_registered(const CheckedRecording& checked, double value) {
+  if (checked.check.diagnosis.registered_pairs == 0) return std::nullopt;
+  return value;
+}
+
+py::dict measured(const Diagnosis& d) {
+  py::dict values;
+  values["scan_files"] = d.scan_files;
+  values["pose_rows"] = d.pose_rows;
+  values["scans"] = d.scans;
+  values["period"] = d.period;
+  values["points"] = d.points;
+  values["invalid_share"] = d.invalid_share;
+  values["ego_share"] = d.ego_share;
+  values["farthest"] = d.farthest;
+  values["step"] = d.step;
+  values["longest_step"] = d.longest_step;
+  values["agreement"] = d.as_given.share;
+  if (d.mounting.known) {
+    values["height"] = d.mounting.height;
+    values["tilt"] = d.mounting.tilt();
+  }
+  return values;
+}
+
 }  // namespace
 
 void bind_check(py::module_& module) {
-  const auto registered = [](const Diagnosis& d, double value) {
-    return d.registered_pairs > 0 ? std::optional<double>(value) : std::nullopt;
-  };
-  const auto mounted = [](const Diagnosis& d, double value) {
-    return d.mounting.known ? std::optional<double>(value) : std::nullopt;
-  };
-  py::class_<CheckedRecording> diagnosis(
-      module, "Diagnosis", "What check() found. Its text is that of the program `dynains check`.");
-  const auto add = [&](const char* name, auto value_of, const char* doc) {
-    diagnosis.def_property_readonly(
-        name, [value_of](const CheckedRecording& self) { return value_of(self.diagnosis()); }, doc);
-  };
-  diagnosis
+  py::class_<CheckedRecording>(
+      module, "Diagnosis", "What check() found. Its text is that of the program `dynains check`.")
       .def_property_readonly(
           "passed", [](const CheckedRecording& self) { return self.check.passed; },
           "Whether the recording will work with the options that it was opened with.")
@@ -106,52 +115,31 @@ void bind_check(py::module_& module) {
             const std::string text = self.check.advice + self.check.remark;
             return text.substr(0, text.find_last_not_of('\n') + 1);
           },
-          "The verdict in words, and what to do.");
-  add(
-      "verdict", [](const Diagnosis& d) { return name_of(d.verdict); },
-      "'agree', 'inexact', 'no motion', 'otherwise' (under other options), 'disagree' or "
-      "'unknown'.");
-  add(
-      "translation_error",
-      [registered](const Diagnosis& d) { return registered(d, d.translation_error); },
-      "m, error of the poses from one scan to the next by registration; None if unknown.");
-  add(
-      "rotation_error",
-      [registered](const Diagnosis& d) { return registered(d, 180.0 / M_PI * d.rotation_error); },
-      "deg, likewise.");
-  add(
-      "agreement", [](const Diagnosis& d) { return d.as_given.share; },
-      "Share of the points of two scans that agree under the poses, 0 to 1.");
-  add(
-      "scan_files", [](const Diagnosis& d) { return d.scan_files; }, "Number of files of scans.");
-  add(
-      "pose_rows", [](const Diagnosis& d) { return d.pose_rows; }, "Number of poses.");
-  add(
-      "scans", [](const Diagnosis& d) { return d.scans; }, "Number of scans with a pose.");
-  add(
-      "period", [](const Diagnosis& d) { return d.period; }, "s from scan to scan, median.");
-  add(
-      "points", [](const Diagnosis& d) { return d.points; }, "Points per scan, mean.");
-  add(
-      "invalid_share", [](const Diagnosis& d) { return d.invalid_share; },
-      "Share of points that are NaN, infinite or all zero, 0 to 1.");
-  add(
-      "ego_share", [](const Diagnosis& d) { return d.ego_share; },
-      "Share of valid points nearer than 2 m, 0 to 1.");
-  add(
-      "farthest", [](const Diagnosis& d) { return d.farthest; }, "m, 99 % of ranges are shorter.");
-  add(
-      "step", [](const Diagnosis& d) { return d.step; }, "m from scan to scan, median.");
-  add(
-      "longest_step", [](const Diagnosis& d) { return d.longest_step; },
-      "m from scan to scan, maximum.");
-  add(
-      "height", [mounted](const Diagnosis& d) { return mounted(d, d.mounting.height); },
-      "m, sensor over the ground; None if no ground was found.");
-  add(
-      "tilt", [mounted](const Diagnosis& d) { return mounted(d, d.mounting.tilt()); },
-      "deg, of the sensor; None if no ground was found.");
-  diagnosis.def("__repr__", [](const CheckedRecording& checked) { return represent(checked); });
+          "The verdict in words, and what to do.")
+      .def_property_readonly(
+          "verdict",
+          [](const CheckedRecording& self) { return name_of(self.check.diagnosis.verdict); },
+          "'agree', 'inexact', 'no motion', 'otherwise' (under other options), 'disagree' or "
+          "'unknown'.")
+      .def_property_readonly(
+          "translation_error",
+          [](const CheckedRecording& self) {
+            return if_registered(self, self.check.diagnosis.translation_error);
+          },
+          "m, error of the poses from one scan to the next by registration; None if unknown.")
+      .def_property_readonly(
+          "rotation_error",
+          [](const CheckedRecording& self) {
+            return if_registered(self, 180.0 / M_PI * self.check.diagnosis.rotation_error);
+          },
+          "deg, likewise.")
+      .def_property_readonly(
+          "measured", [](const CheckedRecording& self) { return measured(self.check.diagnosis); },
+          "By name: scan_files, pose_rows, scans (with a pose); period (s), step, longest_step (m) "
+          "from scan to scan; points (per scan); invalid_share, ego_share (nearer than 2 m), "
+          "agreement (of two scans under the poses), 0 to 1; farthest (m, 99 % of ranges are "
+          "shorter); height (m, over the ground), tilt (deg), unless no ground was found.")
+      .def("__repr__", [](const CheckedRecording& checked) { return represent(checked); });
 
   const std::string doc =
       "Tells in seconds whether a recording will work, and which options it needs.\n\n"

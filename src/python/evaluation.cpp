@@ -9,6 +9,7 @@
 #include "bindings.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "parameters.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -146,7 +147,7 @@ py::dict evaluate_arrays(const py::sequence& points, const py::sequence& poses,
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
-  std::string doc =
+  const std::string doc =
       "Judges what was kept of each scan by its ground truth.\n\n"
       "points, poses, truth, kept: sequences with an entry per scan. points: (N, 3 to 64), "
       "metres, sensor frame. poses: (4, 4), T_world_sensor. truth: (N,) labels of SemanticKITTI, "
@@ -156,11 +157,8 @@ void bind_evaluation(py::module_& module) {
       "kept and left (percent of the static and moving objects, by instance id; nan without); "
       "NaN is a share of nothing.\n"
       "dynamic_classes: ids and ranges. unlabeled: 'ignore' or 'static' (classes 0 and 1).\n"
-      "Settings by name:\n";
-  EvaluationConfig defaults;
-  EvaluationConfig::visit(defaults, [&doc](const auto& parameter) {
-    doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
-  });
+      "Settings by name:\n" +
+      describe_settings<EvaluationConfig>();
   module.def("evaluate", &evaluate_arrays, py::arg("points"), py::arg("poses"), py::arg("truth"),
              py::arg("kept"),
              py::arg("dynamic_classes") = evaluation::TruthClasses().dynamic_classes(),

@@ -5,13 +5,13 @@
 #include <pybind11/stl.h>
 
 #include <optional>
-#include <sstream>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
+#include "run/parameter_values.hpp"
 
 namespace dynains::python {
 
@@ -99,17 +99,10 @@ py::dict to_dict(const Config& config) {
   return result;
 }
 
-/// Docstring of a parameter: description, interval and unit.
+/// Docstring of a parameter: meaning and values.
 template <class T>
 std::string describe(const Parameter<T>& parameter) {
-  std::ostringstream text;
-  text << parameter.help;
-  if constexpr (std::is_enum_v<T>) text << "; " << all_value_names<std::remove_const_t<T>>();
-  if constexpr (kIsBounded<T>) {
-    text << "; in " << parameter.bounds.to_string();
-    if (*parameter.unit != '\0') text << ' ' << parameter.unit;
-  }
-  return text.str();
+  return std::string(parameter.help) + "; " + program::describe_range(parameter);
 }
 
 /// A property with a docstring for each parameter.

@@ -36,40 +36,35 @@ class Remover {
 
   Frame push(const py::object& points, const py::object& pose, std::optional<double> time) {
     const Pose T_world_sensor = to_pose(pose);
-    std::optional<OwnedVerdict> newest, finished;
-    StageTimes times;
     Frame frame;
     with_points(points, [&](const auto& cloud) {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
       const FrameResult result =
           time ? remover_.push(cloud, T_world_sensor, *time) : remover_.push(cloud, T_world_sensor);
-      newest.emplace(result.newest);
-      if (result.finished) finished.emplace(*result.finished);
-      times = result.times;
+      const ScanVerdict newest = result.newest;  // is made here
+      // Whoever holds the interpreter's lock releases it to wait for the mutex.
+      const py::gil_scoped_acquire acquire;
+      frame.newest = py::cast(Verdict(newest));
+      frame.finished = result.finished ? py::cast(Verdict(*result.finished)) : py::none();
+      StageTimes::visit(result.times,
+                        [&](const char* stage, double ms) { frame.times[stage] = ms; });
       frame.pose_residual = result.pose_residual;
       frame.time_doubt = result.time_doubt;
       frame.began_epoch = result.began_epoch;
       frame.plausibility = result.plausibility;
     });
-    frame.newest = py::cast(Verdict(std::move(*newest)));
-    if (finished) {
-      frame.finished = py::cast(Verdict(std::move(*finished)));
-    } else {
-      frame.finished = py::none();
-    }
-    StageTimes::visit(
-        times, [&](const char* stage, double milliseconds) { frame.times[stage] = milliseconds; });
     return frame;
   }
 
   py::list flush() {
-    std::vector<OwnedVerdict> verdicts;
-    without_interpreter([&] {
-      remover_.flush([&](const ScanVerdict& verdict) { verdicts.emplace_back(verdict); });
-    });
     py::list result;
-    for (OwnedVerdict& verdict : verdicts) result.append(Verdict(std::move(verdict)));
+    without_interpreter([&] {
+      remover_.flush([&](const ScanVerdict& verdict) {
+        const py::gil_scoped_acquire acquire;
+        result.append(Verdict(verdict));
+      });
+    });
     return result;
   }
 
@@ -132,8 +127,16 @@ std::optional<std::string> suspicion_of(const Plausibility& window) {
   return plain_value(window.suspicion);
 }
 
-std::string represent(const Plausibility& window) {
-  return "<dynains.Plausibility: " + suspicion_of(window).value_or("no suspicion") + '>';
+py::dict to_dict(const Plausibility& window) {
+  py::dict shares;
+  shares["not_judged"] = window.not_judged;
+  shares["ground_free"] = window.ground_free;
+  shares["instance_free"] = window.instance_free;
+  shares["misfits"] = window.misfits;
+  shares["residual"] = window.residual;
+  shares["suspicion"] = suspicion_of(window);
+  shares["since"] = window.since;
+  return shares;
 }
 
 std::string represent(const Frame& frame) {
@@ -226,26 +229,6 @@ void bind_remover(py::module_& module) {
       .def_readonly("previous_time", &PoseResidual::previous_time, "s, of that scan")
       .def("__repr__", [](const PoseResidual& residual) { return represent(residual); });
 
-  py::class_<Plausibility>(module, "Plausibility",
-                           "Shares over the last ten scans, 0 to 1, and what they contradict.")
-      .def_readonly("not_judged", &Plausibility::not_judged,
-                    "Points that are invalid, too near or too far.")
-      .def_readonly("ground_free", &Plausibility::ground_free,
-                    "Beams through the ground, of those that reach or pass it.")
-      .def_readonly("instance_free", &Plausibility::instance_free,
-                    "Samples above the ground seen free, of those seen free or hit.")
-      .def_readonly("misfits", &Plausibility::misfits,
-                    "Scans that begin an epoch because poses or surfaces do not fit.")
-      .def_readonly("residual", &Plausibility::residual,
-                    "m, mean translation of PoseResidual, each at most 0.15 m.")
-      .def_property_readonly(
-          "suspicion", &suspicion_of,
-          "What the scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, times of "
-          "points). Else None.")
-      .def_readonly("since", &Plausibility::since,
-                    "Number of the scan at which the suspicious window began.")
-      .def("__repr__", [](const Plausibility& window) { return represent(window); });
-
   py::class_<Frame>(module, "FrameResult", "Answer to one scan.")
       .def_readonly("newest", &Frame::newest,
                     "ScanVerdict: what the past alone says of the scan just pushed.")
@@ -267,7 +250,14 @@ void bind_remover(py::module_& module) {
           "suspicion", [](const Frame& frame) { return suspicion_of(frame.plausibility); },
           "What the last scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, "
           "times of points). Else None.")
-      .def_readonly("plausibility", &Frame::plausibility, "Plausibility of the last scans.")
+      .def_property_readonly(
+          "plausibility", [](const Frame& frame) { return to_dict(frame.plausibility); },
+          "Shares over the last ten scans, 0 to 1: not_judged (points invalid, too near or too "
+          "far), ground_free (beams through the ground, of those that reach or pass it), "
+          "instance_free (samples above the ground seen free, of those seen free or hit), misfits "
+          "(scans that begin an epoch because poses or surfaces do not fit); residual (m, mean "
+          "translation of PoseResidual, each at most 0.15); suspicion; since (number of the scan "
+          "at which the suspicious window began).")
       .def_property_readonly(
           "time_doubt",
           [](const Frame& frame) -> std::optional<std::string> {

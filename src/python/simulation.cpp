@@ -5,13 +5,13 @@
 #include <filesystem>
 #include <sstream>
 #include <string>
-#include <vector>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
 #include "parameters.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -80,13 +80,10 @@ void bind_simulation(py::module_& module) {
                     "(4, 4) float64, with the noise that was asked for.")
       .def("__repr__", [](const ScanOfArrays& scan) { return represent(scan); });
 
-  std::string doc =
+  const std::string doc =
       "A labelled street, measured by ray casting: simulator[i] is scan i.\n\nParameters by "
-      "name:\n";
-  simulation::Config defaults;
-  simulation::Config::visit(defaults, [&doc](const auto& parameter) {
-    doc += std::string("  ") + parameter.name + ": " + describe(parameter) + '\n';
-  });
+      "name:\n" +
+      describe_settings<simulation::Config>();
   py::class_<Simulator>(module, "Simulator", doc.c_str())
       .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
            py::arg("labelling") = "ever",

@@ -179,10 +179,11 @@ def test_check_of_a_good_recording(drive):
     recording = dynains.Recording(drive)
     diagnosis = dynains.check(recording)
     assert diagnosis.passed and diagnosis.verdict == "agree" and diagnosis.options == {}
-    assert diagnosis.scans == len(recording) and diagnosis.period == pytest.approx(0.1)
+    measured = diagnosis.measured
+    assert measured["scans"] == len(recording) and measured["period"] == pytest.approx(0.1)
     assert 0 <= diagnosis.translation_error < 0.1 and 0 <= diagnosis.rotation_error < 1
-    assert diagnosis.height == pytest.approx(1.2, abs=0.1) and diagnosis.tilt < 3
-    assert diagnosis.points == pytest.approx(np.mean([len(scan.points) for scan in recording]), 0.01)
+    assert measured["height"] == pytest.approx(1.2, abs=0.1) and measured["tilt"] < 3
+    assert measured["points"] == pytest.approx(np.mean([len(scan.points) for scan in recording]), 0.01)
     text = repr(diagnosis)
     assert text.splitlines()[0].startswith("scans  ") and text.endswith(diagnosis.advice)
     with pytest.raises(TypeError, match="open recording"):
