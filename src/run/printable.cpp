@@ -1,5 +1,7 @@
 #include "printable.hpp"
 
+#include <utility>
+
 namespace dynains::program {
 namespace {
 
@@ -15,37 +17,24 @@ bool is_control(unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') |
 }  // namespace
 
 PrintableStream::PrintableStream(std::ostream& stream)
-    : stream_(stream), target_(stream.rdbuf()), filter_(target_) {
-  stream_.rdbuf(&filter_);
-}
+    : stream_(stream), target_(stream.rdbuf(this)) {}
 
 PrintableStream::~PrintableStream() { stream_.rdbuf(target_); }
 
-PrintableStream::Filter::int_type PrintableStream::Filter::overflow(int_type c) {
-  if (traits_type::eq_int_type(c, traits_type::eof())) return traits_type::not_eof(c);
-  const char character = traits_type::to_char_type(c);
-  return xsputn(&character, 1) == 1 ? c : traits_type::eof();
-}
-
-std::streamsize PrintableStream::Filter::xsputn(const char* text, std::streamsize size) {
+PrintableStream::int_type PrintableStream::overflow(int_type value) {
+  if (traits_type::eq_int_type(value, traits_type::eof())) return traits_type::not_eof(value);
+  const auto c = static_cast<unsigned char>(value);
+  const bool is_second = std::exchange(has_lead_, c == kLeadOfControls);
+  const bool ends_control = is_second && c >= 0x80 && c < 0xA0;
   std::string shown;
-  for (std::streamsize i = 0; i < size; ++i) {
-    const auto c = static_cast<unsigned char>(text[i]);
-    if (after_c2_) {
-      const bool control = c >= 0x80 && c < 0xA0;
-      shown += control ? escaped(kLeadOfControls) : std::string(1, '\xC2');
-      shown += control ? escaped(c) : std::string();
-      after_c2_ = false;
-      if (control) continue;
-    }
-    if (c == kLeadOfControls) {
-      after_c2_ = true;
-    } else {
-      shown += is_control(c) ? escaped(c) : std::string(1, static_cast<char>(c));
-    }
+  if (is_second) shown += ends_control ? escaped(kLeadOfControls) : std::string(1, '\xC2');
+  if (ends_control || is_control(c)) {
+    shown += escaped(c);
+  } else if (!has_lead_) {
+    shown += static_cast<char>(c);
   }
-  const auto length = static_cast<std::streamsize>(shown.size());
-  return target_->sputn(shown.data(), length) == length ? size : 0;
+  const auto size = static_cast<std::streamsize>(shown.size());
+  return target_->sputn(shown.data(), size) == size ? value : traits_type::eof();
 }
 
 std::string on_one_line(const std::string& text) {

@@ -9,7 +9,7 @@ namespace dynains::program {
 
 /// Replaces control characters by \xNN, so that file names cannot steer a terminal. Line feeds and
 /// tabs stay; UTF-8 stays, except its control characters (U+0080 to U+009F).
-class PrintableStream {
+class PrintableStream : std::streambuf {
  public:
   /// Filters `stream` as long as this object lives.
   explicit PrintableStream(std::ostream& stream);
@@ -18,23 +18,12 @@ class PrintableStream {
   PrintableStream& operator=(const PrintableStream&) = delete;
 
  private:
-  class Filter : public std::streambuf {
-   public:
-    explicit Filter(std::streambuf* target) : target_(target) {}
-
-   protected:
-    int_type overflow(int_type c) override;
-    std::streamsize xsputn(const char* text, std::streamsize size) override;
-    int sync() override { return target_->pubsync(); }
-
-   private:
-    std::streambuf* target_;
-    bool after_c2_ = false;  ///< the first byte of U+0080 to U+00BF waits for the second
-  };
+  int_type overflow(int_type value) override;
+  int sync() override { return target_->pubsync(); }
 
   std::ostream& stream_;
   std::streambuf* target_;
-  Filter filter_;
+  bool has_lead_ = false;  ///< the first byte of U+0080 to U+00BF waits for the second
 };
 
 /// The text on one line: line feeds and tabs become \n and \t.
