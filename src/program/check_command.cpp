@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -28,9 +27,7 @@ struct CheckFlags {
 };
 
 void find_closures(const Recording& recording, const CheckFlags& flags) {
-  InputFiles inputs;
-  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
-  OutputFile file(flags.closures, flags.force, inputs);
+  OutputFile file(flags.closures, flags.force, InputFiles(recording));
   const std::vector<ReturnToPlace> returns = find_returns(recording, file.path().parent_path());
   write_closures(file.path(), returns);
   file.put_in_place();

@@ -1,5 +1,4 @@
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
@@ -61,23 +60,6 @@ fs::path target_of(const CleanOptions& options) {
                       map.extension().string() + ", as that of the map");
   }
   return target;
-}
-
-InputFiles inputs_of(const fs::path& map, const Recording& recording) {
-  InputFiles inputs;
-  inputs.add(map);
-  for (const fs::path& file : recording.files()) inputs.add(file);
-  return inputs;
-}
-
-/// Throws IoError for a place among the scans or the results of the run.
-void check_target(const fs::path& target, const Recording& recording, const ResultFolder& out) {
-  const fs::path folder = target.parent_path();
-  for (const fs::path& taken : {recording.scan_folder(), out.path(), out.path() / "labels"}) {
-    if (identity_of(folder) != identity_of(taken)) continue;
-    throw IoError(target.string() + ": lies in " + taken.string() +
-                  ", which is read; choose another folder for --map");
-  }
 }
 
 /// The edge of voxels that hold about one point of the map, m; at least `least`.
@@ -155,8 +137,12 @@ void clean(CleanOptions& options) {
   const ResultFolder out = open_finished_run(options.run);
   const Recording recording = options.sequence.open_of_run(
       out.marker_path(), out.marker(), "dynains clean " + options.map + ' ' + options.run);
-  check_target(target, recording, out);
-  OutputFile cleaned(target, options.force, inputs_of(options.map, recording));
+  InputFiles inputs(recording);
+  for (const fs::path& read :
+       {fs::path(options.map), recording.scan_folder(), out.path(), out.path() / "labels"}) {
+    inputs.add(read);
+  }
+  OutputFile cleaned(target, options.force, inputs);
   const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
 
   const InterruptGuard interrupt;

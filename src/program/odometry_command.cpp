@@ -1,6 +1,5 @@
 #include "odometry_command.hpp"
 
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -40,9 +39,7 @@ void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
 
 void write_poses(const OdometryFlags& flags) {
   Recording recording = flags.recording.open_without_poses(flags.is_compensated);
-  InputFiles inputs;
-  for (const std::filesystem::path& file : recording.files()) inputs.add(file);
-  OutputFile file(flags.out, flags.force, inputs);
+  OutputFile file(flags.out, flags.force, InputFiles(recording));
   const PoseEstimate estimate =
       estimate_with_progress(recording, flags.window, flags.one_thread, flags.quiet);
   write_trajectory(file.path(), recording);

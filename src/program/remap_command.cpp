@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <iomanip>
@@ -8,7 +6,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "command.hpp"
@@ -19,12 +16,12 @@
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/json_file.hpp"
-#include "run/labelled_sequence.hpp"
+#include "run/label_writer.hpp"
 #include "run/naming_scan.hpp"
 #include "run/output_folder.hpp"
-#include "run/repose_session.hpp"
+#include "run/points_of.hpp"
 #include "run/run_plan.hpp"
-#include "run/scratch_file.hpp"
+#include "run/session_contribution.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {
@@ -115,42 +112,67 @@ std::optional<Recording> open_original(const RemapOptions& options, const Earlie
   return recording;
 }
 
-/// The points of a scan that `labels`, of `file`, call static. Throws IoError for labels of another
-/// scan, which show by points that are not finite.
-PointBuffer static_points(const RecordedScan& scan, const std::vector<std::uint32_t>& labels,
-                          const fs::path& file) {
-  PointBuffer points;
+/// Which points `labels`, of `file`, call static. Throws IoError for labels of another scan, which
+/// show by points that are not finite.
+std::vector<std::uint8_t> static_points(const PointBuffer& points,
+                                        const std::vector<PointLabel>& labels,
+                                        const fs::path& file) {
+  std::vector<std::uint8_t> keep;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (class_of(labels[i]) != kRunStatic) continue;
-    const float* const p = &scan.xyzi[4 * i];
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {
-      throw IoError(file.string() +
-                    ": has static points whose coordinates are not finite; expected labels of a "
-                    "run over these scans");
-    }
-    points.push_back(p[0], p[1], p[2]);
+    keep.push_back(is_static(labels[i]) ? 1 : 0);
+    if (keep.back() == 0 || std::isfinite(points.x[i] + points.y[i] + points.z[i])) continue;
+    throw IoError(file.string() +
+                  ": has static points whose coordinates are not finite; expected labels of a run "
+                  "over these scans");
   }
-  return points;
+  return keep;
 }
 
-/// Builds the map of the run's verdicts under the poses of `corrected`. Throws Interrupted.
+/// Builds the map of the verdicts of the run in `folder` under the poses of `corrected`, and adds
+/// the scans to `session`, unless it is null. Throws Interrupted.
 StaticMapAccumulator build_map(const Recording& corrected, const Recording& original,
-                               const std::vector<std::size_t>& scans, const fs::path& labels,
-                               double voxel, bool quiet) {
-  StaticMapAccumulator::Config config;
-  config.map_voxel = voxel;
+                               const std::vector<std::size_t>& scans, const fs::path& folder,
+                               const StaticMapAccumulator::Config& config, bool quiet,
+                               SessionContribution* session) {
   StaticMapAccumulator map(config);
+  const LabelFiles files(folder / "labels", folder / "causes");
   RecordedScan scan;
+  PointBuffer points;
+  VerdictArrays arrays;
   Progress progress(scans.size(), "scans", quiet);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-    original.read_scan(scans[k], scan);
-    const fs::path file = labels / (original.name(scans[k]) + ".label");
-    map.insert(static_points(scan, read_run_labels(file, scan.size()), file), {},
-               orthonormalized(corrected.T_world_sensor(scans[k])));
+    const std::size_t i = scans[k];
+    original.read_scan(i, scan);
+    copy_points(scan, points);
+    files.read(original.name(i), scan, arrays);
+    ScanVerdict verdict;
+    verdict.labels = arrays.labels;
+    verdict.T_world_sensor = orthonormalized(corrected.T_world_sensor(i));
+    const std::vector<std::uint8_t> keep =
+        static_points(points, arrays.labels, folder / "labels" / (original.name(i) + ".label"));
+    map.insert(points, keep, verdict.T_world_sensor);
+    if (session != nullptr) {
+      session->add(scan, verdict,
+                   original.has_labels() ? original.read_labels(i) : std::vector<std::uint32_t>(),
+                   i);
+    }
     progress.update(k + 1);
   }
+  if (session != nullptr) session->prepare();
   return map;
+}
+
+/// The session that --update replaces.
+SessionRequest session_of(const RemapOptions& options, const EarlierRun& run,
+                          const std::string& fingerprint) {
+  std::string name = options.session;
+  if (name.empty()) {
+    const auto of_run = json_field<std::string>(run.report_file, run.report, "/request/session");
+    if (!of_run) throw ConfigError("the run has added no session; name one by --session");
+    name = *of_run;
+  }
+  return reposed_session(whole_path(options.update), name, fingerprint);
 }
 
 /// The map is a file of its own, or is added to the folder of the run, whose report describes it.
@@ -165,7 +187,6 @@ class NewMap {
       throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
     }
     if (path_.parent_path() != folder) {
-      check_is_no_scan(path_, recording);
       outside_.emplace(path_, options.force, inputs);
     } else if (path_.filename() == kRemappedMap) {
       added_.emplace(out, kRemappedMap);
@@ -205,16 +226,6 @@ class NewMap {
   std::unique_ptr<MapFile> writer_;
 };
 
-InputFiles inputs_of(const Recording& corrected, const std::optional<Recording>& original) {
-  InputFiles inputs;
-  for (const Recording* recording : {&corrected, original ? &*original : nullptr}) {
-    if (recording == nullptr) continue;
-    for (const fs::path& file : recording->files()) inputs.add(file);
-    inputs.add(recording->scan_folder());
-  }
-  return inputs;
-}
-
 void check_run_folder(const fs::path& folder) {
   std::error_code error;
   const fs::file_type type = fs::status(folder, error).type();
@@ -244,37 +255,33 @@ void remap(RemapOptions& options) {
   check_run_folder(options.run);
   ResultFolder out = open_finished_run(options.run);
   const EarlierRun run = read_run(out);
-  options.sequence.complete(options.sequence.folder(), point_flags(run));
+  options.sequence.complete(point_flags(run));
   const Recording corrected = open_corrected(options, run);
   const std::vector<std::size_t> scans = scans_of(corrected, run);
   check_poses(corrected, scans);
   const std::optional<Recording> original = open_original(options, run);
   const ScanRange range{scans.front(), scans.back()};
-  NewMap file(options, out, corrected, range, inputs_of(corrected, original));
+  InputFiles inputs(corrected);
+  if (original) inputs.add(*original);
+  inputs.add(corrected.scan_folder());
+  NewMap file(options, out, corrected, range, inputs);
 
   const InterruptGuard interrupt;
-  const StaticMapAccumulator map =
-      build_map(corrected, original ? *original : corrected, scans, out.path() / "labels",
-                options.map_voxel.value_or(run.map_voxel), options.quiet);
-  std::optional<ScratchFile> store;
-  std::unique_ptr<SessionWriter> session;
+  const std::string fingerprint = pose_fingerprint(corrected, range);
+  std::optional<SessionContribution> session;
   if (!options.update.empty()) {
-    const auto name = Json::json_pointer("/request/session");
-    const bool has_name = run.report.contains(name) && run.report[name].is_string();
-    if (options.session.empty() && !has_name) {
-      throw ConfigError("the run has added no session; name one by --session");
-    }
-    session = repose_session(
-        {whole_path(options.update),
-         options.session.empty() ? run.report[name].get<std::string>() : options.session,
-         out.path(), pose_fingerprint(corrected, range), scans},
-        original ? *original : corrected, corrected, store.emplace(whole_path(options.update)));
+    session.emplace(session_of(options, run, fingerprint), SessionWriter::Mode::kReplace);
   }
+  StaticMapAccumulator::Config config;
+  config.map_voxel = options.map_voxel.value_or(run.map_voxel);
+  const StaticMapAccumulator map =
+      build_map(corrected, original ? *original : corrected, scans, out.path(), config,
+                options.quiet, session ? &*session : nullptr);
   file.write(map,
              {{"file", kRemappedMap},
               {"points", map.size()},
               {"map_voxel", map.config().map_voxel},
-              {"poses_and_times", pose_fingerprint(corrected, range)}},
+              {"poses_and_times", fingerprint}},
              [&] {
                if (session) session->commit();
              });

@@ -1,7 +1,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <iomanip>
 #include <iostream>
 #include <memory>
@@ -87,10 +86,12 @@ Recording open(RunFlags& flags, PoseEstimate& estimate) {
     return flags.recording.open();
   }
   Recording recording = flags.recording.open_without_poses(flags.is_compensated);
-  estimate = estimate_with_progress(recording, settings.window, settings.one_thread, flags.quiet);
-  settings.poses_are_estimated = true;
+  estimate =
+      estimate_with_progress(recording, settings.window, settings.outputs.one_thread, flags.quiet);
+  settings.outputs.write_poses = true;
   // Commands over the results take the poses from there.
-  settings.recording_flags["--poses"] = (whole_path(settings.out) / kEstimatedPoses).string();
+  settings.recording_flags["--poses"] =
+      (whole_path(settings.outputs.folder) / kEstimatedPoses).string();
   if (recording.is_deskewed()) settings.recording_flags["--deskew"] = "true";
   return recording;
 }
@@ -138,8 +139,9 @@ void add_run_command(CLI::App& app) {
   auto flags = std::make_shared<RunFlags>(command);
   RunSettings* const options = &flags->settings;
   command
-      .add_option("-o,--out", options->out,
-                  "folder for the results; created, must be empty (see --force)")
+      .add_option_function<std::string>(
+          "-o,--out", [options](const std::string& out) { options->outputs.folder = out; },
+          "folder for the results; created, must be empty (see --force)")
       ->required()
       ->type_name("FOLDER");
   RunSettings::visit_common(*options, SettingFlags{command});

@@ -4,13 +4,21 @@
 #include <filesystem>
 #include <map>
 
+#include "dynains/io/recording.hpp"
 #include "folder.hpp"
 
 namespace dynains::program {
 
 class InputFiles {
  public:
-  /// A file, or a folder whose list of entries is read. A path that leads nowhere is left out.
+  InputFiles() = default;
+  /// The files of a recording.
+  explicit InputFiles(const Recording& recording) { add(recording); }
+
+  void add(const Recording& recording) {
+    for (const std::filesystem::path& file : recording.files()) add(file);
+  }
+  /// A file, or a folder that takes no files as outputs. A path that leads nowhere is left out.
   void add(const std::filesystem::path& path) {
     if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
   }

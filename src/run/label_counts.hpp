@@ -23,11 +23,6 @@ struct LabelCounts {
       }
     });
   }
-  LabelCounts& operator+=(const LabelCounts& other) {
-    for (std::size_t i = 0; i < of.size(); ++i) of[i] += other.of[i];
-    return *this;
-  }
-  bool operator==(const LabelCounts& other) const { return of == other.of; }
   std::uint64_t operator[](PointLabel label) const { return of[static_cast<std::size_t>(label)]; }
 };
 

@@ -111,17 +111,4 @@ void LabelFiles::read(const std::string& name, const RecordedScan& scan,
   }
 }
 
-LabelWriter::LabelWriter(std::filesystem::path folder, std::launch thread)
-    : files_(std::move(folder)), writing_(thread) {
-  files_.create_folders();
-}
-
-void LabelWriter::write(const std::string& name, const ScanVerdict& verdict) {
-  finish();
-  files_.take(verdict);
-  writing_.begin([this, name] { files_.write(name); });
-}
-
-void LabelWriter::finish() { writing_.wait(); }
-
 }  // namespace dynains::program

@@ -1,17 +1,14 @@
-// Verdicts as SemanticKITTI-MOS labels and their causes, written by another thread while the
-// pipeline works.
+// Verdicts as SemanticKITTI-MOS labels and their causes.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <future>
 #include <string>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
-#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::program {
@@ -20,7 +17,7 @@ namespace dynains::program {
 /// 0 for none; ids beyond 65535 start again at 1.
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance);
 
-/// The files of labels of a scan: written by the caller's thread.
+/// The files of labels of a scan.
 class LabelFiles {
  public:
   /// No causes or beliefs are written if their folder is empty.
@@ -47,25 +44,6 @@ class LabelFiles {
   std::vector<std::uint8_t> beliefs_;
 
   void take_beliefs(Span<const float> beliefs);
-};
-
-/// Writes LabelFiles in a thread, if there is one for it. One scan at most waits for the disk.
-class LabelWriter {
- public:
-  /// Creates the folder. `thread`: async for another thread, deferred for the caller's.
-  /// Throws IoError.
-  LabelWriter(std::filesystem::path folder, std::launch thread);
-  LabelWriter(const LabelWriter&) = delete;
-  LabelWriter& operator=(const LabelWriter&) = delete;
-
-  /// Writes the files of scan `name`. Throws IoError, for the scan before as well.
-  void write(const std::string& name, const ScanVerdict& verdict);
-  /// Waits for the last file. Throws IoError.
-  void finish();
-
- private:
-  LabelFiles files_;  // belongs to the writing thread until writing_.wait()
-  Background writing_;
 };
 
 }  // namespace dynains::program

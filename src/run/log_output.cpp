@@ -1,10 +1,8 @@
 #include "log_output.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -31,20 +29,15 @@ Place place_of(const LogMessage& message) { return {message.part, message.block,
 /// Replaces clouds by the labels of a run.
 class CloudEditor {
  public:
-  /// `labels`: the folder of labels of the scans in `range`.
-  CloudEditor(const Recording& recording, const ScanRange& range, fs::path labels, bool adds_labels,
-              bool drops_not_judged)
-      : log_(*recording.log()),
-        labels_(std::move(labels)),
-        adds_labels_(adds_labels),
-        drops_not_judged_(drops_not_judged) {
+  /// `labels`: the folder of labels.
+  CloudEditor(const RunPlan& plan, fs::path labels)
+      : log_(*plan.sequence.log()), labels_(std::move(labels)), outputs_(plan.settings.outputs) {
     for (const LogMessage& message : log_.log().messages()) {
       if (message.topic == log_.cloud_topic()) names_[place_of(message)];
     }
-    unjudged_ = names_.size();
-    for (std::size_t i = range.first; i <= range.last; ++i) {
-      names_[place_of(log_.clouds()[recording.file_index(i)])] = recording.name(i);
-      --unjudged_;
+    unjudged_ = names_.size() - plan.range.size();
+    for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
+      names_[place_of(log_.clouds()[plan.sequence.file_index(i)])] = plan.sequence.name(i);
     }
   }
 
@@ -54,11 +47,11 @@ class CloudEditor {
                                         const SerialisedMessage& cloud) const {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     const auto name = names_.find(place_of(message));
-    if (name == names_.end() || (!adds_labels_ && name->second.empty())) return std::nullopt;
+    if (name == names_.end() || (!outputs_.mark_log && name->second.empty())) return std::nullopt;
     const std::string& type = log_.log().topics()[log_.cloud_topic()].type;
     const std::vector<std::uint8_t> classes =
         classes_of(name->second, inspect_cloud(type, cloud).points);
-    if (adds_labels_) return with_labels(type, cloud, classes);
+    if (outputs_.mark_log) return with_labels(type, cloud, classes);
     const std::vector<std::uint8_t> keep = kept(classes);
     return without_points(type, cloud, keep);
   }
@@ -76,7 +69,8 @@ class CloudEditor {
   }
   std::vector<std::uint8_t> kept(std::vector<std::uint8_t> classes) const {
     for (std::uint8_t& value : classes) {
-      const bool stays = value == kRunStatic || (value == kRunNotJudged && !drops_not_judged_);
+      const bool stays =
+          value == kRunStatic || (value == kRunNotJudged && !outputs_.drop_not_judged);
       value = stays ? 1 : 0;
     }
     return classes;
@@ -84,44 +78,34 @@ class CloudEditor {
 
   const LogScans& log_;
   fs::path labels_;
-  bool adds_labels_;
-  bool drops_not_judged_;
+  const RunOutputs& outputs_;
   std::map<Place, std::string> names_;  ///< of the clouds on the topic; empty: without labels
   std::size_t unjudged_ = 0;
 };
 
 }  // namespace
 
-LogOutput::LogOutput(const RunPlan& plan, bool may_replace)
-    : recording_(plan.sequence),
-      range_(plan.range),
-      target_(plan.outputs.log),
-      adds_labels_(plan.outputs.mark_log),
-      drops_not_judged_(plan.outputs.drop_not_judged) {
-  check_kind();
-  check_is_no_scan(target_, recording_);
-  file_.emplace(target_, may_replace, plan.inputs);
-}
-
-void LogOutput::check_kind() const {
-  const std::string flag = "--write-log " + target_.string() + ": ";
-  if (recording_.log() == nullptr) {
+void check_log_output(const RunPlan& plan) {
+  const fs::path& target = plan.settings.outputs.log;
+  const std::string flag = "--write-log " + target.string() + ": ";
+  const LogScans* const log = plan.sequence.log();
+  if (log == nullptr) {
     throw ConfigError(flag + "the recording is no log; --write-clean writes its scans");
   }
-  if (target_.extension() != ".mcap")
-    throw ConfigError(flag + "expected a name that ends in .mcap");
-  if (!adds_labels_) return;
-  const LogScans& log = *recording_.log();
-  const std::string& type = log.log().topics()[log.cloud_topic()].type;
+  if (target.extension() != ".mcap") throw ConfigError(flag + "expected a name that ends in .mcap");
+  if (!plan.settings.outputs.mark_log) return;
+  const std::string& type = log->log().topics()[log->cloud_topic()].type;
   if (!can_have_labels(type)) throw ConfigError("--mark: clouds of " + type + " have no labels");
-  if (recording_.columns().label) throw ConfigError("--mark: the clouds have labels already");
+  if (plan.sequence.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 
-std::optional<std::size_t> LogOutput::write(const fs::path& results) const {
-  const CloudEditor editor(recording_, range_, results / "labels", adds_labels_, drops_not_judged_);
+std::optional<std::size_t> write_log(const RunPlan& plan, const fs::path& results,
+                                     const fs::path& file) {
+  const CloudEditor editor(plan, results / "labels");
   try {
-    const auto log = open_log(recording_.log()->log().path(), recording_.options().accept_missing);
-    copy_log(*log, file_->path(), std::cref(editor));
+    const auto log =
+        open_log(plan.sequence.log()->log().path(), plan.sequence.options().accept_missing);
+    copy_log(*log, file, std::cref(editor));
   } catch (const Interrupted&) {
     return std::nullopt;
   }

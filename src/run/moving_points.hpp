@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstring>
 
-#include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
 
@@ -23,19 +22,6 @@ void for_each_moving(Span<const PointLabel> labels, Visit&& visit) {
     if (next == nullptr) return;
     visit(static_cast<std::size_t>(next - first));
   }
-}
-
-/// Calls `visit(point)` for each moving point of a scan: a FilePoint in the world frame (m) with
-/// the label `label_of(i)`.
-template <class LabelOf, class Visit>
-void for_each_moving_point(const RecordedScan& scan, const ScanVerdict& verdict, LabelOf&& label_of,
-                           Visit&& visit) {
-  for_each_moving(verdict.labels, [&](std::size_t i) {
-    FilePoint point = scan.point(i);
-    point.position = verdict.T_world_sensor * point.position;
-    point.label = label_of(i);
-    visit(point);
-  });
 }
 
 }  // namespace dynains::program

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -37,6 +36,15 @@ void check_name(const fs::path& target) {
   if (target.extension() != kPartialEnd) return;
   throw ConfigError(target.string() +
                     ": names that end in .partial are those of unfinished outputs; choose another");
+}
+
+/// The place of a file. Throws ConfigError for the name, IoError if the file or its folder is read.
+fs::path allowed_target(const fs::path& target, const InputFiles& inputs) {
+  const fs::path place = whole_path(target);
+  check_name(place);
+  inputs.refuse(place);
+  inputs.refuse(place.parent_path());
+  return place;
 }
 
 }  // namespace
@@ -270,9 +278,8 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
 }
 
 OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
-    : target_(whole_path(target)), lock_(target_.parent_path(), FolderLock::Mode::kShared) {
-  check_name(target_);
-  inputs.refuse(target_);
+    : target_(allowed_target(target, inputs)),
+      lock_(target_.parent_path(), FolderLock::Mode::kShared) {
   const Folder parent(target_.parent_path());
   if (const auto entry = parent.find(target_.filename().string())) {
     if (entry->kind != Folder::Kind::kFile) {

@@ -1,6 +1,5 @@
 #include "run.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,13 +9,11 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/recording/second_pass.hpp"
 #include "estimate_poses.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
 #include "output_folder.hpp"
-#include "range_check.hpp"
 #include "run_doubts.hpp"
 #include "run_plan.hpp"
 #include "run_sequence.hpp"
@@ -37,45 +34,31 @@ void finish_second_pass(const RunPlan& plan, RunResults& results, const RunListe
   SecondPass* const pass = results.second_pass();
   if (pass == nullptr) return;
   pass->test([] { return InterruptGuard::signal() == 0; });
-  StaticMapAccumulator map(plan.config.map);
-  const auto add_to_map = [&](PointsView points, Span<const std::uint8_t> keep, const Pose& T) {
-    map.insert(points, keep, T);
-  };
-  results.revise(add_to_map, [&](std::size_t done) {
-    if (listener.revision_progress) listener.revision_progress(done, results.finished());
-  });
-  if (!results.map_points()) return;
-  map.for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
+  results.revise(plan.settings.config.map,
+                 [&](std::size_t done) { listener.revision_progress(done, results.finished()); });
 }
 
 /// Threads of the remover: two, if the machine has two cores or the configuration says so.
 int remover_threads(const RunPlan& plan) {
-  if (plan.outputs.thread != std::launch::async) return 1;
-  return std::thread::hardware_concurrency() > 1 ? 2 : plan.config.threads;
+  if (plan.settings.outputs.one_thread) return 1;
+  return std::thread::hardware_concurrency() > 1 ? 2 : plan.settings.config.threads;
 }
 
 /// Processes all scans, or those that come before a signal. Returns the times.
 RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& results) {
   const std::size_t total = plan.range.size();
-  const auto report_progress = [&](std::size_t done) {
-    if (listener.progress) listener.progress(done, total);
-  };
-  DynaInsRemover::Config config = plan.config;
+  DynaInsRemover::Config config = plan.settings.config;
   if (results.second_pass() != nullptr) config.build_map = false;  // the second pass makes the map
   config.threads = remover_threads(plan);
   DynaInsRemover remover(config);
-  report_progress(0);
+  listener.progress(0, total);
   RunTiming timing =
       run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
-        report_progress(done);
+        listener.progress(done, total);
         return InterruptGuard::signal() == 0;
       });
   finish_second_pass(plan, results, listener);
   return timing;
-}
-
-void warn(const RunListener& listener, const std::string& text) {
-  if (listener.warn) listener.warn(text);
 }
 
 /// The listener, whose warnings are also added to `warnings`. Both must outlive the result.
@@ -83,7 +66,7 @@ RunListener with_memory(const RunListener& listener, std::vector<std::string>& w
   RunListener result = listener;
   result.warn = [&](const std::string& text) {
     warnings.push_back(text);
-    warn(listener, text);
+    listener.warn(text);
   };
   return result;
 }
@@ -104,28 +87,9 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 " invalid (NaN, infinite or at the origin)");
 }
 
-RunDescription describe(const RunPlan& plan, const RunSettings& settings,
-                        const Agreement& agreement, const RunResults& results) {
-  const Recording& sequence = plan.sequence;
-  RunDescription description;
-  description.sequence = settings.recording;
-  description.sequence_flags = settings.recording_flags;
-  description.first_scan = sequence.name(plan.range.first);
-  // Without a finished scan: the first one.
-  description.last_scan =
-      sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
-  description.missing_poses = sequence.missing_pose_count();
-  description.log_ends_early = sequence.early_end().has_value();
-  description.agreement = agreement;
-  description.preset = settings.preset;
-  description.map = plan.outputs.map_name();
-  description.configuration = plan.configuration;
-  return description;
-}
-
 RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunTiming& timing) {
   RunOutcome outcome;
-  outcome.outputs = plan.outputs;
+  outcome.outputs = plan.settings.outputs;
   outcome.complete = results.is_complete();
   outcome.scans = results.finished();
   outcome.points = results.points();
@@ -162,43 +126,42 @@ nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
 struct OutsideOutputs {
   /// Files of the results that `out` replaces are replaced, too.
   OutsideOutputs(const RunPlan& plan, const OutputFolder& out) {
-    const fs::path& map_file = plan.outputs.map;
-    if (plan.outputs.has_outside_map()) {
-      check_is_no_scan(map_file, plan.sequence);
+    const fs::path& map_file = plan.settings.outputs.map;
+    if (plan.settings.outputs.has_outside_map()) {
       map.emplace(map_file, out.owns("/static_map/file", map_file), plan.inputs);
     }
-    const fs::path& log_file = plan.outputs.log;
+    const fs::path& log_file = plan.settings.outputs.log;
     if (log_file.empty()) return;
-    log.emplace(plan, out.owns("/request/write_log", log_file));
+    check_log_output(plan);
+    log.emplace(log_file, out.owns("/request/write_log", log_file), plan.inputs);
   }
 
-  std::optional<OutputFile> map;
-  std::optional<LogOutput> log;
+  std::optional<OutputFile> map, log;
 };
 
-/// Writes the log of the results in `folder`.
-void write_log(const LogOutput& log, const RunPlan& plan, const fs::path& folder,
+/// Writes the log of the results in `folder` to `file`.
+void write_log(const fs::path& file, const RunPlan& plan, const fs::path& folder,
                const RunListener& listener, RunOutcome& outcome) {
-  const std::optional<std::size_t> unjudged = log.write(folder);
+  const std::optional<std::size_t> unjudged = write_log(plan, folder, file);
   if (!unjudged) {
     outcome.complete = false;
     return;
   }
-  outcome.log = plan.outputs.log;
+  outcome.log = plan.settings.outputs.log;
   if (*unjudged == 0) return;
-  warn(listener, outcome.log.string() + ": " + std::to_string(*unjudged) +
-                     " clouds have no verdict, for lack of a pose, by their stamps or by --start "
-                     "and --end; they keep all points");
+  listener.warn(outcome.log.string() + ": " + std::to_string(*unjudged) +
+                " clouds have no verdict, for lack of a pose, by their stamps or by --start and "
+                "--end; they keep all points");
 }
 
 /// Throws ConfigError if the scans disagree with the poses. Returns the agreement.
-Agreement check_before(const RunPlan& plan, const RunSettings& settings,
-                       const RunListener& listener) {
-  check_ranges(plan.sequence, plan.range, plan.config,
+Agreement check_before(const RunPlan& plan, const RunListener& listener) {
+  const RunSettings& settings = plan.settings;
+  check_ranges(plan.sequence, plan.range, settings.config,
                settings.recording_flags.contains("--point-units"));
   const StartCheck start =
-      check_start(plan.sequence, plan.range, plan.config, settings.accept_poses);
-  for (const std::string& text : start.warnings) warn(listener, text);
+      check_start(plan.sequence, plan.range, settings.config, settings.accept_poses);
+  for (const std::string& text : start.warnings) listener.warn(text);
   if (!start.refusal.empty()) {
     throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
                       "; or run with these poses and clouds by --accept-poses");
@@ -209,7 +172,7 @@ Agreement check_before(const RunPlan& plan, const RunSettings& settings,
 /// Where the files are written that appear at the end.
 RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
                            const OutsideOutputs& outside) {
-  RunOutputs outputs = plan.outputs;
+  RunOutputs outputs = plan.settings.outputs;
   outputs.folder = out.path();
   if (!outputs.map.empty()) {
     outputs.map = outside.map ? outside.map->path() : out.path() / outputs.map.filename();
@@ -227,7 +190,7 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ord
     return out.keep_unfinished(report);
   }
   if (outputs.write_page) {
-    outcome.page = plan.outputs.folder / kViewPage;
+    outcome.page = plan.settings.outputs.folder / kViewPage;
     write_page(outputs.folder / kViewPage, outputs.folder, report, plan.sequence,
                kDefaultViewPoints);
   }
@@ -239,11 +202,11 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ord
 }
 
 /// Writes the results, from the first scan on, or until a signal comes.
-RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
-                         const RunListener& caller, OutputFolder& out, OutsideOutputs& outside) {
+RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputFolder& out,
+                         OutsideOutputs& outside) {
   std::vector<std::string> warnings = plan.sequence.warnings();
   const RunListener listener = with_memory(caller, warnings);
-  const Agreement agreement = check_before(plan, settings, listener);
+  const Agreement agreement = check_before(plan, listener);
   std::optional<SessionContribution> session;
   std::optional<SessionAlignment> alignment;
   // The results that are replaced may have added the session already.
@@ -262,13 +225,13 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunResults results(plan.sequence, plan.range, outputs);
   if (session) results.contribute_to(*session);
   ScratchFile store(outputs.folder);
-  Returns returns(store, plan.config.evidence);
+  Returns returns(store, plan.settings.config.evidence);
   std::optional<SecondPass> second_pass;
-  if (plan.passes > 1) {
+  if (plan.settings.passes > 1) {
     SecondPassConfig config;
-    config.static_policy = plan.static_policy;
-    config.evidence = plan.config.evidence;
-    config.threads = outputs.thread == std::launch::async ? 2 : 1;
+    config.static_policy = plan.settings.static_policy;
+    config.evidence = plan.settings.config.evidence;
+    config.threads = outputs.one_thread ? 1 : 2;
     results.wait_for(second_pass.emplace(store, config));
   } else {
     results.watch(returns);
@@ -280,20 +243,17 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
   doubts.returns = return_errors(plan.sequence, plan.range.first,
                                  second_pass ? second_pass->returns() : returns.found());
-  for (const std::string& text : sentences(doubts, plan.sequence)) warn(listener, text);
+  for (const std::string& text : sentences(doubts, plan.sequence)) listener.warn(text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kEstimatedPoses, plan.sequence);
   if (outside.log && outcome.complete) {
-    write_log(*outside.log, plan, outputs.folder, listener, outcome);
+    write_log(outside.log->path(), plan, outputs.folder, listener, outcome);
   }
-  outcome.wall = wall_time(ms_since(settings.started), timing);
-  RunDescription description = describe(plan, settings, agreement, results);
-  description.wall = outcome.wall;
-  description.doubts = to_json(doubts, plan.sequence);
-  description.doubts["warnings"] = warnings;
-  nlohmann::ordered_json report = make_report(description, results, timing);
-  report["request"] = plan.request;
+  outcome.wall = wall_time(ms_since(plan.settings.started), timing);
+  nlohmann::ordered_json told = to_json(doubts, plan.sequence);
+  told["warnings"] = warnings;
+  nlohmann::ordered_json report = make_report(plan, agreement, outcome.wall, told, results, timing);
   if (second_pass) report["second_pass"] = to_json(*second_pass, plan);
   publish(plan, outputs, report, out, outside, session ? &*session : nullptr, outcome);
   return outcome;
@@ -303,10 +263,10 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
 
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
   const RunPlan plan = make_plan(settings, std::move(recording));
-  OutputFolder out(plan.outputs.folder, run_output_kind(), plan.listing, settings.force,
+  OutputFolder out(plan.settings.outputs.folder, run_output_kind(), plan.listing, settings.force,
                    plan.inputs);
   OutsideOutputs outside(plan, out);
-  return write_results(plan, settings, listener, out, outside);
+  return write_results(plan, listener, out, outside);
 }
 
 }  // namespace dynains::program

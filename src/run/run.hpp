@@ -17,13 +17,14 @@
 
 namespace dynains::program {
 
-/// How a run and its caller reach each other while it lasts. All functions may be empty.
+/// How a run and its caller reach each other while it lasts.
 struct RunListener {
-  std::function<void(const std::string&)> warn;
+  std::function<void(const std::string&)> warn = [](const std::string&) {};
   /// Called before the first scan and after each.
-  std::function<void(std::size_t done, std::size_t total)> progress;
+  std::function<void(std::size_t done, std::size_t total)> progress = [](std::size_t, std::size_t) {
+  };
   /// Called before the second pass revises the first scan and after each.
-  std::function<void(std::size_t done, std::size_t total)> revision_progress;
+  std::function<void(std::size_t done, std::size_t total)> revision_progress = progress;
   SecondSignal second_signal = SecondSignal::kEndsProcess;
 };
 

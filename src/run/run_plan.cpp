@@ -34,46 +34,40 @@ void check_scans(const Recording& sequence, const ScanRange& range) {
   }
 }
 
-/// Path of the map; empty if there is none. Throws ConfigError.
-fs::path choose_map(const RunSettings& settings, const DynaInsRemover::Config& config) {
-  const fs::path out = whole_path(settings.out);
-  if (settings.map.empty()) return config.build_map ? out / "static_map.ply" : fs::path();
-  if (!config.build_map) throw ConfigError("--map needs --build-map true");
-  return map_path(settings.map, out);
-}
-
 /// Whether `path` lies in a folder of results. Both are by whole_path().
 bool is_in_results(const fs::path& path, const fs::path& out) {
   return std::mismatch(out.begin(), out.end(), path.begin(), path.end()).first == out.end();
 }
 
-/// Place of the log that is written; empty if there is none. Throws ConfigError.
-fs::path choose_log(const RunSettings& settings) {
-  if (settings.log.empty()) {
-    if (settings.mark_log) throw ConfigError("--mark needs --write-log");
-    return {};
-  }
-  const fs::path out = whole_path(settings.out);
-  const fs::path log = whole_path(settings.log);
-  if (is_in_results(log, out)) {
-    throw ConfigError("--write-log " + settings.log + ": choose a place outside of --out");
-  }
-  return log;
-}
-
 /// Throws ConfigError.
-void add_map_attributes(const RunSettings& settings, const DynaInsRemover::Config& config,
-                        RunOutputs& outputs) {
-  outputs.map_attributes = settings.map_attributes || outputs.has_las_map();
+void complete_map(const DynaInsRemover::Config& config, RunOutputs& outputs) {
+  if (!config.build_map) {
+    if (!outputs.map.empty()) throw ConfigError("--map needs --build-map true");
+    if (outputs.map_attributes) throw ConfigError("--map-attributes needs --build-map true");
+  } else {
+    const fs::path out = whole_path(outputs.folder);
+    outputs.map =
+        outputs.map.empty() ? out / "static_map.ply" : map_path(outputs.map.string(), out);
+  }
+  if (outputs.has_las_map()) outputs.map_attributes = true;
   constexpr double kFinest = 0.01;  // m, for a map of all points
   outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
-  outputs.crs = settings.crs;
-  if (settings.map_attributes && !config.build_map) {
-    throw ConfigError("--map-attributes needs --build-map true");
-  }
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
   wkt_of(outputs.crs);
+}
+
+/// Throws ConfigError.
+void complete_log(RunOutputs& outputs) {
+  if (outputs.log.empty()) {
+    if (outputs.mark_log) throw ConfigError("--mark needs --write-log");
+    return;
+  }
+  const fs::path log = whole_path(outputs.log);
+  if (is_in_results(log, whole_path(outputs.folder))) {
+    throw ConfigError("--write-log " + outputs.log.string() + ": choose a place outside of --out");
+  }
+  outputs.log = log;
 }
 
 /// Throws ConfigError.
@@ -89,28 +83,19 @@ void check_passes(const RunSettings& settings) {
 
 /// Outputs of the run. Throws ConfigError.
 RunOutputs outputs_of(const RunSettings& settings) {
-  const DynaInsRemover::Config& config = settings.config;
-  RunOutputs outputs;
-  outputs.folder = settings.out;
-  outputs.map = choose_map(settings, config);
-  outputs.write_online = settings.write_online;
-  outputs.write_clean = settings.write_clean;
-  outputs.drop_not_judged = settings.drop_not_judged;
-  outputs.write_poses = settings.poses_are_estimated;
-  outputs.log = choose_log(settings);
-  outputs.mark_log = settings.mark_log;
-  outputs.write_page = settings.view;
-  outputs.write_beliefs = settings.view || settings.write_beliefs;
-  add_map_attributes(settings, config, outputs);
+  RunOutputs outputs = settings.outputs;
+  complete_map(settings.config, outputs);
+  complete_log(outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
-  if (settings.passes > 1 && outputs.needs_beliefs()) outputs.write_beliefs = true;
+  if (outputs.write_page || (settings.passes > 1 && outputs.map_attributes)) {
+    outputs.write_beliefs = true;
+  }
   return outputs;
 }
 
 InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
-  InputFiles inputs;
-  for (const fs::path& file : sequence.files()) inputs.add(file);
+  InputFiles inputs(sequence);
   inputs.add(sequence.scan_folder());
   inputs.add(sequence.folder() / "labels");
   if (!settings.config_file.empty()) inputs.add(settings.config_file);
@@ -139,7 +124,7 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
     return request;
   }
   request.city = whole_path(settings.update);
-  const fs::path out = whole_path(settings.out);
+  const fs::path out = whole_path(settings.outputs.folder);
   if (out == request.city || out.parent_path() == request.city) {
     throw ConfigError("--update " + settings.update +
                       ": is a map of many sessions; choose a folder for --out outside of it");
@@ -211,14 +196,14 @@ void check_settings(const RunSettings& settings) { outputs_of(settings); }
 RunPlan make_plan(const RunSettings& given, Recording sequence) {
   RunSettings settings = given;
   DynaInsRemover::Config& config = settings.config;
-  RunOutputs outputs = outputs_of(settings);
+  RunOutputs& outputs = settings.outputs;
+  outputs = outputs_of(given);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
   if (settings.find_own_body) {
     config.min_range = own_body_range(sequence, range, config.min_range);
     config.validate();
   }
-  if (settings.one_thread) outputs.thread = std::launch::deferred;
   const nlohmann::ordered_json configuration = parameters_of(config);
   nlohmann::ordered_json request = {{"poses_and_times", pose_fingerprint(sequence, range)},
                                     {"points_in_world", sequence.frame() == PointFrame::kWorld},
@@ -240,15 +225,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range);
   InputFiles inputs = inputs_of(settings, sequence);
-  return {config,          std::move(sequence),   range,
-          outputs,         std::move(listing),    std::move(inputs),
-          configuration,   std::move(request),    std::move(session),
-          settings.passes, settings.static_policy};
-}
-
-void check_is_no_scan(const fs::path& output, const Recording& recording) {
-  if (identity_of(output.parent_path()) != identity_of(recording.scan_folder())) return;
-  throw IoError(output.string() + ": the scans are there; choose another folder");
+  return {std::move(settings), std::move(sequence), range,
+          std::move(listing),  std::move(inputs),   configuration,
+          std::move(request),  std::move(session)};
 }
 
 }  // namespace dynains::program

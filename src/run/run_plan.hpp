@@ -2,11 +2,8 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "input_files.hpp"
@@ -19,17 +16,14 @@
 namespace dynains::program {
 
 struct RunPlan {
-  DynaInsRemover::Config config;
+  RunSettings settings;  ///< complete
   Recording sequence;
   ScanRange range;
-  RunOutputs outputs;
   OutputListing listing;  ///< of the results
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
   nlohmann::ordered_json request;        ///< what determines the results, and no other field tells
   SessionRequest session;
-  int passes = 1;  ///< over the recording
-  StaticPolicy static_policy = StaticPolicy::kAlways;
 };
 
 /// Path of the file that a flag --map names, links followed. `out`: folder of the results, by
@@ -50,10 +44,6 @@ void check_settings(const RunSettings& settings);
 
 /// Checks everything but the points. Throws ConfigError, IoError, PoseError.
 RunPlan make_plan(const RunSettings& given, Recording sequence);
-
-/// Throws IoError if `output`, a file of a command over `recording`, lies among the scans, where it
-/// would be read as one.
-void check_is_no_scan(const std::filesystem::path& output, const Recording& recording);
 
 /// The scans in a window. Throws ConfigError if there is none.
 ScanRange select_scans(const Recording& sequence, const ScanWindow& window);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <iomanip>
 #include <locale>
+#include <map>
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
@@ -21,16 +22,17 @@ nlohmann::ordered_json to_json(std::vector<double> values) {
 }
 
 nlohmann::ordered_json times_to_json(const RunTiming& timing) {
-  nlohmann::ordered_json json;
-  const auto column = [&](auto&& value_of) {
-    std::vector<double> values;
-    for (const TimingRow& row : timing.rows) values.push_back(value_of(row));
-    return to_json(std::move(values));
-  };
-  for (std::size_t stage = 0; stage < timing.stages.size(); ++stage) {
-    json[timing.stages[stage]] = column([&](const TimingRow& row) { return row.stages[stage]; });
+  std::map<std::string, std::vector<double>> columns;
+  for (const TimingRow& row : timing.rows) {
+    StageTimes::visit(row.stages,
+                      [&](const char* stage, double ms) { columns[stage].push_back(ms); });
+    columns["total"].push_back(row.total);
   }
-  json["total"] = column([](const TimingRow& row) { return row.total; });
+  nlohmann::ordered_json json;
+  const StageTimes none;
+  StageTimes::visit(
+      none, [&](const char* stage, double) { json[stage] = to_json(std::move(columns[stage])); });
+  json["total"] = to_json(std::move(columns["total"]));
   return json;
 }
 
@@ -69,37 +71,45 @@ WallTime wall_time(double ms, const RunTiming& timing) {
   return {ms, std::clamp(1.0 - timing.pipeline / ms, 0.0, 1.0)};
 }
 
-nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
-                                   const RunTiming& timing) {
+nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
+                                   const WallTime& wall, const nlohmann::ordered_json& doubts,
+                                   const RunResults& results, const RunTiming& timing) {
+  const Recording& sequence = plan.sequence;
+  const RunSettings& settings = plan.settings;
   const LabelCounts& labels = results.labels();
   nlohmann::ordered_json report = begin_marker(run_output_kind());
   report["static_map"] = nullptr;
-  if (!run.map.empty()) report["static_map"] = {{"file", run.map}};
-  report["sequence"] = run.sequence;
-  report["sequence_flags"] = run.sequence_flags;
-  report["first_scan"] = run.first_scan;
-  report["last_scan"] = run.last_scan;
+  if (results.map_points()) {
+    report["static_map"] = {{"file", settings.outputs.map_name()},
+                            {"points", *results.map_points()}};
+  }
+  report["sequence"] = settings.recording;
+  report["sequence_flags"] = settings.recording_flags;
+  report["first_scan"] = sequence.name(plan.range.first);
+  // Without a finished scan: the first one.
+  report["last_scan"] =
+      sequence.name(plan.range.first + std::max<std::size_t>(results.finished(), 1) - 1);
   report["scans"] = results.finished();
-  report["scans_without_pose"] = run.missing_poses;
-  report["log_ends_early"] = run.log_ends_early;
+  report["scans_without_pose"] = sequence.missing_pose_count();
+  report["log_ends_early"] = sequence.early_end().has_value();
   report["points"] = results.points();
   report["labels"] = {{"invalid", labels[PointLabel::kInvalid]},
                       {"out_of_range", labels[PointLabel::kOutOfRange]},
                       {"ground", labels[PointLabel::kGround]},
                       {"static", labels[PointLabel::kStatic]},
                       {"dynamic", labels[PointLabel::kDynamic]}};
-  if (results.map_points()) report["static_map"]["points"] = *results.map_points();
   report["milliseconds"] = times_to_json(timing);
   report["flush_milliseconds"] = timing.flush;
-  report["wall_milliseconds"] = run.wall.ms;
-  report["share_outside_pipeline"] = run.wall.outside;
+  report["wall_milliseconds"] = wall.ms;
+  report["share_outside_pipeline"] = wall.outside;
   report["peak_memory_bytes"] = peak_memory_bytes();
   report["pose_agreement"] = nullptr;
-  if (run.agreement.points > 0) report["pose_agreement"] = run.agreement.share;
+  if (agreement.points > 0) report["pose_agreement"] = agreement.share;
   report["pose_residual"] = pose_residual_to_json(timing);
-  report["doubts"] = run.doubts;
-  report["preset"] = run.preset;
-  report["configuration"] = run.configuration;
+  report["doubts"] = doubts;
+  report["preset"] = settings.preset;
+  report["configuration"] = plan.configuration;
+  report["request"] = plan.request;
   return report;
 }
 
@@ -113,11 +123,12 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
   std::ostream& out = file.stream();
   out.imbue(std::locale::classic());
   out << std::fixed << std::setprecision(4) << "scan,points";
-  for (const std::string& stage : timing.stages) out << ',' << stage << "_ms";
+  const StageTimes none;
+  StageTimes::visit(none, [&](const char* stage, double) { out << ',' << stage << "_ms"; });
   out << ",total_ms,pose_residual_m,pose_residual_deg,time_s\n";
   for (const TimingRow& row : timing.rows) {
     out << evaluation::csv_field(row.scan) << ',' << row.points;
-    for (const double ms : row.stages) out << ',' << ms;
+    StageTimes::visit(row.stages, [&](const char*, double ms) { out << ',' << ms; });
     out << ',' << row.total << ',';
     if (row.pose_residual) out << row.pose_residual->translation;
     out << ',';

@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
 #include "output_folder.hpp"
-#include "run_results.hpp"
+#include "run_plan.hpp"
 #include "run_timing.hpp"
 
 namespace dynains::program {
@@ -35,23 +34,11 @@ struct WallTime {
 /// `ms`: from the start of the command on.
 WallTime wall_time(double ms, const RunTiming& timing);
 
-struct RunDescription {
-  std::string sequence;
-  nlohmann::ordered_json sequence_flags;  ///< flag -> value, those that describe the files
-  std::string first_scan;
-  std::string last_scan;
-  std::size_t missing_poses = 0;  ///< scans that were left out because they have no pose
-  bool log_ends_early = false;    ///< scans behind the early end are missing
-  std::string preset;
-  Agreement agreement;  ///< of the scans under the poses, by a sample
-  std::string map;      ///< file, relative to the folder of results if it lies there; empty: none
-  nlohmann::ordered_json configuration;  ///< parameter name -> value
-  WallTime wall;
-  nlohmann::ordered_json doubts;  ///< see to_json(RunDoubts), and "warnings"
-};
-
-nlohmann::ordered_json make_report(const RunDescription& run, const RunResults& results,
-                                   const RunTiming& timing);
+/// `agreement`: of the scans under the poses, by a sample. `doubts`: see to_json(RunDoubts), and
+/// "warnings".
+nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
+                                   const WallTime& wall, const nlohmann::ordered_json& doubts,
+                                   const RunResults& results, const RunTiming& timing);
 
 /// The folder of a run.
 const OutputKind& run_output_kind();

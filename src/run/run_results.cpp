@@ -114,9 +114,10 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
       overview_(path_of(recording, range)),
       overview_file_(outputs.folder / kOverviewPicture),
       needs_beliefs_(outputs.needs_beliefs()),
-      writing_(outputs.thread) {
+      writing_(outputs.thread()),
+      writing_online_(outputs.thread()) {
   final_labels_.create_folders();
-  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online", outputs.thread);
+  if (outputs.write_online) online_labels_.emplace(outputs.folder / "online").create_folders();
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
   if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
@@ -131,7 +132,11 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 void RunResults::take_newest(const FrameResult& frame) {
   const NewestVerdict& verdict = frame.newest;
   compared_.add(frame);
-  if (online_labels_) online_labels_->write(recording_.name(range_.first + verdict.scan), verdict);
+  if (!online_labels_) return;
+  writing_online_.wait();
+  online_labels_->take(verdict);
+  writing_online_.begin(
+      [this, i = range_.first + verdict.scan] { online_labels_->write(recording_.name(i)); });
 }
 
 void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
@@ -147,15 +152,12 @@ void JudgedScan::refer_to_arrays() {
   verdict.causes = arrays.causes;
 }
 
-void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
+void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(verdict, needs_beliefs_);
   judged_.compared = compared_[verdict.scan];
-  if (scan != nullptr) std::swap(judged_.scan, *scan);
-  writing_.begin([this, reads = scan == nullptr] {
-    if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
-    write_final(judged_.scan, judged_.verdict);
-  });
+  std::swap(judged_.scan, scan);
+  writing_.begin([this] { write_final(judged_.scan, judged_.verdict); });
   ++finished_;
 }
 
@@ -173,24 +175,11 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   }
 }
 
-void RunResults::revise(const AddToMap& add_to_map,
+void RunResults::revise(const StaticMapAccumulator::Config& map,
                         const std::function<void(std::size_t done)>& progress) {
   if (finished_ == 0) return;
+  if (map_) revised_map_.emplace(map);
   progress(0);
-  try {
-    revise_scans(add_to_map, progress);
-  } catch (...) {
-    // The last task must not outlive what the caller has given.
-    try {
-      finish();
-    } catch (...) {  // the first exception is thrown
-    }
-    throw;
-  }
-}
-
-void RunResults::revise_scans(const AddToMap& add_to_map,
-                              const std::function<void(std::size_t done)>& progress) {
   ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, thread());
   JudgedScan judged;
   for (std::size_t i = 0; i < finished_; ++i) {
@@ -208,25 +197,26 @@ void RunResults::revise_scans(const AddToMap& add_to_map,
     judged_.verdict.time = recording_.time(index);
     judged_.verdict.T_world_sensor = T_world_sensor;
     judged_.refer_to_arrays();
-    writing_.begin([this, is_revised, &add_to_map] { write_revised(is_revised, add_to_map); });
+    writing_.begin([this, is_revised] { write_revised(is_revised); });
     progress(i + 1);
   }
   finish();
+  if (revised_map_) revised_map_->for_each([&](const auto& point) { add_map_point(point); });
 }
 
-void RunResults::write_revised(bool is_revised, const AddToMap& add_to_map) {
+void RunResults::write_revised(bool is_revised) {
   const ScanVerdict& verdict = judged_.verdict;
   if (is_revised) {
     final_labels_.take(verdict);
     final_labels_.write(recording_.name(range_.first + verdict.scan));
   }
   complete_scan(judged_.scan, verdict);
-  if (!map_) return;
+  if (!revised_map_) return;
   keep_.resize(judged_.points.size());
   std::transform(verdict.labels.begin(), verdict.labels.end(), keep_.begin(), [](PointLabel label) {
     return static_cast<std::uint8_t>(is_static(label) ? 1 : 0);
   });
-  add_to_map(judged_.points, keep_, verdict.T_world_sensor);
+  revised_map_->insert(judged_.points, keep_, verdict.T_world_sensor);
 }
 
 bool RunResults::is_complete() const {
@@ -238,10 +228,12 @@ void RunResults::complete_scan(const RecordedScan& scan, const ScanVerdict& verd
   labels_.add(verdict.labels);
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
-  for_each_moving_point(
-      scan, verdict,
-      [&](std::size_t i) { return mos_label(verdict.labels[i], verdict.instances[i]); },
-      [&](const FilePoint& point) { dynamic_points_.add(point); });
+  for_each_moving(verdict.labels, [&](std::size_t i) {
+    FilePoint point = scan.point(i);
+    point.position = verdict.T_world_sensor * point.position;
+    point.label = mos_label(verdict.labels[i], verdict.instances[i]);
+    dynamic_points_.add(point);
+  });
 }
 
 void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
@@ -264,7 +256,7 @@ void RunResults::add_map_point(const Eigen::Vector3d& point) {
 
 void RunResults::commit() {
   finish();
-  if (online_labels_) online_labels_->finish();
+  writing_online_.wait();
   dynamic_points_.commit();
   if (dynamic_las_) dynamic_las_->commit();
   overview_.picture().write_png(overview_file_);

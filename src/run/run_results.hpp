@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -16,6 +15,7 @@
 #include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
@@ -41,6 +41,8 @@ inline constexpr const char* kEstimatedPoses = "poses.txt";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
 
+/// The results of a run. A plan has them whole: in settings, an empty `map` is the file
+/// static_map.ply in the folder.
 struct RunOutputs {
   std::filesystem::path folder;
   std::filesystem::path map;  ///< by whole_path(); empty: no map
@@ -52,11 +54,12 @@ struct RunOutputs {
   bool write_poses = false;
   bool write_page = false;  ///< of dynains view
   bool write_beliefs = false;
-  std::launch thread = std::launch::async;  ///< deferred: the caller reads and writes
-  bool map_attributes = false;              ///< the map holds attributes of its points
-  std::string crs;                          ///< of a LAS map, for example "EPSG:25832"; empty: none
-  double map_voxel = 0.0;                   ///< m, of attributes
+  bool one_thread = false;      ///< the caller reads and writes
+  bool map_attributes = false;  ///< the map holds attributes of its points
+  std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
+  double map_voxel = 0.0;       ///< m, of attributes
 
+  std::launch thread() const { return one_thread ? std::launch::deferred : std::launch::async; }
   /// Whether a result holds beliefs.
   bool needs_beliefs() const { return write_beliefs || map_attributes; }
   bool has_outside_map() const;
@@ -102,9 +105,9 @@ class RunResults {
   /// The result of the push just made.
   void take_newest(const FrameResult& frame);
   /// The final verdict on a scan, in the order of the scans. Keeps the content of `scan` and gives
-  /// the content of an earlier scan back, whose memory the caller can use again. If `scan` is null,
-  /// the scan is read from its file. Throws IoError, for the scan before as well.
-  void take_final(RecordedScan* scan, const ScanVerdict& verdict);
+  /// the content of an earlier scan back, whose memory the caller can use again. Throws IoError,
+  /// for the scan before as well.
+  void take_final(RecordedScan& scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.
@@ -115,13 +118,12 @@ class RunResults {
   /// Final verdicts also go to `returns`, which outlives this.
   void watch(Returns& returns) { returns_ = &returns; }
   SecondPass* second_pass() const { return second_pass_; }
-  /// Adds the points with `keep` to the map; m, sensor frame.
-  using AddToMap =
-      std::function<void(PointsView, Span<const std::uint8_t> keep, const Pose& T_world_sensor)>;
   /// Reads all scans and first verdicts again, revises them by the second pass, and makes all other
-  /// results of them. Calls `progress` before the first scan and after each. Throws IoError.
-  void revise(const AddToMap& add_to_map, const std::function<void(std::size_t done)>& progress);
-  /// The thread that reads and writes, RunOutputs::thread.
+  /// results of them, the map with this configuration. Calls `progress` before the first scan and
+  /// after each. Throws IoError.
+  void revise(const StaticMapAccumulator::Config& map,
+              const std::function<void(std::size_t done)>& progress);
+  /// See RunOutputs::thread().
   std::launch thread() const { return writing_.policy(); }
 
   void add_map_point(const Eigen::Vector3d& point);
@@ -139,7 +141,7 @@ class RunResults {
   const Recording& recording_;
   ScanRange range_;
   LabelFiles final_labels_;
-  std::optional<LabelWriter> online_labels_;
+  std::optional<LabelFiles> online_labels_;  ///< belong to writing_online_
   std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
   Overview overview_;
@@ -158,12 +160,11 @@ class RunResults {
   // These belong to the writing thread until writing_.wait().
   JudgedScan judged_;
   std::vector<std::uint8_t> keep_;
-  Background writing_;
+  std::optional<StaticMapAccumulator> revised_map_;
+  Background writing_, writing_online_;
 
   void write_final(const RecordedScan& scan, const ScanVerdict& verdict);
-  void revise_scans(const AddToMap& add_to_map,
-                    const std::function<void(std::size_t done)>& progress);
-  void write_revised(bool is_revised, const AddToMap& add_to_map);
+  void write_revised(bool is_revised);
   void complete_scan(const RecordedScan& scan, const ScanVerdict& verdict);
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
 };

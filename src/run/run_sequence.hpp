@@ -3,14 +3,14 @@
 
 #include <chrono>
 #include <cstddef>
+#include <deque>
 #include <utility>
-#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
 #include "naming_scan.hpp"
-#include "open_scans.hpp"
 #include "points_of.hpp"
+#include "read_ahead.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
@@ -37,16 +37,23 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
                        RunResults& results, KeepGoing&& keep_going) {
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
-  timing.stages = stage_names();
-  OpenScans scans(recording, range, remover.latency(), results.thread());
+  ReadAhead reader(recording, range.first, range.last, results.thread());
+  std::deque<RecordedScan> open;  // scans without a final verdict, oldest first
+  RecordedScan judged;
+  const auto take_final = [&](const ScanVerdict& verdict) {
+    judged = std::move(open.front());
+    open.pop_front();
+    results.take_final(judged, verdict);
+  };
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    const RecordedScan& scan = scans.next();
+    const RecordedScan& scan = open.emplace_back(reader.next(std::exchange(judged, {})));
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
-    timing.rows.push_back(timing_row(recording.name(i), scan.size(), ms_since(begin), frame));
-    timing.rows.back().time = recording.time(i);
+    timing.rows.push_back({recording.name(i), scan.size(), frame.times, ms_since(begin),
+                           frame.pose_residual, frame.began_epoch, frame.plausibility,
+                           recording.time(i)});
     results.take_newest(frame);
-    if (frame.finished) results.take_final(scans.next_judged(), *frame.finished);
+    if (frame.finished) take_final(*frame.finished);
     if (!keep_going(timing.rows.size())) break;
   }
 
@@ -54,7 +61,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   const Clock::time_point begin = Clock::now();
   remover.flush([&](const ScanVerdict& verdict) {
     const Clock::time_point begin_writing = Clock::now();
-    results.take_final(scans.next_judged(), verdict);
+    take_final(verdict);
     writing += ms_since(begin_writing);
   });
   timing.flush = ms_since(begin) - writing;

@@ -15,6 +15,7 @@
 #include "labelled_sequence.hpp"
 #include "parameter_values.hpp"
 #include "recording_settings.hpp"
+#include "run_results.hpp"
 
 namespace dynains::program {
 
@@ -29,29 +30,17 @@ std::optional<T> read_number(const std::string& text) {
 }
 
 struct RunSettings {
-  std::string out;                      ///< folder of the results
-  std::string map;                      ///< file of the static map; empty: static_map.ply in `out`
+  RunOutputs outputs;                   ///< as asked for
   std::string update;                   ///< folder of a map of many sessions; empty: none
   std::string session;                  ///< name there; empty: that of the recording
   std::optional<double> session_begin;  ///< s; none: time of the first scan
   bool align = false;                   ///< moves the session into the frame of `update`
   std::string align_start;              ///< as of read_extrinsic(); empty: identity
-  bool map_attributes = false;
-  std::string crs;  ///< of a LAS map, for example "EPSG:25832"; empty: none
   ScanWindow window;
   int passes = 1;  ///< 2: scans of the whole recording revise the first verdicts
   StaticPolicy static_policy = StaticPolicy::kAlways;  ///< of two passes
-  bool one_thread = false;                             ///< works, reads and writes in one thread
-  bool write_online = false;
-  bool write_clean = false;
-  std::string log;        ///< file or folder of the log without moving points; empty: none
-  bool mark_log = false;  ///< the log keeps all points, with their labels
-  bool write_beliefs = false;
-  bool view = false;
   bool force = false;
   bool accept_poses = false;
-  bool poses_are_estimated = false;  ///< by the odometry; they are a result
-  bool drop_not_judged = false;      ///< clean/ has no points that are not judged
   /// Whether `config.min_range` follows what the sensor sees of its own body.
   bool find_own_body = false;
 
@@ -79,6 +68,7 @@ struct RunSettings {
 
 template <class Self, class Visitor>
 void RunSettings::visit_common(Self& self, Visitor&& visitor) {
+  constexpr auto kPath = &read_text<std::filesystem::path>;
   visitor(
       Parameter{"force", self.force, Bounds(), "",
                 "replace the results of an earlier run, and its files of map and write_log, "
@@ -89,7 +79,7 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
   visitor(TextParameter{"end", self.window.end, &read_number<std::uint64_t>, "N",
                         "number of the last scan (inclusive)"});
   visitor(
-      TextParameter{"map", self.map, &read_text<std::string>, "FILE",
+      TextParameter{"map", self.outputs.map, kPath, "FILE",
                     "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"});
   visitor(Parameter{"passes", self.passes, closed(1, 2), "",
                     "2: after the last scan, scans of the whole recording remove what came or went "
@@ -97,7 +87,7 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
   visitor(Parameter{"static", self.static_policy, Bounds(), "",
                     "with two passes: what never came or went, or what stands at last, as a car "
                     "that has parked"});
-  visitor(Parameter{"view", self.view, Bounds(), "",
+  visitor(Parameter{"view", self.outputs.write_page, Bounds(), "",
                     "also write the page view.html, which shows the results, and the folder "
                     "beliefs"});
   visitor(Parameter{"accept_poses", self.accept_poses, Bounds(), "",
@@ -108,10 +98,11 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
 template <class Self, class Visitor>
 void RunSettings::visit_more(Self& self, Visitor&& visitor) {
   constexpr auto kText = &read_text<std::string>;
-  visitor(Parameter{"map_attributes", self.map_attributes, Bounds(), "",
+  constexpr auto kPath = &read_text<std::filesystem::path>;
+  visitor(Parameter{"map_attributes", self.outputs.map_attributes, Bounds(), "",
                     "the map holds intensity, time and label of its points, as far as scans have "
                     "them; a map of LAS holds its attributes always"});
-  visitor(TextParameter{"crs", self.crs, kText, "EPSG:N",
+  visitor(TextParameter{"crs", self.outputs.crs, kText, "EPSG:N",
                         "coordinate reference system of the poses, for a map of LAS [none]"});
   visitor(
       TextParameter{"update", self.update, kText, "CITY",
@@ -128,23 +119,23 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
   visitor(TextParameter{"align_start", self.align_start, kText, "POSE",
                         "start of the alignment, pose of the session's frame in that of the map: "
                         "\"x y z qx qy qz qw\", or a file [identity]"});
-  visitor(Parameter{"write_online", self.write_online, Bounds(), "",
+  visitor(Parameter{"write_online", self.outputs.write_online, Bounds(), "",
                     "also write the verdicts without latency, to the folder online"});
-  visitor(Parameter{"write_clean", self.write_clean, Bounds(), "",
+  visitor(Parameter{"write_clean", self.outputs.write_clean, Bounds(), "",
                     "also write every scan without its moving points, to the folder clean, in the "
                     "form it has in the recording"});
-  visitor(TextParameter{"write_log", self.log, kText, "FILE",
+  visitor(TextParameter{"write_log", self.outputs.log, kPath, "FILE",
                         "also write the log of the recording again, as MCAP: all messages as they "
                         "are, except that clouds of the topic have no moving points"});
-  visitor(Parameter{"mark", self.mark_log, Bounds(), "",
+  visitor(Parameter{"mark", self.outputs.mark_log, Bounds(), "",
                     "clouds of that log keep all points and get a field `label` (uint8): 251 "
                     "moving, 9 static, 0 not judged"});
-  visitor(Parameter{"drop_not_judged", self.drop_not_judged, Bounds(), "",
+  visitor(Parameter{"drop_not_judged", self.outputs.drop_not_judged, Bounds(), "",
                     "clean scans and the log have no points that are not judged, as too near or "
                     "too far; the map never has them"});
-  visitor(Parameter{"write_beliefs", self.write_beliefs, Bounds(), "",
+  visitor(Parameter{"write_beliefs", self.outputs.write_beliefs, Bounds(), "",
                     "also write the probability that a point moves, to the folder beliefs"});
-  visitor(Parameter{"one_thread", self.one_thread, Bounds(), "",
+  visitor(Parameter{"one_thread", self.outputs.one_thread, Bounds(), "",
                     "after the check of poses, the run works, reads and writes in one thread, for "
                     "machines on which many runs use all cores"});
 }

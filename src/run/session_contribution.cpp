@@ -30,6 +30,20 @@ bool SessionRequest::is_fulfilled() const {
   });
 }
 
+SessionRequest reposed_session(const std::filesystem::path& folder, const std::string& name,
+                               const std::string& fingerprint) {
+  const City city(folder);
+  for (const SessionInfo& session : city.sessions()) {
+    if (session.name != name) continue;
+    SessionRequest request{folder, session, city.grid(), {}};
+    request.info.fingerprint = fingerprint;
+    request.info.alignment.reset();
+    return request;
+  }
+  throw ConfigError(folder.string() + ": has no session \"" + name +
+                    "\"; name the session of the run by --session");
+}
+
 SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range) {
   if (!request.T_city_start) return request;
   if (!std::filesystem::exists(request.city)) {
@@ -51,11 +65,10 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
   return request;
 }
 
-SessionContribution::SessionContribution(const SessionRequest& request)
-    : SessionContribution(City::open_or_make(request.city, request.grid), request) {}
-
-SessionContribution::SessionContribution(const City& city, const SessionRequest& request)
-    : store_(city.folder()), writer_(city, request.info, store_) {
+SessionContribution::SessionContribution(const SessionRequest& request, SessionWriter::Mode mode)
+    : store_(City::open_or_make(request.city, request.grid).folder()),
+      writer_(City::open_or_make(request.city, request.grid), request.info, store_, SessionConfig(),
+              mode) {
   if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
 }
 

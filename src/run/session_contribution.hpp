@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
@@ -32,24 +31,32 @@ struct SessionRequest {
   bool is_fulfilled() const;
 };
 
+/// A session of the map in `city`, to be written again under poses of this fingerprint: begin,
+/// recording and configuration stay, an alignment ends. Throws ConfigError if there is none of this
+/// name, IoError.
+SessionRequest reposed_session(const std::filesystem::path& city, const std::string& name,
+                               const std::string& fingerprint);
+
 /// The request with the alignment that it asks for. Nothing changes in the map. Throws ConfigError
 /// if the scans do not fit, IoError.
 SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range);
 
-/// Takes the final verdicts of a run. Adds the session at once by commit().
+/// Takes the final verdicts of a run. Adds or replaces the session at once by commit(); until then,
+/// and after any error or signal, the map is as it was.
 class SessionContribution {
  public:
   /// Throws ConfigError, IoError, UsageError: see SessionWriter.
-  explicit SessionContribution(const SessionRequest& request);
+  explicit SessionContribution(const SessionRequest& request,
+                               SessionWriter::Mode mode = SessionWriter::Mode::kNew);
 
   /// `labels` of the recording may be empty. `number`: of the scan.
   void add(const RecordedScan& scan, const ScanVerdict& verdict,
            const std::vector<std::uint32_t>& labels, std::size_t number);
+  /// See SessionWriter.
+  void prepare() { writer_.prepare(); }
   void commit() { writer_.commit(); }
 
  private:
-  SessionContribution(const City& city, const SessionRequest& request);
-
   ScratchFile store_;
   SessionWriter writer_;
   std::optional<Pose> T_city_session_;

@@ -28,18 +28,21 @@ TEST_CASE("Quantiles are measured values") {
 TEST_CASE("timing.csv has a row for each scan") {
   TemporaryFolder folder;
   RunTiming timing;
-  timing.stages = {"ground", "map"};
-  timing.rows.push_back(
-      {"000007", 120000, {1.25, 0.5}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
-  timing.rows.push_back({"000008", 0, {0.0, 0.0}, 0.00004, {}});
+  timing.rows.push_back({"000007", 120000, {}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
+  timing.rows[0].stages.ground = 1.25;
+  timing.rows[0].stages.map = 0.5;
+  timing.rows.push_back({"000008", 0, {}, 0.00004, {}});
   timing.rows[1].time = 1700000000.123456;
   write_timing(folder / "timing.csv", timing);
+  const std::string none = "0.0000,0.0000,0.0000,0.0000,0.0000,";
   CHECK(read_text(folder / "timing.csv") ==
-        "scan,points,ground_ms,map_ms,total_ms,pose_residual_m,pose_residual_deg,time_s\n"
-        "000007,120000,1.2500,0.5000,2.0000,0.0125,0.5000,0.000000000\n"
-        "000008,0,0.0000,0.0000,0.0000,,,1700000000.123456001\n");
+        "scan,points,ingest_ms,ground_ms,window_ms,cluster_ms,evidence_ms,judge_ms,verdict_ms,"
+        "map_ms,total_ms,pose_residual_m,pose_residual_deg,time_s\n"
+        "000007,120000,0.0000,1.2500," +
+            none + "0.5000,2.0000,0.0125,0.5000,0.000000000\n000008,0,0.0000,0.0000," + none +
+            "0.0000,0.0000,,,1700000000.123456001\n");
 
-  timing.rows = {{"a,b\n\"c\"", 1, {0.0, 0.0}, 0.0, {}}};
+  timing.rows = {{"a,b\n\"c\"", 1, {}, 0.0, {}}};
   write_timing(folder / "timing.csv", timing);
   CHECK(read_text(folder / "timing.csv").find("\n\"a,b\n\"\"c\"\"\",1,0.0000") !=
         std::string::npos);

@@ -9,7 +9,6 @@
 #include "io/files.hpp"
 #include "program/tiny_sequence.hpp"
 #include "run/label_writer.hpp"
-#include "run/open_scans.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
@@ -53,7 +52,6 @@ class FakeRemover {
     while (finished_ < pushed_.size()) sink(finish());
   }
   Map map() const { return {}; }
-  std::size_t latency() const { return 2; }
 
   std::size_t fail_at = 1000;
 
@@ -121,32 +119,11 @@ TEST_CASE("Labels: 251 moving, 9 static, 0 not judged; instances wrap but never 
   CHECK(mos_label(PointLabel::kDynamic, 0xFFFFFFFF) == (251 | 65535U << 16));
 }
 
-TEST_CASE("Scans are kept for their final verdict if they are few") {
-  Fixture fixture(7);
-  const Recording& recording = *fixture.sequence;
-  const std::launch thread = GENERATE(std::launch::async, std::launch::deferred);
-  for (const std::size_t latency : {std::size_t{2}, std::size_t{30}}) {
-    OpenScans scans(recording, {1, 6}, latency, thread);
-    std::size_t judged = 1;
-    const auto judge_next = [&] {
-      const RecordedScan* const kept = scans.next_judged();
-      REQUIRE((kept != nullptr) == (latency == 2));
-      if (kept != nullptr) CHECK(kept->xyzi == recording.read_scan(judged++).xyzi);
-    };
-    for (std::size_t i = 1; i <= 6; ++i) {
-      CHECK(scans.next().xyzi == recording.read_scan(i).xyzi);
-      if (i >= 3) judge_next();
-    }
-    judge_next();
-    judge_next();
-  }
-}
-
 TEST_CASE("Every scan gets its final labels, every dynamic point its place in the world") {
   Fixture fixture(5);
   const ScanRange range{1, 4};
   RunOutputs outputs = fixture.outputs();
-  outputs.thread = GENERATE(std::launch::async, std::launch::deferred);
+  outputs.one_thread = GENERATE(false, true);
   RunResults results(*fixture.sequence, range, outputs);
   const RunTiming timing =
       run_sequence(fixture.remover, *fixture.sequence, range, results, kAlways);
@@ -182,12 +159,9 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   CHECK(read_points(fixture.folder / "out/map.ply").positions.size() == 1);
 
   REQUIRE(timing.rows.size() == 4);
-  const auto map = std::find(timing.stages.begin(), timing.stages.end(), "map");
-  REQUIRE(map != timing.stages.end());
   CHECK(timing.rows[0].scan == "000001");
   CHECK(timing.rows[0].points == count);
-  const auto stage = static_cast<std::size_t>(map - timing.stages.begin());
-  CHECK(timing.rows[0].stages.at(stage) == 0.5);
+  CHECK(timing.rows[0].stages.map == 0.5);
 }
 
 TEST_CASE("A stopped run finishes the scans that it has taken") {

@@ -1,9 +1,5 @@
-#include <algorithm>
-#include <cmath>
-#include <csignal>
 #include <nlohmann/json.hpp>
 
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -109,39 +105,6 @@ TEST_CASE("simulate replaces only its own results, and only by --force") {
   CHECK(refused.code == 1);
   CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
   CHECK(Recording(out).size() == 2);
-}
-
-TEST_CASE("Until a simulation by --force is complete, the earlier one stays as it is") {
-  TemporaryFolder folder;
-  const std::string out = folder / "sim";
-  REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
-  const std::string partial = out + ".partial";
-  for (const int signal : {SIGINT, SIGKILL}) {
-    Process process({"simulate", out, "--sensor", "vlp16", "--scans", "1000", "--force"});
-    for (int i = 0; i < 60000 && !fs::exists(partial + "/labels/000000.label"); ++i) {
-      ::usleep(1000);
-    }
-    ::kill(process.id(), signal);
-    const Outcome outcome = process.wait();
-    CHECK(outcome.code == 128 + signal);
-    CHECK(Recording(out).size() == 3);
-    CHECK(fs::exists(partial) == (signal == SIGKILL));
-  }
-  const auto marker = [&] { return nlohmann::json::parse(read_text(out + "/simulation.json")); };
-  CHECK(marker()["complete"] == true);
-  REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
-  CHECK(Recording(out).size() == 2);
-  CHECK(marker()["outputs"]["scans"] == nlohmann::json({"000000", "000001"}));
-  CHECK_FALSE(fs::exists(partial));
-}
-
-TEST_CASE("simulate refuses a folder that another run writes to") {
-  const TemporaryFolder folder;
-  const FolderLock other(folder.path());
-  const Outcome refused = simulate(folder.path(), {"--scans", "1"});
-  CHECK(refused.code == 2);
-  CHECK_THAT(refused.err, ContainsSubstring(folder.path().string() + ": is in use"));
-  CHECK(fs::is_empty(folder.path()));
 }
 
 TEST_CASE("simulate refuses unknown values") {
