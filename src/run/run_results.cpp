@@ -152,12 +152,15 @@ void JudgedScan::refer_to_arrays() {
   verdict.causes = arrays.causes;
 }
 
-void RunResults::take_final(RecordedScan& scan, const ScanVerdict& verdict) {
+void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
   judged_.take(verdict, needs_beliefs_);
   judged_.compared = compared_[verdict.scan];
-  std::swap(judged_.scan, scan);
-  writing_.begin([this] { write_final(judged_.scan, judged_.verdict); });
+  if (scan != nullptr) std::swap(judged_.scan, *scan);
+  writing_.begin([this, reads = scan == nullptr] {
+    if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
+    write_final(judged_.scan, judged_.verdict);
+  });
   ++finished_;
 }
 

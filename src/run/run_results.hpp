@@ -105,9 +105,9 @@ class RunResults {
   /// The result of the push just made.
   void take_newest(const FrameResult& frame);
   /// The final verdict on a scan, in the order of the scans. Keeps the content of `scan` and gives
-  /// the content of an earlier scan back, whose memory the caller can use again. Throws IoError,
-  /// for the scan before as well.
-  void take_final(RecordedScan& scan, const ScanVerdict& verdict);
+  /// the content of an earlier scan back, whose memory the caller can use again. If `scan` is null,
+  /// the scan is read from its file. Throws IoError, for the scan before as well.
+  void take_final(RecordedScan* scan, const ScanVerdict& verdict);
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.

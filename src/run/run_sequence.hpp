@@ -31,6 +31,8 @@ inline double ms_since(std::chrono::steady_clock::time_point begin) {
 }
 
 /// Pushes the scans of `range` and passes every verdict, and at the end the map, to `results`.
+/// Scans wait in memory for their final verdict, unless they are many and a second reading is a
+/// plain copy of their file (.bin).
 /// Calls `keep_going(done)` after each scan; if it returns false, the sequence ends there.
 template <class Remover, class KeepGoing>
 RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanRange& range,
@@ -38,15 +40,21 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
   ReadAhead reader(recording, range.first, range.last, results.thread());
-  std::deque<RecordedScan> open;  // scans without a final verdict, oldest first
-  RecordedScan judged;
+  constexpr std::size_t kFewScans = 8;
+  const bool are_kept = remover.latency() <= kFewScans || recording.format() != ScanFormat::kBin;
+  std::deque<RecordedScan> kept;  // oldest first; the last one is the pushed scan
+  RecordedScan spare;
+  const auto take_oldest = [&] {
+    spare = std::move(kept.front());
+    kept.pop_front();
+  };
   const auto take_final = [&](const ScanVerdict& verdict) {
-    judged = std::move(open.front());
-    open.pop_front();
-    results.take_final(judged, verdict);
+    if (are_kept) take_oldest();
+    results.take_final(are_kept ? &spare : nullptr, verdict);
   };
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    const RecordedScan& scan = open.emplace_back(reader.next(std::exchange(judged, {})));
+    if (!are_kept && !kept.empty()) take_oldest();
+    const RecordedScan& scan = kept.emplace_back(reader.next(std::exchange(spare, {})));
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
     timing.rows.push_back({recording.name(i), scan.size(), frame.times, ms_since(begin),
