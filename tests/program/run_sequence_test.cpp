@@ -52,8 +52,10 @@ class FakeRemover {
     while (finished_ < pushed_.size()) sink(finish());
   }
   Map map() const { return {}; }
+  std::size_t latency() const { return announced_latency; }
 
   std::size_t fail_at = 1000;
+  std::size_t announced_latency = 2;  // of more than a few scans: they are read again
 
  private:
   struct Scan {
@@ -124,6 +126,7 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   const ScanRange range{1, 4};
   RunOutputs outputs = fixture.outputs();
   outputs.one_thread = GENERATE(false, true);
+  fixture.remover.announced_latency = GENERATE(2, 30);
   RunResults results(*fixture.sequence, range, outputs);
   const RunTiming timing =
       run_sequence(fixture.remover, *fixture.sequence, range, results, kAlways);
