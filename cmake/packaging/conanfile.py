@@ -21,7 +21,7 @@ COMPONENTS = {
     "io": (),
     "poses": ("io",),
     "recording": (),
-    "odometry": ("remover", "io"),
+    "odometry": ("remover", "poses"),
     "city": ("io", "poses", "recording"),
     "evaluation": (),
     "simulation": ("io",),

@@ -97,19 +97,15 @@ struct Fit {
 /// From a guess of the motion. Without score if only few points meet surfaces.
 Fit fitted(const RegistrationScan& map, const RegistrationScan& session, const Pose& guess) {
   Fit fit;
-  const auto found = register_scans(map, session, {guess});
+  const auto found = register_scans(map.surfaces(), session.points(), {guess});
   if (!found) return fit;
   fit.T = found->T_a_b;
   fit.uncertainty = found->uncertainty;
   for (const Eigen::Vector3d& point : session.points()) {
     const Eigen::Vector3d p = fit.T * point;
-    const CellSurface* const surface = map.find(kCellLevels - 1, p);
-    if (surface == nullptr) continue;
-    double squared = 0.0;
-    for (std::size_t k = 0; k < surface->direction_count; ++k) {
-      const double distance = surface->directions[k].dot(p - surface->mean);
-      squared += distance * distance;
-    }
+    const CellSurface* const surface = map.surfaces().find(kCellLevels - 1, p);
+    if (surface == nullptr || surface->variance > 0.0) continue;
+    const double squared = surface->squared_distance(p);
     const bool is_inlier = squared <= kInlier * kInlier;
     fit.upright += surface->is_upright ? 1.0 : 0.0;
     fit.upright_inliers += is_inlier && surface->is_upright ? 1.0 : 0.0;
@@ -138,7 +134,6 @@ Fit best_fit(const RegistrationScan& map, const RegistrationScan& session) {
 void check_fit(const City& city, const Fit& fit) {
   constexpr double kFewest = 200.0;  // points at upright surfaces
   constexpr double kLeastFitting = 0.7;
-  constexpr double kMostUncertain = 0.05;  // m
   constexpr double kSlack = 1.1;
   const std::string limits = rounded(SessionAligner::kMostTranslation, 0) + " m and " +
                              rounded(SessionAligner::kMostRotation, 0) + " degrees";
@@ -177,10 +172,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
     const double range = local.norm();
     if (!(range > kNearest && range < kReach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
-    const std::size_t count = taken_.size();
-    if (taken_.insert(cell_key(point - sensors_.front(), kThinned)) == count) {
-      points_.push_back(point);
-    }
+    if (adds(taken_, cell_key(point - sensors_.front(), kThinned))) points_.push_back(point);
   }
 }
 

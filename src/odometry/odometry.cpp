@@ -10,14 +10,11 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "local_map.hpp"
-#include "registration.hpp"
+#include "poses/scan_registration.hpp"
 #include "scan_preparation.hpp"
 
 namespace dynains {
 
-using odometry::Alignment;
-using odometry::LocalMap;
 using odometry::ScanPreparation;
 
 void OdometryConfig::validate() const {
@@ -26,6 +23,28 @@ void OdometryConfig::validate() const {
   throw ConfigError("Odometry.nearest = " + std::to_string(nearest) +
                     " must be less than farthest = " + std::to_string(farthest));
 }
+
+namespace {
+
+/// Motions near a pose: none, up to 3 m along the ground of the sensor, and turns up to 30 deg.
+std::vector<Pose> motions_near(const Pose& T_map_near) {
+  constexpr int kDirections = 8, kRings = 3;
+  std::vector<Pose> poses = {T_map_near};
+  for (int ring = 1; ring <= kRings; ++ring) {  // its radius in m
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2.0 * M_PI * i / kDirections;
+      poses.push_back(T_map_near *
+                      Eigen::Translation3d(ring * std::cos(angle), ring * std::sin(angle), 0.0));
+    }
+  }
+  for (const double degrees : {-30.0, -20.0, -10.0, 10.0, 20.0, 30.0}) {
+    poses.push_back(T_map_near *
+                    Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()));
+  }
+  return poses;
+}
+
+}  // namespace
 
 class Odometry::Loop {
  public:
@@ -93,60 +112,40 @@ class Odometry::Loop {
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
     if (is_after_gap(period)) return OdometryLoss::kGap;
     constexpr int kMostTurns = 4;
-    constexpr std::size_t kFewest = 100;  // points
-    constexpr double kLeastFit = 0.2;
     constexpr double kConverged = 0.02;  // m
-    // m. The surfaces of a few scans are rough.
-    constexpr double kFirst = 0.8, kDecay = 0.9, kFinest = 0.1;
-    const double finest =
-        std::max(kFinest, kFirst * std::pow(kDecay, static_cast<double>(scan_count_)));
-    double scale = 3.0 * expected_error_;
     for (int turn = 0; turn < kMostTurns; ++turn) {
       scan_.prepare(T_last_newest, period);
       const std::vector<Eigen::Vector3d>& points = scan_.keypoints();
-      if (points.size() < kFewest) return OdometryLoss::kFewPoints;
+      if (points.size() < kFewestMatches) return OdometryLoss::kFewPoints;
       if (scan_count_ == 0) return OdometryLoss::kNone;
       if (first_) start_map(T_last_newest, period);
-      Alignment best = align(points, map_, T_world_last_ * T_last_newest, scale, finest);
-      if (turn == 0 && (!is_predictable(period) || best.fit < kLeastFit)) {
-        const Alignment found = search(points, map_, T_world_last_ * T_last_newest, finest);
-        if (found.score > best.score) best = found;
+      const Pose T_predicted = T_world_last_ * T_last_newest;
+      std::optional<Registration> best;
+      if (turn > 0 || is_predictable(period)) best = register_near(map_, points, T_predicted);
+      if (turn == 0 && (!best || best->score < kLeastScore)) {
+        best = register_scans(map_, points, motions_near(T_predicted));
       }
-      result.fit = best.fit;
-      result.free_directions = best.free_directions;
-      if (best.fit < kLeastFit) return OdometryLoss::kNoOverlap;
+      result.fit = best ? best->score : 0.0;
+      if (result.fit < kLeastScore) return OdometryLoss::kNoOverlap;
+      result.free_directions = best->free_directions;
       const Pose T_last_before = T_last_newest;
-      T_last_newest = T_world_last_.inverse() * best.T_map_scan;
-      if (scan_.has_one_time() || length_of(T_last_before.inverse() * T_last_newest) < kConverged) {
+      T_last_newest = T_world_last_.inverse() * best->T_a_b;
+      if (scan_.has_one_time() || extent_of(T_last_before.inverse() * T_last_newest) < kConverged) {
         break;
       }
-      scale = finest;
     }
     return OdometryLoss::kNone;
   }
 
-  /// Of a motion: m, a turn counts at an arm of 10 m.
-  static double length_of(const Pose& T) {
-    constexpr double kArm = 10.0;  // m
-    const Eigen::Matrix3d R = T.linear();
-    const Eigen::Vector3d axis(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
-    return T.translation().norm() + kArm * std::atan2(axis.norm(), R.trace() - 1.0);
-  }
-
   /// The map of the first scan, whose motion is that until the second one.
   void start_map(const Pose& T_first_second, double period) {
-    map_ = LocalMap();
+    map_ = SurfaceGrid(true);
     first_->prepare(T_first_second, period);
     for (const ScanPreparation::Point& point : first_->map_points()) map_.insert(point.position);
   }
 
   /// Judges the scan, adds it to the map, and is ready for the next one.
   void take(const Pose& T_last_newest, double period, double mean_time, OdometryResult& result) {
-    constexpr double kShare = 0.1;
-    if (period_ > 0.0) {  // the running mean of the errors of predictions
-      const double error = length_of(predicted_motion(period).inverse() * T_last_newest);
-      expected_error_ += kShare * (error - expected_error_);
-    }
     T_world_last_ = orthonormalized(T_world_last_ * T_last_newest);
     if (config_.remove) {
       if (scan_count_ < 2) remover_.emplace(DynaInsRemover::Config::odometry());
@@ -171,6 +170,7 @@ class Odometry::Loop {
 
   void add_to_map(Span<const PointLabel> labels) {
     constexpr double kForget = 0.1;  // of the reach
+    map_.begin_scan(T_world_last_.translation());
     for (const ScanPreparation::Point& point : scan_.map_points()) {
       if (!labels.empty() && labels[point.index] == PointLabel::kDynamic) continue;
       map_.insert(T_world_last_ * point.position);
@@ -186,13 +186,12 @@ class Odometry::Loop {
   Config config_;
   ScanPreparation scan_;
   std::optional<ScanPreparation> first_;  // until the motion of the first scan is known
-  LocalMap map_;
+  SurfaceGrid map_{true};
   std::optional<DynaInsRemover> remover_;
   Pose T_world_start_ = Pose::Identity();
   Pose T_world_last_ = Pose::Identity();
   Pose T_last_newest_ = Pose::Identity();
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();  // m, of the map
-  double expected_error_ = 0.5;                       // m, of predictions
   double mean_time_ = 0.0;                            // s, of the last scan
   double period_ = 0.0;                               // s, of T_last_newest_; 0: not known
   std::size_t scan_count_ = 0;

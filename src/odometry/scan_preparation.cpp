@@ -4,17 +4,12 @@
 #include <cmath>
 
 #include "dynains/io/trajectory.hpp"
-#include "local_map.hpp"
+#include "poses/cell_surfaces.hpp"
 
 namespace dynains::odometry {
 namespace {
 
 constexpr double kLongest = 0.5;  // s from the stamp, of offsets that can be right
-
-bool is_first_in_voxel(VoxelHashTable<>& taken, const Eigen::Vector3d& p, double edge) {
-  const std::size_t count = taken.size();
-  return taken.insert(voxel_of(p, edge)) == count;
-}
 
 }  // namespace
 
@@ -72,12 +67,12 @@ void ScanPreparation::thin_out() {
     const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&cloud_[3 * i]).cast<double>();
     const double squared = p.squaredNorm();
     if (!(squared > nearest_ * nearest_ && squared < farthest_ * farthest_)) continue;
-    if (is_first_in_voxel(taken_, p, kSmall)) map_points_.push_back({p, i});
+    if (adds(taken_, cell_key(p, kSmall))) map_points_.push_back({p, i});
   }
   keypoints_.clear();
   taken_.clear();
   for (const Point& point : map_points_) {
-    if (is_first_in_voxel(taken_, point.position, edge_)) keypoints_.push_back(point.position);
+    if (adds(taken_, cell_key(point.position, edge_))) keypoints_.push_back(point.position);
   }
 }
 

@@ -1,50 +1,125 @@
 #include "cell_surfaces.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 namespace dynains {
 
-CellSurface surface_of(const CellMoments& moments, double edge) {
+void SurfaceGrid::insert(const Eigen::Vector3d& point) {
+  constexpr double kApart = 0.1;  // m
+  if (!adds(taken_, cell_key(point, kApart))) return;
+  for (std::size_t level = 0; level < kCellLevels; ++level) {
+    Level& at = levels_[level];
+    const VoxelKey key = cell_key(point, kCellEdges[level]);
+    const std::uint32_t number = at.numbers.insert(key);
+    if (number == at.cells.size()) {
+      at.cells.emplace_back();
+      at.cells.back().key = key;
+      at.cells.back().origin = point;
+    }
+    Cell& cell = at.cells[number];
+    const Eigen::Vector3d relative = point - cell.origin;
+    cell.count += 1.0;
+    cell.sum += relative;
+    cell.squares += relative * relative.transpose();
+    cell.is_fitted = false;
+  }
+}
+
+void SurfaceGrid::forget_beyond(const Eigen::Vector3d& centre, double reach) {
+  const auto is_far = [&](const Cell& cell) {
+    return (cell.origin - centre).squaredNorm() > reach * reach;
+  };
+  taken_.clear();
+  for (Level& level : levels_) {
+    level.cells.erase(std::remove_if(level.cells.begin(), level.cells.end(), is_far),
+                      level.cells.end());
+    level.numbers.clear();
+    for (const Cell& cell : level.cells) level.numbers.insert(cell.key);
+  }
+}
+
+const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& point) const {
+  const std::size_t coarsest = with_clutter_ ? 0 : level;
+  for (std::size_t k = level + 1; k-- > coarsest;) {
+    const std::uint32_t number = levels_[k].numbers.find(cell_key(point, kCellEdges[k]));
+    if (number == VoxelHashTable<>::kNone) continue;
+    const Cell& cell = levels_[k].cells[number];
+    if (!cell.is_fitted) cell.surface = surface_of(cell);
+    cell.is_fitted = true;
+    if (cell.surface.direction_count > 0) return &cell.surface;
+  }
+  return nullptr;
+}
+
+/// Whether a plane contains the beams that hit it: those of one beam on persons, in foliage or on a
+/// rough wall lie in such a plane, which moves with the sensor.
+bool SurfaceGrid::is_trace_of_beam(const CellSurface& surface) const {
+  constexpr double kEdgeOn = 0.04;   // sine of the angle between beam and plane
+  constexpr double kDistance = 0.5;  // m, of the plane from the sensor; distant ground is farther
+  const Eigen::Vector3d beam = surface.mean - sensor_;
+  const double distance = std::abs(surface.directions[0].dot(beam));
+  return distance < kDistance && distance < kEdgeOn * beam.norm();
+}
+
+CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kFewest = 6.0;   // points
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
   constexpr double kSteep = 0.8;    // z of a pole
   constexpr double kUpright = 0.5;  // most z of the normal of an upright plane
   CellSurface surface;
-  if (moments.count < kFewest) return surface;
-  const Eigen::Vector3d mean = moments.sum / moments.count;
-  surface.mean = moments.origin + mean;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments.squares / moments.count -
+  if (cell.count < kFewest) return surface;
+  const Eigen::Vector3d mean = cell.sum / cell.count;
+  surface.mean = cell.origin + mean;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(cell.squares / cell.count -
                                                               mean * mean.transpose());
   const Eigen::Vector3d extent = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const Eigen::Matrix3d& axes = solver.eigenvectors();
-  if (extent[2] < 0.05 * edge) return surface;
   surface.directions = {axes.col(0), axes.col(1)};
   if (extent[1] < kNarrow * extent[2]) {
+    // Rings of a sensor lie along lines on the ground that move with the sensor.
     if (std::abs(axes(2, 2)) < kSteep) return surface;
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
+    if (is_trace_of_beam(surface)) return surface;
     surface.direction_count = 1;
     surface.is_upright = std::abs(axes(2, 0)) < kUpright;
+  } else if (with_clutter_) {
+    surface.direction_count = 2;
+    surface.variance = extent[1] * extent[1];
   }
   return surface;
 }
 
-Pose motion_of(const Vector6& rotation_and_translation) {
-  const Eigen::Vector3d w = rotation_and_translation.head<3>();
-  const double angle = w.norm();
-  Pose T = Pose::Identity();
-  if (angle > 0.0) T.linear() = Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
-  T.translation() = rotation_and_translation.tail<3>();
-  return T;
+Pose stepped(const Pose& T, const Vector6& step) {
+  const Eigen::Vector3d turn = step.tail<3>() / kLever;
+  Pose result = T;
+  result.translation() += step.head<3>();
+  result.linear() =
+      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * T.linear();
+  return orthonormalized(result);
 }
 
-double NormalEquations::uncertainty() const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(translation_covariance());
-  return kPointDeviation * std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+NormalEquations::Solution NormalEquations::solve() const {
+  // Of a symmetric matrix these are eigenvectors. Eigen's solver for those aligns its matrices.
+  const Eigen::JacobiSVD<Matrix6> solver(hessian_, Eigen::ComputeFullU);
+  Solution solution;
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    const Vector6 direction = solver.matrixU().col(k);
+    const double value = std::max(solver.singularValues()[k], 1e-6);
+    const Eigen::Vector3d way = direction.head<3>();
+    solution.covariance += way * way.transpose() / value;
+    if (value < least_) {
+      ++solution.free_directions;
+    } else {
+      solution.step -= direction * (direction.dot(gradient_) / value);
+    }
+  }
+  return solution;
 }
 
 }  // namespace dynains

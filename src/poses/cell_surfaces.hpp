@@ -1,19 +1,20 @@
-// Planes and upright poles in the cells of a grid, and the fit of points to them.
+// Planes, upright poles and clutter in the cells of grids, and the fit of points to them.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "dynains/pose.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "given_motion.hpp"
 
 namespace dynains {
 
+// Not aligned, since the alignment of the types of Eigen depends on flags.
 using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
-// Not ldlt() and inverse(), whose types have the alignment that depends on flags.
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 
 /// Edges of the cells (m) by level, from coarse to fine.
@@ -34,66 +35,103 @@ inline VoxelKey cell_key(const Eigen::Vector3d& p, double edge) {
   return voxel_key(index(p.x()), index(p.y()), index(p.z()));
 }
 
-/// Sums over the points of a cell.
-struct CellMoments {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< m; sums are relative to it
-  double count = 0.0;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+/// Whether `key` was new to `table`, which has it now.
+inline bool adds(VoxelHashTable<>& table, VoxelKey key) {
+  const std::size_t count = table.size();
+  return table.insert(key) == count;
+}
 
-  void add(const Eigen::Vector3d& point) {
-    const Eigen::Vector3d relative = point - origin;
-    count += 1.0;
-    sum += relative;
-    squares += relative * relative.transpose();
-  }
-  /// Adds those of another cell with the same origin.
-  void add(const CellMoments& other) {
-    count += other.count;
-    sum += other.sum;
-    squares += other.squares;
-  }
-};
-
-/// Plane, or upright pole, through the points of a cell.
+/// Plane, upright pole or clutter through the points of a cell.
 struct CellSurface {
-  Eigen::Vector3d mean;                       ///< m
-  std::array<Eigen::Vector3d, 2> directions;  ///< orthonormal; it determines places along them
-  std::size_t direction_count = 0;            ///< 0: no surface, 1: plane, 2: pole
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< m
+  std::array<Eigen::Vector3d, 2> directions;       ///< orthonormal; it determines places along them
+  std::size_t direction_count = 0;                 ///< 0: nothing, 1: plane, 2: pole or clutter
+  double variance = 0.0;                           ///< m^2, of clutter across its longest extent
   bool is_upright = false;
+
+  /// m^2, of a point (m) along the directions.
+  double squared_distance(const Eigen::Vector3d& point) const {
+    double squared = 0.0;
+    for (std::size_t k = 0; k < direction_count; ++k) {
+      const double distance = directions[k].dot(point - mean);
+      squared += distance * distance;
+    }
+    return squared;
+  }
 };
 
-/// `edge`: m, of the cell. Rings of a sensor lie along lines on the ground that move with the
-/// sensor, so a line is a surface only if it is upright.
-CellSurface surface_of(const CellMoments& moments, double edge);
+/// Surfaces through points, of one scan or of a map that grows, in the cells of a grid for each
+/// level. One thread at a time.
+class SurfaceGrid {
+ public:
+  /// `with_clutter`: whether clutter counts, and larger cells where a cell has no surface. In one
+  /// scan clutter is persons and noise, in a map of many scans it tells places, too.
+  explicit SurfaceGrid(bool with_clutter = false) : with_clutter_(with_clutter) {}
 
-/// Rigid motion of a rotation vector (rad) and a translation (m).
-Pose motion_of(const Vector6& rotation_and_translation);
+  bool empty() const { return levels_.back().cells.empty(); }
+  /// Least eigenvalue of normal equations whose direction is determined, in points whose distance
+  /// changes as much as the motion. Clutter determines every direction a little.
+  double least_determined() const { return with_clutter_ ? 2.0 : 0.01; }
+  /// The next points are of a scan by a sensor at this place (m).
+  void begin_scan(const Eigen::Vector3d& sensor) { sensor_ = sensor; }
+  /// Adds a point (m). Dense rings would outweigh others: of a small voxel, one point counts.
+  void insert(const Eigen::Vector3d& point);
+  /// Forgets what is farther than `reach` m from `centre`.
+  void forget_beyond(const Eigen::Vector3d& centre, double reach);
+  /// The surface in the cell around a point; null if it has too few points or no surface.
+  const CellSurface* find(std::size_t level, const Eigen::Vector3d& point) const;
 
-/// Normal equations of a motion that moves points to surfaces. Rotation comes before translation.
+ private:
+  struct Cell {
+    VoxelKey key;
+    Eigen::Vector3d origin;  // m; sums are relative to it
+    double count = 0.0;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    mutable bool is_fitted = false;
+    mutable CellSurface surface = {};
+  };
+  struct Level {
+    VoxelHashTable<> numbers;
+    std::vector<Cell> cells;
+  };
+
+  CellSurface surface_of(const Cell& cell) const;
+  bool is_trace_of_beam(const CellSurface& surface) const;
+
+  bool with_clutter_;
+  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, at the newest scan
+  std::array<Level, kCellLevels> levels_;
+  VoxelHashTable<> taken_;
+};
+
+/// Rotates `T` by a rotation vector (rad times kLever) about its own origin, along the axes of the
+/// outer frame, and translates it (m).
+Pose stepped(const Pose& T, const Vector6& step);
+
+/// Normal equations of a step that moves points to surfaces: translation (m) and rotation (rad
+/// times kLever), as of stepped().
 class NormalEquations {
  public:
-  struct Fit {
-    double squared;  ///< m^2, distance to the surface
-    double weight;   ///< Geman-McClure, (0, 1]
-  };
-  /// Adds a point (m, moved). `scale`: m, distance at which its weight is a fourth.
-  Fit add(const Eigen::Vector3d& point, const CellSurface& surface, double scale) {
-    std::array<double, 2> distances{};
-    double squared = 0.0;
-    for (std::size_t k = 0; k < surface.direction_count; ++k) {
-      distances[k] = surface.directions[k].dot(point - surface.mean);
-      squared += distances[k] * distances[k];
-    }
+  /// `least`: SurfaceGrid::least_determined().
+  explicit NormalEquations(double least) : least_(least) {}
+
+  /// Adds the point `p` (m) of a scan at the pose `T`. `scale`: m, distance at which its weight is
+  /// a fourth. Returns the weight (Geman-McClure), (0, 1].
+  double add(const Pose& T, const Eigen::Vector3d& p, const CellSurface& surface, double scale) {
+    const Eigen::Vector3d arm = T.linear() * p;
+    const Eigen::Vector3d point = arm + T.translation();
+    const double squared = surface.squared_distance(point) + surface.variance;
     const double root = 1.0 / (1.0 + squared / (scale * scale));
     const double weight = root * root;
     for (std::size_t k = 0; k < surface.direction_count; ++k) {
+      const Eigen::Vector3d& n = surface.directions[k];
       Vector6 J;
-      J << point.cross(surface.directions[k]), surface.directions[k];
-      add(J, distances[k], weight);
+      J << n, arm.cross(n) / kLever;
+      add(J, n.dot(point - surface.mean), weight);
     }
     ++count_;
-    return {squared, weight};
+    return weight;
   }
   /// Adds a point that is `distance` (m) from its place, with the derivative of this distance.
   void add(const Vector6& jacobian, double distance, double weight) {
@@ -102,39 +140,35 @@ class NormalEquations {
   }
 
   std::size_t count() const { return count_; }  ///< points
-  Matrix6 hessian() const { return hessian_.selfadjointView<Eigen::Lower>(); }
-  /// The step that solves the equations, slightly damped.
-  Vector6 step() const {
-    const Matrix6 damped = hessian() + 1e-3 * Matrix6::Identity();
-    return -Eigen::LDLT<Matrix6>(damped).solve(gradient_);
-  }
-  /// Deviation (m) of the translation along its least certain direction.
-  double uncertainty() const;
-  /// Covariance of the translation (m^2) for points with a deviation of 1 m.
-  Eigen::Matrix3d translation_covariance() const {
-    const Matrix6 damped = hessian() + 1e-6 * Matrix6::Identity();
-    const Matrix6 covariance = Eigen::PartialPivLU<Matrix6>(damped).inverse();
-    return covariance.bottomRightCorner<3, 3>();
-  }
+
+  struct Solution {
+    Vector6 step = Vector6::Zero();  ///< 0 along directions that too little determines
+    int free_directions = 0;         ///< their number
+    /// Of the translation (m^2), for points with a deviation of 1 m.
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  };
+  Solution solve() const;
 
  private:
-  Matrix6 hessian_ = Matrix6::Zero();  // its lower triangle counts
+  Matrix6 hessian_ = Matrix6::Zero();
   Vector6 gradient_ = Vector6::Zero();
   std::size_t count_ = 0;
+  double least_;
 };
 
-/// Gauss-Newton steps from `T`, at most `most`, until they are shorter than 0.1 mm and `turn` (rad)
-/// or fewer than 30 points meet a surface. `equations_at(T)` returns NormalEquations.
+/// Gauss-Newton steps from `T`, at most `most`, until they are short or fewer than 30 points meet a
+/// surface. `equations_at(T)` returns NormalEquations.
 template <class EquationsAt>
-Pose gauss_newton(Pose T, int most, double turn, EquationsAt&& equations_at) {
+Pose gauss_newton(Pose T, int most, EquationsAt&& equations_at) {
   constexpr std::size_t kFewest = 30;
+  constexpr double kShort = 1e-4;  // m
   for (int k = 0; k < most; ++k) {
     const NormalEquations equations = equations_at(T);
     if (equations.count() < kFewest) break;
-    const Vector6 step = equations.step();
+    const Vector6 step = equations.solve().step;
     if (!step.allFinite()) break;
-    T = motion_of(step) * T;
-    if (step.head<3>().norm() < turn && step.tail<3>().norm() < 1e-4) break;
+    T = stepped(T, step);
+    if (step.norm() < kShort) break;
   }
   return T;
 }

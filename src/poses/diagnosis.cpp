@@ -289,13 +289,12 @@ PoseFlaws flaws_of(const Recording& recording) {
 bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion& given) {
   constexpr double kMoving = 0.3;  // m at points 10 m away
   constexpr double kMost = 0.7;    // ratio
-  constexpr double kArm = 10.0;    // m
   std::size_t moving = 0, missed = 0;
   for (const RegisteredMotion& motion : motions) {
     const auto T = given(motion);
     if (!T) continue;
-    const double by_poses = extent_of(*T, kArm);
-    const double by_scans = extent_of(motion.T_first_second, kArm);
+    const double by_poses = extent_of(*T);
+    const double by_scans = extent_of(motion.T_first_second);
     if (!(std::max(by_poses, by_scans) > kMoving)) continue;
     ++moving;
     missed += error_at_points({motion}, given) > kMost * std::min(by_poses, by_scans) ? 1 : 0;

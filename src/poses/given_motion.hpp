@@ -20,9 +20,12 @@ inline double angle_of(const Eigen::Matrix3d& R) {
   return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
 }
 
-/// Size of a motion, m, for points `lever` m away.
-inline double extent_of(const Pose& T, double lever) {
-  return std::hypot(T.translation().norm(), lever * angle_of(T.linear()));
+/// Distance (m) of the points at which a rotation is as long as a translation.
+inline constexpr double kLever = 10.0;
+
+/// Size of a motion, m, for points kLever away.
+inline double extent_of(const Pose& T) {
+  return std::hypot(T.translation().norm(), kLever * angle_of(T.linear()));
 }
 
 }  // namespace dynains

@@ -26,7 +26,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
     const VoxelKey key = cell_key(p, kVoxel);
-    if (occupied.insert(key) == kept.size()) kept.emplace_back(key, p);
+    if (adds(occupied, key)) kept.emplace_back(key, p);
   }
   // Every n-th of them is spread over the scan.
   std::sort(kept.begin(), kept.end(),

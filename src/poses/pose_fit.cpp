@@ -16,15 +16,14 @@
 namespace dynains {
 namespace {
 
-constexpr double kLever = 10.0;  // m, distance of the points at which a rotation is judged
-
 /// A scan, as planes and as landmarks.
 class ChainScan {
  public:
   explicit ChainScan(const PointBuffer& points)
       : planes_(points), landmarks_(points, estimate_mounting(points), kWayRange) {}
 
-  const RegistrationScan& planes() const { return planes_; }
+  const SurfaceGrid& surfaces() const { return planes_.surfaces(); }
+  const std::vector<Eigen::Vector3d>& points() const { return planes_.points(); }
   const Landmarks& landmarks() const { return landmarks_; }
 
  private:
@@ -53,17 +52,16 @@ std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& el
 
 /// `uncertain`: m, uncertainty of the translation.
 bool is_certain(const std::optional<Registration>& registration, double uncertain) {
-  constexpr double kLeastScore = 0.45;
   return registration && registration->score > kLeastScore &&
          registration->uncertainty < uncertain && !registration->is_ambiguous;
 }
 
-/// Residual of a motion: rotation times kLever, and translation, m.
+/// Residual of a motion: translation, and rotation times kLever, m.
 Vector6 residual(const Pose& body, const Pose& sensor, const Pose& T_body_sensor) {
   const Pose E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
   const Eigen::AngleAxisd rotation(detail::Quaternion(E.linear()));
   Vector6 r;
-  r << kLever * rotation.angle() * rotation.axis(), E.translation();
+  r << E.translation(), kLever * rotation.angle() * rotation.axis();
   return r;
 }
 
@@ -100,7 +98,7 @@ std::optional<GuidedRegistration> register_along(const ChainScan& a, const Chain
   const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
   if (!guess) return std::nullopt;
   const KnownTranslation way{direction, kDeviation};
-  const auto found = register_near(a.planes(), b.planes(), *guess, way);
+  const auto found = register_near(a.surfaces(), b.points(), *guess, way);
   if (!found) return std::nullopt;
   return GuidedRegistration{*found, way};
 }
@@ -139,8 +137,8 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
   if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < least_gap) return std::nullopt;
   const Pose T_b_a = best->registration.T_a_b.inverse();
   const KnownTranslation way{T_b_a.linear() * best->way.direction, best->way.deviation};
-  return checked(best->registration, register_near(b.planes(), a.planes(), T_b_a, way), kUncertain,
-                 best->way.deviation);
+  return checked(best->registration, register_near(b.surfaces(), a.points(), T_b_a, way),
+                 kUncertain, best->way.deviation);
 }
 
 /// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the
@@ -152,12 +150,12 @@ std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainS
   constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
   constexpr double kUncertain = 0.06;  // m
   constexpr double kWorse = 1.02;      // ratio of gaps
-  const auto forth = register_scans(a.planes(), b.planes(), guesses);
+  const auto forth = register_scans(a.surfaces(), b.points(), guesses);
   if (!forth) return std::nullopt;
   const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
   const auto found =
       is_open ? complete(a, b, *forth, given, farthest)
-              : checked(forth, register_scans(b.planes(), a.planes(), {forth->T_a_b.inverse()}),
+              : checked(forth, register_scans(b.surfaces(), a.points(), {forth->T_a_b.inverse()}),
                         kUncertain, 0.0);
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
   return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
@@ -182,22 +180,15 @@ Pose refine(const std::vector<BothMotions>& motions, Pose T_body_sensor) {
   constexpr double kStep = 1e-6;
   for (int k = 0; k < 25; ++k) {
     Matrix6 H = 1e-6 * Matrix6::Identity();
+    H.diagonal().head<3>().array() += kPrior * kPrior;
     Vector6 g = Vector6::Zero();
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      H(3 + axis, 3 + axis) += kPrior * kPrior;
-      g[3 + axis] += kPrior * kPrior * T_body_sensor.translation()[axis];
-    }
+    g.head<3>() = kPrior * kPrior * T_body_sensor.translation();
     for (const BothMotions& m : motions) {
       const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
       Matrix6 J;
       for (Eigen::Index j = 0; j < 6; ++j) {
-        Vector6 change = Vector6::Zero();
-        change[j] = kStep;
-        Pose moved = T_body_sensor;
-        const Pose T = motion_of(change);
-        moved.linear() = (T.linear() * T_body_sensor.linear()).eval();
-        moved.translation() += T.translation();
-        J.col(j) = (residual(m.body, m.sensor, moved) - r) / kStep;
+        const Pose T = stepped(T_body_sensor, kStep * Vector6::Unit(j));
+        J.col(j) = (residual(m.body, m.sensor, T) - r) / kStep;
       }
       const double weight = 1.0 / (1.0 + r.squaredNorm() / (kScale * kScale));
       H += weight * J.transpose() * J;
@@ -205,13 +196,9 @@ Pose refine(const std::vector<BothMotions>& motions, Pose T_body_sensor) {
     }
     const Vector6 change = -Eigen::LDLT<Matrix6>(H).solve(g);
     if (!change.allFinite()) break;
-    const Pose T = motion_of(change);
-    T_body_sensor.linear() = (T.linear() * T_body_sensor.linear()).eval();
-    T_body_sensor.translation() += T.translation();
+    T_body_sensor = stepped(T_body_sensor, change);
     if (change.norm() < 1e-7) break;
   }
-  T_body_sensor.linear() =
-      detail::Quaternion(T_body_sensor.linear()).normalized().toRotationMatrix();
   return T_body_sensor;
 }
 
@@ -368,10 +355,10 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
     const Vector6& d = motion.difference;
-    translations.push_back(r.tail<3>().norm());
-    rotations.push_back(r.head<3>().norm() / kLever);
-    translation_noise.push_back(std::hypot(d.tail<3>().norm(), motion.deviation));
-    rotation_noise.push_back(d.head<3>().norm() / kLever);
+    translations.push_back(r.head<3>().norm());
+    rotations.push_back(r.tail<3>().norm() / kLever);
+    translation_noise.push_back(std::hypot(d.head<3>().norm(), motion.deviation));
+    rotation_noise.push_back(d.tail<3>().norm() / kLever);
     both.push_back(r.cwiseProduct(weights).norm());
     noise.push_back(std::hypot(d.cwiseProduct(weights).norm(), motion.deviation));
   }

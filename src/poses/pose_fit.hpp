@@ -19,7 +19,7 @@ struct RegisteredMotion {
   std::size_t first;   ///< scan
   std::size_t second;  ///< scan
   Pose T_first_second;
-  /// Difference of both directions of the registration: rotation times 10 m, and translation, m.
+  /// Difference of both directions of the registration: translation, and rotation times 10 m, m.
   Eigen::Matrix<double, 6, 1, Eigen::DontAlign> difference;
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };

@@ -1,4 +1,4 @@
-// Registration of two scans by planes in the cells of a grid.
+// Registration of a scan by the surfaces of another one, or of a map.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -22,28 +22,35 @@ class RegistrationScan {
 
   /// One point for each voxel of 0.4 m.
   const std::vector<Eigen::Vector3d>& points() const { return points_; }
-  /// The surface in the cell around a point; null if it has too few points or no surface.
-  const CellSurface* find(std::size_t level, const Eigen::Vector3d& point) const;
+  const SurfaceGrid& surfaces() const { return surfaces_; }
 
  private:
   std::vector<Eigen::Vector3d> points_;
-  std::array<VoxelHashTable<>, kCellLevels> index_;
-  std::array<std::vector<CellSurface>, kCellLevels> surfaces_;
+  SurfaceGrid surfaces_;
 };
+
+/// Points at planes and poles that a registration needs.
+inline constexpr std::size_t kFewestMatches = 100;
+/// Score that registrations of other places hardly reach.
+inline constexpr double kLeastScore = 0.45;
+/// Deviation (m) of the translation of a registration that tells where a scan or a session is.
+inline constexpr double kMostUncertain = 0.05;
 
 struct Registration {
   Pose T_a_b = Pose::Identity();
-  double score = 0.0;        ///< mean weight of the points of b, [0, 1]; higher is better
+  double score = 0.0;        ///< mean weight of the points at planes and poles, [0, 1]
   double uncertainty = 0.0;  ///< m, of the translation along its least certain direction
   /// The two directions that planes determine worst, the worst first; unit vectors, frame of a.
   std::array<Eigen::Vector3d, 2> uncertain = {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()};
+  int free_directions = 0;  ///< of six, that the surfaces do not determine; they keep the guess
   /// Whether another result is nearly as good, as in traffic that moves with the sensor.
   bool is_ambiguous = false;
 };
 
-/// Registers `b` to `a` from several guesses of T_a_b; the best result counts. Empty if too few
-/// points of `b` meet a cell of `a`.
-std::optional<Registration> register_scans(const RegistrationScan& a, const RegistrationScan& b,
+/// Registers the points `b` (m) to the surfaces `a` from several guesses of T_a_b; the best result
+/// counts. Empty if too few points meet a surface.
+std::optional<Registration> register_scans(const SurfaceGrid& a,
+                                           const std::vector<Eigen::Vector3d>& b,
                                            const std::vector<Pose>& guesses);
 
 /// A component of the translation that is known otherwise.
@@ -53,7 +60,8 @@ struct KnownTranslation {
 };
 
 /// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
-std::optional<Registration> register_near(const RegistrationScan& a, const RegistrationScan& b,
-                                          const Pose& guess, const KnownTranslation& way);
+std::optional<Registration> register_near(const SurfaceGrid& a,
+                                          const std::vector<Eigen::Vector3d>& b, const Pose& guess,
+                                          const std::optional<KnownTranslation>& way = {});
 
 }  // namespace dynains

@@ -22,8 +22,8 @@ std::string loss_at(const Recording& recording, std::size_t scan, std::size_t do
                      recording.name(scan) + ": " +
                      value_names(result.loss)[static_cast<std::size_t>(result.loss)];
   if (result.loss == OdometryLoss::kNoOverlap) {
-    text += " (" + std::to_string(static_cast<int>(100.0 * result.fit)) +
-            " % of its points lie on their surfaces)";
+    text += " (it fits to their surfaces by " +
+            std::to_string(static_cast<int>(100.0 * result.fit)) + " %)";
   }
   return text + "; " + std::to_string(done) + " scans before it have poses";
 }

@@ -8,10 +8,8 @@
 namespace dynains::program {
 namespace {
 
-constexpr double kReach = 40.0;          // m, points that count
-constexpr double kWay = 2.0;             // m, between two alignments
-constexpr double kLeastScore = 0.4;      // of a registration; a map elsewhere has less
-constexpr double kMostUncertain = 0.05;  // m
+constexpr double kReach = 40.0;  // m, points that count
+constexpr double kWay = 2.0;     // m, between two alignments
 
 bool is_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return a.x() < b.x(); }
 
@@ -48,7 +46,8 @@ void MapAlignment::align(PointsView standing, const Pose& T_world_sensor) {
   const Pose T_centre_map = T_map_centre.inverse();
   const Pose T_latest = T_centre_map * T_map_world_ * T_world_sensor;
   const RegistrationScan map(around(centre), kReach), scan(standing, kReach);
-  const auto found = register_scans(map, scan, {T_latest, T_centre_map * T_world_sensor});
+  const auto found =
+      register_scans(map.surfaces(), scan.points(), {T_latest, T_centre_map * T_world_sensor});
   if (!found || found->score < kLeastScore || found->uncertainty > kMostUncertain) return;
   T_map_world_ = T_map_centre * found->T_a_b * T_world_sensor.inverse();
   ++aligned_;

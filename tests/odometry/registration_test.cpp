@@ -1,20 +1,17 @@
 // Registration of known motions, and motions that nothing determines.
-#include "odometry/registration.hpp"
-
 #include <Eigen/Geometry>
 #include <limits>
 #include <random>
 #include <vector>
 
 #include "odometry/scan_preparation.hpp"
+#include "poses/scan_registration.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::odometry {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
-
-constexpr double kFinest = 0.1;  // m
 
 /// Random points on the floor and two walls of a corridor of 40 m along x, with 1 cm of noise. A
 /// closed one has a wall at one end.
@@ -44,8 +41,8 @@ Points corridor(bool is_closed, unsigned seed, std::size_t count) {
   return points;
 }
 
-LocalMap map_of(const Points& points) {
-  LocalMap map;
+SurfaceGrid map_of(const Points& points) {
+  SurfaceGrid map(true);
   for (const Eigen::Vector3d& p : points) map.insert(p);
   return map;
 }
@@ -69,71 +66,75 @@ double angle_between(const Pose& a, const Pose& b) {
 }
 
 TEST_CASE("Known motions are recovered") {
-  const LocalMap map = map_of(corridor(true, 1, 20000));
+  const SurfaceGrid map = map_of(corridor(true, 1, 20000));
   for (const double degrees : {-4.0, 0.0, 4.0}) {
     const Pose T = motion({0.3, -0.2, 0.1}, degrees);
     const Points scan = seen_from(T, corridor(true, 2, 2000));
-    const Alignment found = align(scan, map, Pose::Identity(), 1.0, kFinest);
-    CAPTURE(degrees, (found.T_map_scan.translation() - T.translation()).norm());
-    CHECK(found.free_directions == 0);
-    CHECK((found.T_map_scan.translation() - T.translation()).norm() < 0.005);
-    CHECK(angle_between(found.T_map_scan, T) < 0.1);
-    CHECK(found.fit > 0.9);
+    const auto found = register_scans(map, scan, {Pose::Identity()});
+    REQUIRE(found);
+    CAPTURE(degrees, (found->T_a_b.translation() - T.translation()).norm());
+    CHECK(found->free_directions == 0);
+    CHECK((found->T_a_b.translation() - T.translation()).norm() < 0.005);
+    CHECK(angle_between(found->T_a_b, T) < 0.1);
+    CHECK(found->score > 0.9);
   }
 }
 
 TEST_CASE("Along an open corridor the motion stays the predicted one, and this is told") {
-  const LocalMap map = map_of(corridor(false, 1, 20000));
+  const SurfaceGrid map = map_of(corridor(false, 1, 20000));
   const Pose T = motion({0.4, 0.1, 0.0}, 0.0);
   Points scan;
   for (const Eigen::Vector3d& p : seen_from(T, corridor(false, 2, 2000))) {
     if (std::abs(p.x()) < 10.0) scan.push_back(p);  // no end of the map in sight
   }
-  const Alignment found = align(scan, map, motion({0.7, 0.0, 0.0}, 0.0), 1.0, kFinest);
-  CHECK(found.free_directions == 1);
-  CHECK(found.T_map_scan.translation().x() == Approx(0.7).margin(0.01));
-  CHECK(found.T_map_scan.translation().y() == Approx(0.1).margin(0.005));
+  const auto found = register_near(map, scan, motion({0.7, 0.0, 0.0}, 0.0));
+  REQUIRE(found);
+  CHECK(found->free_directions == 1);
+  CHECK(found->T_a_b.translation().x() == Approx(0.7).margin(0.01));
+  CHECK(found->T_a_b.translation().y() == Approx(0.1).margin(0.005));
 }
 
-TEST_CASE("A search finds a motion that a prediction is too far from") {
-  const LocalMap map = map_of(corridor(true, 1, 20000));
-  const Pose T = motion({2.2, 0.0, 0.0}, 0.0);
+TEST_CASE("The best of several guesses counts") {
+  const SurfaceGrid map = map_of(corridor(true, 1, 20000));
+  const Pose T = motion({4.2, 0.0, 0.0}, 0.0);
   const Points scan = seen_from(T, corridor(true, 2, 2000));
-  CHECK((align(scan, map, Pose::Identity(), kFinest, kFinest).T_map_scan.translation() -
-         T.translation())
-            .norm() > 0.5);
-  CHECK((search(scan, map, Pose::Identity(), kFinest).T_map_scan.translation() - T.translation())
-            .norm() < 0.005);
+  const auto error_from = [&](const std::vector<Pose>& guesses) {
+    const auto found = register_scans(map, scan, guesses);
+    REQUIRE(found);
+    return (found->T_a_b.translation() - T.translation()).norm();
+  };
+  CHECK(error_from({Pose::Identity()}) > 0.5);
+  CHECK(error_from({Pose::Identity(), motion({3.0, 0.0, 0.0}, 0.0)}) < 0.005);
 }
 
 TEST_CASE("A scan of another place does not fit") {
-  const LocalMap map = map_of(corridor(true, 1, 20000));
+  const SurfaceGrid map = map_of(corridor(true, 1, 20000));
   std::mt19937 random(3);
   Points scan;
   for (int i = 0; i < 2000; ++i) {
     const auto coordinate = [&] { return 0.04 * static_cast<double>(random() % 1000); };
     scan.emplace_back(coordinate(), coordinate(), coordinate());
   }
-  CHECK(align(scan, map, Pose::Identity(), 1.0, kFinest).fit < 0.2);
-  CHECK(align(scan, LocalMap(), Pose::Identity(), 1.0, kFinest).fit == 0.0);
+  const auto found = register_scans(map, scan, {Pose::Identity()});
+  CHECK((found ? found->score : 0.0) < 0.3);
+  CHECK_FALSE(register_scans(SurfaceGrid(), scan, {Pose::Identity()}));
 }
 
 TEST_CASE("What is far is forgotten") {
   const Points points = corridor(true, 1, 20000);
-  LocalMap map = map_of(points);
+  SurfaceGrid map = map_of(points);
   map.forget_beyond({-20.0, 0.0, 0.0}, 15.0);
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  CHECK(map.surface_at({-15.0, 0.0, -1.5}, up).direction_count == 1);
-  CHECK(map.surface_at({15.0, 0.0, -1.5}, up).direction_count == 0);
+  CHECK(map.find(2, {-15.3, 0.3, -1.5}) != nullptr);
+  CHECK(map.find(2, {15.3, 0.3, -1.5}) == nullptr);
 }
 
 TEST_CASE("An upright pole is a surface; a ring of the sensor is none") {
-  LocalMap map;
-  for (int i = 0; i < 20; ++i) map.insert({5.0, 0.0, 0.25 * i});
-  for (int i = 0; i < 20; ++i) map.insert({0.0, 20.0 + 0.25 * i, 0.0});
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
-  CHECK(map.surface_at({5.1, 0.0, 2.0}, up).direction_count == 2);
-  CHECK(map.surface_at({0.1, 22.0, 0.0}, up).direction_count == 0);
+  SurfaceGrid map;
+  for (int i = 0; i < 20; ++i) map.insert({5.0, 0.0, 0.125 * i});
+  for (int i = 0; i < 20; ++i) map.insert({0.0, 20.0 + 0.125 * i, 0.0});
+  REQUIRE(map.find(2, {5.1, 0.1, 1.1}) != nullptr);
+  CHECK(map.find(2, {5.1, 0.1, 1.1})->direction_count == 2);
+  CHECK(map.find(2, {0.1, 21.1, 0.0}) == nullptr);
 }
 
 TEST_CASE("Points are moved by the motion between their time and the mean time") {

@@ -12,6 +12,13 @@ using namespace dynains;
 
 namespace {
 
+/// Rigid motion of a rotation vector (rad) and a translation (m).
+Pose motion_of(const Vector6& rotation_and_translation) {
+  Vector6 step;
+  step << rotation_and_translation.tail<3>(), kLever * rotation_and_translation.head<3>();
+  return stepped(Pose::Identity(), step);
+}
+
 /// Motions of a sensor that is mounted at `X` on a body; `limits`: rotation (rad) and translation
 /// (m) of the body along each axis. Noise of 5 mm.
 struct Drive {

@@ -121,7 +121,7 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
         points.push_back(p.x(), p.y(), p.z());
       }
     }
-    return RegistrationScan(points).find(2, middle) != nullptr;
+    return RegistrationScan(points).surfaces().find(2, middle) != nullptr;
   };
   const auto sign = GENERATE(1.0, -1.0);
   CHECK_FALSE(has_surface(10.5, 0.035 * sign));

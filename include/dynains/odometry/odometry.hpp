@@ -52,7 +52,7 @@ struct OdometryResult {
   /// At the stamp, in the frame of the first scan at its stamp. After a loss: the predicted pose.
   Pose T_world_sensor = Pose::Identity();
   OdometryLoss loss = OdometryLoss::kNone;
-  double fit = 1.0;  ///< share of the points that lie on surfaces of the map, [0, 1]
+  double fit = 1.0;  ///< mean weight of the points at planes and poles of the map, [0, 1]
   /// Number of directions of motion, of six, that the surfaces do not determine, as along a
   /// corridor. Along them the motion is the predicted one.
   int free_directions = 0;
@@ -65,7 +65,7 @@ struct OdometryResult {
 
 /// Scans in, poses out. Each scan is predicted at constant velocity, de-skewed to the mean time of
 /// its points if they have times, and registered point to plane (poles: point to line) to a map of
-/// voxels (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
+/// cells (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
 /// and Singh 2016). Then the remover judges the scan, and only points that do not move enter the
 /// map. The first motions are searched for up to 3 m. Same scans, same bits.
 class Odometry {
