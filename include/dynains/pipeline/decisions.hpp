@@ -245,8 +245,7 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
 
   FreeSpaceDecision(const PipelineConfig<Stages>& config, Background* other)
       : evidence_(config.evidence) {
-    if_offered(evidence_,
-               [&](auto& e) -> decltype(e.share_work(other)) { return e.share_work(other); });
+    if constexpr (Offers<ShareWork, Evidence>::value) evidence_.share_work(other);
   }
 
   std::size_t window_length() const override { return 1; }
@@ -254,14 +253,13 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
   void reserve(std::size_t scans) override {
-    if_offered(evidence_, [&](auto& e) -> decltype(e.reserve(scans)) { return e.reserve(scans); });
+    if constexpr (Offers<Reserve, Evidence>::value) evidence_.reserve(scans);
   }
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
-    const double time = newest.time;
-    if_offered(evidence_, [&](auto& e) -> decltype(e.set_time(time)) { return e.set_time(time); });
+    if constexpr (Offers<SetTime, Evidence>::value) evidence_.set_time(newest.time);
     evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
     propagate_ids(scans);
@@ -281,16 +279,16 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
   }
 
   std::optional<PoseResidual> pose_residual() const override {
-    return offered<std::optional<PoseResidual>>(
-        evidence_, [](const auto& e) -> decltype(e.pose_residual()) { return e.pose_residual(); });
+    if constexpr (Offers<HasPoseResidual, Evidence>::value) return evidence_.pose_residual();
+    return std::nullopt;
   }
   std::optional<EpochReason> misfit() const override {
-    return offered<std::optional<EpochReason>>(
-        evidence_, [](const auto& e) -> decltype(e.misfit()) { return e.misfit(); });
+    if constexpr (Offers<HasMisfit, Evidence>::value) return evidence_.misfit();
+    return std::nullopt;
   }
   std::optional<SurfaceCounts> surfaces() const override {
-    return offered<std::optional<SurfaceCounts>>(
-        evidence_, [](const auto& e) -> decltype(e.surfaces()) { return e.surfaces(); });
+    if constexpr (Offers<HasSurfaces, Evidence>::value) return evidence_.surfaces();
+    return std::nullopt;
   }
 
  private:

@@ -15,6 +15,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -102,31 +103,36 @@ struct IsMap<
                            PointsView(), Span<const std::uint8_t>(), std::declval<const Pose&>())),
                        decltype(std::declval<Stage&>().clear())>> : std::true_type {};
 
-/// Calls `call(stage)` if the stage has the optional member that it calls.
-template <class Stage, class Call>
-void if_offered(Stage& stage, const Call& call) {
-  if constexpr (std::is_invocable_v<const Call&, Stage&>) call(stage);
-}
-
-/// Result of `call(stage)` if the stage has the optional member that it calls; else `Result()`.
-template <class Result, class Stage, class Call>
-Result offered(const Stage& stage, const Call& call) {
-  if constexpr (std::is_invocable_v<const Call&, const Stage&>) {
-    return call(stage);
-  } else {
-    return Result();
-  }
-}
+// Optional members of stages, for Offers.
+template <class Stage>
+using NeedsSensor = decltype(std::declval<const Stage&>().needs_sensor());
+template <class Stage>
+using Adapt = decltype(std::declval<Stage&>().adapt(SensorModel()));
+template <class Stage>
+using Reserve = decltype(std::declval<Stage&>().reserve(std::size_t{}));
+template <class Stage>
+using SetTime = decltype(std::declval<Stage&>().set_time(0.0));
+template <class Stage>
+using ShareWork = decltype(std::declval<Stage&>().share_work(std::declval<Background*>()));
+template <class Stage>
+using HasPoseResidual = decltype(std::declval<const Stage&>().pose_residual());
+template <class Stage>
+using HasMisfit = decltype(std::declval<const Stage&>().misfit());
+template <class Stage>
+using HasSurfaces = decltype(std::declval<const Stage&>().surfaces());
 
 /// Whether a stage wants adapt(sensor).
 template <class Stage>
 bool needs_sensor(const Stage& stage) {
-  return offered<bool>(
-      stage, [](const auto& s) -> decltype(s.needs_sensor()) { return s.needs_sensor(); });
+  if constexpr (Offers<NeedsSensor, Stage>::value) {
+    return stage.needs_sensor();
+  } else {
+    return false;
+  }
 }
 template <class Stage>
 void adapt_stage(Stage& stage, const SensorModel& sensor) {
-  if_offered(stage, [&](auto& s) -> decltype(s.adapt(sensor)) { return s.adapt(sensor); });
+  if constexpr (Offers<Adapt, Stage>::value) stage.adapt(sensor);
 }
 
 }  // namespace dynains::detail
