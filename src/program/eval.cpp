@@ -113,8 +113,8 @@ void eval(const EvalOptions& options) {
 
 }  // namespace
 
-void add_eval_command(CLI::App& program) {
-  CLI::App& command = *program.add_subcommand(
+void add_eval_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
       "eval",
       "Judge runs or maps of any tool by a labelled sequence: PR, RR, F1 and SA, DA, AA, HA");
   const auto options = std::make_shared<EvalOptions>(command);

@@ -13,7 +13,7 @@ class PrintableStream : std::streambuf {
  public:
   /// Filters `stream` as long as this object lives.
   explicit PrintableStream(std::ostream& stream);
-  ~PrintableStream();
+  ~PrintableStream() override;
   PrintableStream(const PrintableStream&) = delete;
   PrintableStream& operator=(const PrintableStream&) = delete;
 

@@ -31,10 +31,10 @@ struct SessionRequest {
   bool is_fulfilled() const;
 };
 
-/// A session of the map in `city`, to be written again under poses of this fingerprint: begin,
+/// A session of the map in `folder`, to be written again under poses of this fingerprint: begin,
 /// recording and configuration stay, an alignment ends. Throws ConfigError if there is none of this
 /// name, IoError.
-SessionRequest reposed_session(const std::filesystem::path& city, const std::string& name,
+SessionRequest reposed_session(const std::filesystem::path& folder, const std::string& name,
                                const std::string& fingerprint);
 
 /// The request with the alignment that it asks for. Nothing changes in the map. Throws ConfigError
