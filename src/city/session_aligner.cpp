@@ -172,7 +172,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
     const double range = local.norm();
     if (!(range > kNearest && range < kReach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
-    if (adds(taken_, cell_key(point - sensors_.front(), kThinned))) points_.push_back(point);
+    if (adds(taken_, voxel_at(point - sensors_.front(), kThinned))) points_.push_back(point);
   }
 }
 

@@ -67,12 +67,12 @@ void ScanPreparation::thin_out() {
     const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&cloud_[3 * i]).cast<double>();
     const double squared = p.squaredNorm();
     if (!(squared > nearest_ * nearest_ && squared < farthest_ * farthest_)) continue;
-    if (adds(taken_, cell_key(p, kSmall))) map_points_.push_back({p, i});
+    if (adds(taken_, voxel_at(p, kSmall))) map_points_.push_back({p, i});
   }
   keypoints_.clear();
   taken_.clear();
   for (const Point& point : map_points_) {
-    if (adds(taken_, cell_key(point.position, edge_))) keypoints_.push_back(point.position);
+    if (adds(taken_, voxel_at(point.position, edge_))) keypoints_.push_back(point.position);
   }
 }
 

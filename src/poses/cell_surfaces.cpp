@@ -9,10 +9,10 @@ namespace dynains {
 
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
-  if (!adds(taken_, cell_key(point, kApart))) return;
+  if (!adds(taken_, voxel_at(point, kApart))) return;
   for (std::size_t level = 0; level < kCellLevels; ++level) {
     Level& at = levels_[level];
-    const VoxelKey key = cell_key(point, kCellEdges[level]);
+    const VoxelKey key = voxel_at(point, kCellEdges[level]);
     const std::uint32_t number = at.numbers.insert(key);
     if (number == at.cells.size()) {
       at.cells.emplace_back();
@@ -44,7 +44,7 @@ void SurfaceGrid::forget_beyond(const Eigen::Vector3d& centre, double reach) {
 const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& point) const {
   const std::size_t coarsest = with_clutter_ ? 0 : level;
   for (std::size_t k = level + 1; k-- > coarsest;) {
-    const std::uint32_t number = levels_[k].numbers.find(cell_key(point, kCellEdges[k]));
+    const std::uint32_t number = levels_[k].numbers.find(voxel_at(point, kCellEdges[k]));
     if (number == VoxelHashTable<>::kNone) continue;
     const Cell& cell = levels_[k].cells[number];
     if (!cell.is_fitted) cell.surface = surface_of(cell);

@@ -25,16 +25,6 @@ inline constexpr std::array<double, kCellLevels> kCellEdges = {4.0, 2.0, 1.0};
 /// correlated, so it is a large value.
 inline constexpr double kPointDeviation = 0.2;
 
-/// The cell of edge `edge` (m) around a point.
-inline VoxelKey cell_key(const Eigen::Vector3d& p, double edge) {
-  const auto index = [&](double coordinate) {
-    const double cell = coordinate / edge;
-    const auto number = static_cast<std::int64_t>(cell);
-    return number - (static_cast<double>(number) > cell ? 1 : 0);  // floor without a call of libm
-  };
-  return voxel_key(index(p.x()), index(p.y()), index(p.z()));
-}
-
 /// Whether `key` was new to `table`, which has it now.
 inline bool adds(VoxelHashTable<>& table, VoxelKey key) {
   const std::size_t count = table.size();

@@ -25,7 +25,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
-    const VoxelKey key = cell_key(p, kVoxel);
+    const VoxelKey key = voxel_at(p, kVoxel);
     if (adds(occupied, key)) kept.emplace_back(key, p);
   }
   // Every n-th of them is spread over the scan.

@@ -92,7 +92,7 @@ RegistrationScan::RegistrationScan(PointsView points, double farthest) {
     const double range = p.norm();
     if (!(range > kNearest && range < farthest)) continue;
     surfaces_.insert(p);
-    if (adds(thinned, cell_key(p, kThinned))) points_.push_back(p);
+    if (adds(thinned, voxel_at(p, kThinned))) points_.push_back(p);
   }
 }
 

@@ -8,7 +8,6 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/simd/floor.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -28,12 +27,7 @@ inline TileIndex tile_of(VoxelKey cell) {
 }
 
 /// The cell of a point, m, world frame.
-inline VoxelKey cell_at(const Eigen::Vector3d& point) {
-  const auto index = [&](int axis) {
-    return detail::floor_to<std::int64_t>(point[axis] / kWorldCell);
-  };
-  return voxel_key(index(0), index(1), index(2));
-}
+inline VoxelKey cell_at(const Eigen::Vector3d& point) { return voxel_at(point, kWorldCell); }
 
 /// The corner of a cell with the lowest coordinates, m. `edge`: m, of the cells.
 inline Eigen::Vector3d corner_of(VoxelKey cell, double edge = kWorldCell) {

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/simd/floor.hpp"
+
 namespace dynains {
 
 /// The three indices of a voxel in its grid as one number, ordered by x, then y, then z. Each index
@@ -31,6 +33,13 @@ constexpr VoxelKey voxel_key_step(std::int64_t dx, std::int64_t dy, std::int64_t
 constexpr std::int64_t voxel_index(VoxelKey key, int axis) {
   constexpr VoxelKey kMask = (VoxelKey{1} << kVoxelKeyBits) - 1;
   return static_cast<std::int64_t>(key >> ((2 - axis) * kVoxelKeyBits) & kMask) - kVoxelKeyOffset;
+}
+
+/// The voxel of edge `edge` around a point, in the unit of `edge`. `Point`: a vector of doubles.
+template <class Point>
+VoxelKey voxel_at(const Point& point, double edge) {
+  const auto index = [&](int axis) { return detail::floor_to<std::int64_t>(point[axis] / edge); };
+  return voxel_key(index(0), index(1), index(2));
 }
 
 /// Hash of a key. The upper bits are mixed best.
