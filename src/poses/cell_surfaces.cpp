@@ -105,7 +105,8 @@ Pose stepped(const Pose& T, const Vector6& step) {
 }
 
 NormalEquations::Solution NormalEquations::solve() const {
-  // Of a symmetric matrix these are eigenvectors. Eigen's solver for those aligns its matrices.
+  // The singular vectors of a symmetric matrix are its eigenvectors. Eigen's eigenvalue solver is
+  // not used, because it aligns its matrices.
   const Eigen::JacobiSVD<Matrix6> solver(hessian_, Eigen::ComputeFullU);
   Solution solution;
   for (Eigen::Index k = 0; k < 6; ++k) {

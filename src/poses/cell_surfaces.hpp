@@ -134,7 +134,7 @@ class NormalEquations {
   struct Solution {
     Vector6 step = Vector6::Zero();  ///< 0 along directions that too little determines
     int free_directions = 0;         ///< their number
-    /// Of the translation (m^2), for points with a deviation of 1 m.
+    /// Covariance of the translation (m^2), if the distance of each point has a deviation of 1 m.
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
   Solution solve() const;
@@ -145,22 +145,5 @@ class NormalEquations {
   std::size_t count_ = 0;
   double least_;
 };
-
-/// Gauss-Newton steps from `T`, at most `most`, until they are short or fewer than 30 points meet a
-/// surface. `equations_at(T)` returns NormalEquations.
-template <class EquationsAt>
-Pose gauss_newton(Pose T, int most, EquationsAt&& equations_at) {
-  constexpr std::size_t kFewest = 30;
-  constexpr double kShort = 1e-4;  // m
-  for (int k = 0; k < most; ++k) {
-    const NormalEquations equations = equations_at(T);
-    if (equations.count() < kFewest) break;
-    const Vector6 step = equations.solve().step;
-    if (!step.allFinite()) break;
-    T = stepped(T, step);
-    if (step.norm() < kShort) break;
-  }
-  return T;
-}
 
 }  // namespace dynains

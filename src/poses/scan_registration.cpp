@@ -50,13 +50,22 @@ struct Prior {
   }
 };
 
-Pose refine(const SurfaceGrid& a, const Points& b, const Pose& T, std::size_t level, double scale,
+/// Gauss-Newton steps from `T`, at most `most`, until they are short or fewer than 30 points meet a
+/// surface.
+Pose refine(const SurfaceGrid& a, const Points& b, Pose T, std::size_t level, double scale,
             std::size_t stride, int most, const std::optional<Prior>& prior = {}) {
-  return gauss_newton(T, most, [&](const Pose& at) {
-    Linearization result = linearize(a, b, at, level, scale, stride);
-    if (prior) prior->add_to(result.equations, at);
-    return result.equations;
-  });
+  constexpr std::size_t kFewest = 30;
+  constexpr double kShort = 1e-4;  // m
+  for (int k = 0; k < most; ++k) {
+    Linearization result = linearize(a, b, T, level, scale, stride);
+    if (prior) prior->add_to(result.equations, T);
+    if (result.equations.count() < kFewest) break;
+    const Vector6 step = result.equations.solve().step;
+    if (!step.allFinite()) break;
+    T = stepped(T, step);
+    if (step.norm() < kShort) break;
+  }
+  return T;
 }
 
 /// The result of small steps; empty if too few points meet a surface.
