@@ -115,7 +115,7 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointLabel label = verdict.labels[i];
     const bool is_removed = label == PointLabel::kDynamic;
-    // What looks like ground under an instance is often its underside or its wheels.
+    // Ground that left with the instance above it stays removed: it holds wheels and undersides.
     if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) continue;
     const Eigen::Vector3d point = world_point(points, i, T_level_sensor);
     if (const VoxelKey next = cell_at(point); next != cell) {

@@ -137,10 +137,9 @@ class Collector {
   ThinnedPoints static_, moving_;
   const evaluation::TruthClasses truth_;
   ViewData data_;
-  // Of one scan.
-  RecordedScan scan_;
-  VerdictArrays verdict_;
-  std::vector<std::uint32_t> labels_;  // of the recording; empty: none
+  RecordedScan scan_;                  // the newest one
+  VerdictArrays verdict_;              // of scan_
+  std::vector<std::uint32_t> labels_;  // of scan_ in the recording; empty: none
 };
 
 }  // namespace
