@@ -1,4 +1,5 @@
-# Refuses an include of a folder of src/ or of a component whose target is not linked. ROOMS: a list
+# Refuses an include of a folder of src/ or of a component whose target is not linked, and of CLI11
+# where it is not the program's. ROOMS: a list
 # of FOLDER=LINKED,LINKED: each folder of src/ and the folders of the targets that it links.
 cmake_minimum_required(VERSION 3.16)
 set(wrong "")
@@ -12,6 +13,10 @@ foreach(room IN LISTS ROOMS)
     ${SOURCE_DIR}/include/dynains/${folder}/*.hpp)
   foreach(file IN LISTS files)
     math(EXPR count "${count} + 1")
+    file(STRINGS ${file} includes REGEX "^#include <CLI/")
+    if(includes AND NOT folder STREQUAL "program")
+      list(APPEND wrong "${file}: ${includes}")
+    endif()
     file(STRINGS ${file} includes REGEX "^#include \"")
     foreach(include IN LISTS includes)
       string(REGEX REPLACE "^#include \"(dynains/)?(.*)\"" "\\2" included ${include})
