@@ -1,4 +1,4 @@
-# Compiles SOURCE with the flags of pkg-config alone.
+# Compiles SOURCE, and links a program of the compiled remover, with the flags of pkg-config alone.
 if(NOT PKG_CONFIG)
   message("SKIPPED: pkg-config is not installed")
   return()
@@ -21,16 +21,10 @@ foreach(flag IN LISTS flags)
   endif()
 endforeach()
 
-set(program ${WORK_DIR}/pkg_config_consumer)
-file(REMOVE ${program})
-execute_process(COMMAND ${COMPILER} -std=c++17 ${SOURCE} ${flags} -o ${program}
+execute_process(COMMAND ${COMPILER} -std=c++17 -fsyntax-only ${SOURCE} ${flags}
   RESULT_VARIABLE result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "does not compile with: ${flags}")
-endif()
-execute_process(COMMAND ${program} RESULT_VARIABLE result)
-if(NOT result EQUAL 0)
-  message(FATAL_ERROR "${program} ended with ${result}")
 endif()
 
 # The compiled remover, where it is installed.
@@ -41,6 +35,8 @@ endif()
 execute_process(COMMAND ${PKG_CONFIG} --cflags --libs --print-errors dynains-remover
   OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE)
 separate_arguments(flags)
+set(program ${WORK_DIR}/pkg_config_remover)
+file(REMOVE ${program})
 file(WRITE ${WORK_DIR}/pkg_config_remover.cpp
   "#include <dynains/compiled_remover.hpp>\n"
   "int main() { return dynains::DynaInsRemover().latency() == 0 ? 1 : 0; }\n")
