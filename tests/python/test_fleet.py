@@ -17,9 +17,9 @@ from dynains import fleet  # noqa: E402
 @pytest.fixture(scope="module")
 def drives(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
-    for seed in range(6):
+    for seed in range(3):
         dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(folder / f"drive{seed}")
-    dynains.Simulator("crowd", "vlp16", scans=150, seed=6).write(folder / "drive6")
+    dynains.Simulator("crowd", "vlp16", scans=100, seed=3).write(folder / "drive3")
     broken = folder / "broken"
     (broken / "velodyne").mkdir(parents=True)
     (broken / "velodyne" / "000000.bin").write_bytes(b"x")
@@ -80,11 +80,11 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
 
     def disturb():
         while not disturbed:
-            disturbed.extend(out.glob("drive6.partial/labels/*.label"))
+            disturbed.extend(out.glob("drive3.partial/labels/*.label"))
             time.sleep(0.01)
         workers.workers[0].send_signal(signal.SIGKILL)
         workers.workers[1].send_signal(signal.SIGSTOP)
-        threading.Timer(20.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
+        threading.Timer(10.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
 
     threading.Thread(target=disturb, daemon=True).start()
     results = fleet.clean(
@@ -94,7 +94,7 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
     )
     assert disturbed and workers.workers[0].wait() == -signal.SIGKILL
     assert not [name for name, result in results.items() if "error" in result]
-    assert list(results) == [f"drive{seed}" for seed in range(7)]
+    assert list(results) == [f"drive{seed}" for seed in range(4)]
     assert results_in(out) == expected
     assert json.loads((out / "fleet.json").read_text()) == results
 
@@ -202,20 +202,17 @@ def test_the_program_starts_a_fleet_and_says_what_it_lacks(drives, tmp_path):
         environment = {**os.environ, "PATH": path, **environment}
         return subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cwd)
 
-    out = tmp_path / "out"
-    done = fleet_command(drives / "drive1", "--out", out, "--workers", "1")
-    assert done.returncode == 0 and "1 of 1 recordings: drive1: 20 scans" in done.stderr
-    assert json.loads((out / "fleet.json").read_text())["drive1"]["scans"] == 20
-    wrong = fleet_command(drives / "drive1", "--out", out, "--workers", "0")
-    assert wrong.returncode == 2 and "expected at least 1" in wrong.stderr
     assert "usage: dynains fleet" in fleet_command("--help").stdout
 
+    out = tmp_path / "out"
     data = tmp_path / "data"  # the current folder holds modules that nobody asked for
     data.mkdir()
     for name in ("dynains", "distributed", "json", "pickle", "multiprocessing", "socket"):
         (data / f"{name}.py").write_text("open('executed', 'w')")
-    again = fleet_command(drives / "drive1", "--out", out, "--workers", "1", cwd=data)
-    assert again.returncode == 0 and not (data / "executed").exists()
+    done = fleet_command(drives / "drive1", "--out", out, "--workers", "1", cwd=data)
+    assert done.returncode == 0 and "1 of 1 recordings: drive1: 20 scans" in done.stderr
+    assert json.loads((out / "fleet.json").read_text())["drive1"]["scans"] == 20
+    assert not (data / "executed").exists()
 
     (tmp_path / "dynains.py").write_text("raise ImportError('not here')")
     missing = fleet_command("x", PYTHONPATH=str(tmp_path))
