@@ -66,7 +66,8 @@ void check_crashes(const Scenario& scenario) {
   CHECK(needs_syncs(rehearsal));
 
   const std::vector<State> states = crash_states(model);
-  const std::size_t step = std::max<std::size_t>(1, states.size() / DYNAINS_CRASH_STATES);
+  constexpr std::size_t kRestarts = DYNAINS_CRASH_STATES;
+  const std::size_t step = (states.size() + kRestarts - 1) / kRestarts;
   for (std::size_t i = 0; i < states.size(); ++i) {
     const Crash& crash = states[i].crash;
     CAPTURE(crash.length, int(crash.names), int(crash.data), crash.seed);

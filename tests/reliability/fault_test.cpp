@@ -3,7 +3,7 @@
 // gives the result of an undisturbed run.
 //
 // The first and the last call of each kind fail, and one of each DYNAINS_FAULTS_OF between them
-// (default 4; 1: every call).
+// (default 8; 1: every call).
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -111,7 +111,7 @@ class FaultTest {
 
   Rehearsal rehearsal_;
   Random random_;
-  std::size_t few_ = number_in("DYNAINS_FAULTS_OF", 4);
+  std::size_t few_ = number_in("DYNAINS_FAULTS_OF", 8);
   std::size_t failed_ = 0;
   std::set<std::size_t> states_;  ///< states from which the command was started again
 };

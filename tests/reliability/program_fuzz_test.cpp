@@ -218,7 +218,7 @@ TEST_CASE("the program is started at random") {
   const TemporaryFolder folder;
   const std::string root = fs::canonical(folder.path()).string() + "/root";
   const std::size_t first = number_in("DYNAINS_PROGRAM_FIRST", 0);
-  const std::size_t count = number_in("DYNAINS_PROGRAM_STARTS", 600);
+  const std::size_t count = number_in("DYNAINS_PROGRAM_STARTS", 200);
   std::size_t succeeded = 0;
   const auto begin = std::chrono::steady_clock::now();
   for (std::size_t number = first; number < first + count; ++number) {
