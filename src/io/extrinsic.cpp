@@ -10,6 +10,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
+#include "kitti_files.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -39,16 +40,12 @@ Pose read_extrinsic(const std::string& text) {
     throw IoError(text + ": has " + std::to_string(file.poses.size()) + " poses; " + kExpected);
   }
   const auto& n = *numbers;
-  const detail::Quaternion q(n[6], n[3], n[4], n[5]);
-  const Eigen::Vector3d t(n[0], n[1], n[2]);
-  if (!t.allFinite() || !(std::abs(q.norm() - 1.0) < 0.01)) {
+  const auto pose = rigid_pose({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});
+  if (!pose) {
     throw ConfigError("extrinsic \"" + text +
                       "\": expected finite numbers and a quaternion of length 1");
   }
-  Pose pose = Pose::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = t;
-  return pose;
+  return *pose;
 }
 
 Eigen::Vector3d read_sensor_origin(const std::string& text) {

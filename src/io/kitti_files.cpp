@@ -75,6 +75,15 @@ void for_each_row(const fs::path& path, Parse&& parse) {
 
 }  // namespace
 
+std::optional<Pose> rigid_pose(const Eigen::Vector3d& position,
+                               const detail::Quaternion& rotation) {
+  if (!position.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01)) return std::nullopt;
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation.normalized().toRotationMatrix();
+  pose.translation() = position;
+  return pose;
+}
+
 std::optional<Pose> nearest_rigid(const double* rows) {
   using RowMajor34 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
   const RowMajor34 matrix = Eigen::Map<const RowMajor34>(rows);

@@ -1,4 +1,4 @@
-// The files of a KITTI folder, one by one.
+// The files of a KITTI folder, one by one, and transforms in files.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -30,6 +30,10 @@ Pose read_kitti_calib(const std::filesystem::path& path);
 
 /// Throws IoError if `rows` < `needed`.
 void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed);
+
+/// The rigid transform of a position (m) and a quaternion of length 1, which may be off by 1 %;
+/// nothing unless they are finite.
+std::optional<Pose> rigid_pose(const Eigen::Vector3d& position, const detail::Quaternion& rotation);
 
 /// The rigid transform nearest to 12 numbers (upper 3x4, row by row); nothing if they differ from
 /// one by more than rounding.

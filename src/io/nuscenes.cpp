@@ -1,7 +1,6 @@
 #include "nuscenes.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <map>
@@ -13,6 +12,7 @@
 
 #include "failure.hpp"
 #include "input_file.hpp"
+#include "kitti_files.hpp"
 
 #if defined(DYNAINS_HAS_JSON)
 #include <nlohmann/json.hpp>
@@ -49,12 +49,9 @@ class TableRow {
   Pose pose() const {
     const std::vector<double>& p = list("translation", 3);
     const std::vector<double>& q = list("rotation", 4);
-    const detail::Quaternion rotation(q[0], q[1], q[2], q[3]);
-    const Eigen::Vector3d translation(p[0], p[1], p[2]);
-    if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01)) {
-      fail("expected a finite translation and a quaternion of length 1");
-    }
-    return Eigen::Translation3d(translation) * rotation.normalized();
+    const auto pose = rigid_pose({p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]});
+    if (!pose) fail("expected a finite translation and a quaternion of length 1");
+    return *pose;
   }
   [[noreturn]] void fail(const std::string& what) const {
     dynains::fail(table_, "row " + std::to_string(index_) + ": " + what);

@@ -1,15 +1,14 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "byte_reader.hpp"
+#include "kitti_files.hpp"
 #include "lzf.hpp"
 #include "point_file_copy.hpp"
 #include "point_readers.hpp"
@@ -87,15 +86,12 @@ Pose parse_viewpoint(const ByteReader& reader, std::string_view line) {
   std::array<double, 7> v{};
   for (double& value : v) {
     const auto number = text::parse_number(text::next_token(line));
-    if (!number || !std::isfinite(*number)) reader.fail_on_line(expected);
+    if (!number) reader.fail_on_line(expected);
     value = *number;
   }
-  const detail::Quaternion rotation(v[3], v[4], v[5], v[6]);
-  if (!(std::abs(rotation.norm() - 1.0) < 0.1)) reader.fail_on_line(expected);
-  Pose pose = Pose::Identity();
-  pose.linear() = rotation.normalized().toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
-  return pose;
+  const auto pose = rigid_pose({v[0], v[1], v[2]}, {v[3], v[4], v[5], v[6]});
+  if (!pose) reader.fail_on_line(expected);
+  return *pose;
 }
 
 PcdEncoding parse_encoding(const ByteReader& reader, std::string_view line) {
@@ -196,9 +192,8 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
     reader.fail_on_line("expected WIDTH or POINTS before DATA");
   }
   if (!header.has_width) return;
-  constexpr std::uint64_t kMax = std::numeric_limits<std::uint64_t>::max();
-  const bool overflows = header.height != 0 && header.width > kMax / header.height;
-  const std::uint64_t product = overflows ? kMax : header.width * header.height;
+  const std::uint64_t product = header.width * header.height;
+  const bool overflows = header.height != 0 && product / header.height != header.width;
   if (overflows || (header.has_points && header.points != product)) {
     reader.fail_on_line("expected POINTS to be WIDTH * HEIGHT");
   }

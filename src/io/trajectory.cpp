@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <string_view>
 
@@ -150,17 +149,16 @@ Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
   std::array<double, 4> q{};
   for (std::size_t i = 0; i < 4; ++i) q[i] = number_in(reader, cells, columns.rotation[i]);
   const detail::Quaternion rotation(q[3], q[0], q[1], q[2]);
-  if (!(std::abs(rotation.norm() - 1.0) < 0.01)) {
+  Eigen::Vector3d position;
+  for (std::size_t i = 0; i < 3; ++i) {
+    position[static_cast<Eigen::Index>(i)] = number_in(reader, cells, columns.position[i]);
+  }
+  const auto pose = rigid_pose(position, rotation);
+  if (!pose) {
     reader.fail_on_line("expected a quaternion of length 1, found one of length " +
                         std::to_string(rotation.norm()));
   }
-  Pose pose = Pose::Identity();
-  pose.linear() = rotation.normalized().toRotationMatrix();
-  for (std::size_t i = 0; i < 3; ++i) {
-    pose.translation()[static_cast<Eigen::Index>(i)] =
-        number_in(reader, cells, columns.position[i]);
-  }
-  return pose;
+  return *pose;
 }
 
 }  // namespace
@@ -236,23 +234,7 @@ Pose interpolate(const Pose& a, const Pose& b, double share) {
 }
 
 Pose extrapolate(const Pose& a, const Pose& b, double share) {
-  // Spherical linear interpolation. That of Eigen returns a type with alignment.
-  const detail::Quaternion from(a.linear());
-  const detail::Quaternion to(b.linear());
-  const double cosine = from.dot(to);
-  double of_from = 1.0 - share;
-  double of_to = share;
-  if (std::abs(cosine) < 1.0 - std::numeric_limits<double>::epsilon()) {
-    const double angle = std::acos(std::abs(cosine));
-    of_from = std::sin((1.0 - share) * angle) / std::sin(angle);
-    of_to = std::sin(share * angle) / std::sin(angle);
-  }
-  if (cosine < 0.0) of_to = -of_to;
-  const detail::Quaternion rotation(of_from * from.coeffs() + of_to * to.coeffs());
-  Pose pose = Pose::Identity();
-  pose.linear() = rotation.normalized().toRotationMatrix();
-  pose.translation() = a.translation() + share * (b.translation() - a.translation());
-  return pose;
+  return a * detail::scaled_motion(detail::inverted(a) * b, share);
 }
 
 double to_seconds(double stamp) {

@@ -1,9 +1,9 @@
 #include "ros_messages.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
+#include "../kitti_files.hpp"
 #include "message_reader.hpp"
 #include "point_cloud2.hpp"
 
@@ -43,13 +43,9 @@ Pose read_pose(MessageReader& in) {
   for (double& value : position) value = in.number<double>("a position");
   Eigen::Vector4d xyzw;
   for (double& value : xyzw) value = in.number<double>("a quaternion");
-  if (!position.allFinite() || !(std::abs(xyzw.norm() - 1.0) < 0.01)) {
-    in.fail("expected a finite position and a quaternion of length 1");
-  }
-  Pose T = Pose::Identity();
-  T.linear() = detail::Quaternion(xyzw).normalized().toRotationMatrix();
-  T.translation() = position;
-  return T;
+  const auto pose = rigid_pose(position, detail::Quaternion(xyzw));
+  if (!pose) in.fail("expected a finite position and a quaternion of length 1");
+  return *pose;
 }
 
 StampedPose read_transform(MessageReader& in) {
