@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "dynains/errors.hpp"
@@ -33,14 +34,15 @@ class LasFields {
   std::string bytes_;
 };
 
-std::string extra_description(const char* name, std::uint8_t type, const char* description) {
-  constexpr std::size_t kUnused = 124;  // no-data, least, most, scale and offset
+std::string extra_description(const char* name, Scalar type, const char* description) {
+  const auto* const types = std::begin(las::kExtraTypes);
+  const auto* const number = std::find(types + 1, std::end(las::kExtraTypes), type);
   return LasFields()
       .zeros(2)
-      .number(type)
+      .number(static_cast<std::uint8_t>(number - types))
       .number(std::uint8_t{0})
       .text(name, 32)
-      .zeros(kUnused)
+      .zeros(124)  // no-data, least, most, scale and offset
       .text(description, 32)
       .bytes();
 }
@@ -58,13 +60,10 @@ std::string vlr(const std::string& user, std::uint16_t record, const std::string
 }
 
 std::string extra_bytes_vlr() {
-  constexpr std::uint8_t kUint8 = 1;
-  constexpr std::uint8_t kUint32 = 5;
-  constexpr std::uint8_t kFloat = 9;
   return vlr(las::kSpecUser, las::kExtraBytesRecord, "extra bytes",
-             extra_description("belief", kFloat, "probability of being dynamic") +
-                 extra_description("cause", kUint8, "cause of the verdict") +
-                 extra_description("instance", kUint32, "0: none"));
+             extra_description("belief", Scalar::kFloat, "probability of being dynamic") +
+                 extra_description("cause", Scalar::kUint8, "cause of the verdict") +
+                 extra_description("instance", Scalar::kUint32, "0: none"));
 }
 
 constexpr std::uint8_t kLasPointFormat = 6;
@@ -115,13 +114,13 @@ std::string LasWriter::header() const {
 
 void LasWriter::add(const LasPoint& point) {
   constexpr std::uint8_t kOnlyReturn = 1U << 4U | 1U;
-  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  const double most = std::numeric_limits<std::int32_t>::max();
   std::array<std::int32_t, 3> steps{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<Eigen::Index>(axis);
     const double value = std::round((point.position[i] - options_.offset[i]) / options_.scale);
-    if (!(std::abs(value) <= kMost)) {
-      fail(path_, "expected points within " + std::to_string(kMost * options_.scale) +
+    if (!(std::abs(value) <= most)) {
+      fail(path_, "expected points within " + std::to_string(most * options_.scale) +
                       " m of the first one");
     }
     steps[axis] = static_cast<std::int32_t>(value);

@@ -14,13 +14,13 @@ namespace {
 constexpr const char* kFrame = "lidar";
 
 std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
-  CloudLayout layout{{{"x", CloudLayout::kFloat32, 4},
-                      {"y", CloudLayout::kFloat32, 4},
-                      {"z", CloudLayout::kFloat32, 4},
-                      {"intensity", CloudLayout::kFloat32, 4},
-                      {"label", CloudLayout::kUint32, 4}}};
+  CloudLayout layout{{{"x", Scalar::kFloat},
+                      {"y", Scalar::kFloat},
+                      {"z", Scalar::kFloat},
+                      {"intensity", Scalar::kFloat},
+                      {"label", Scalar::kUint32}}};
   const bool has_times = !scan.times.empty();
-  if (has_times) layout.fields.push_back({"time", CloudLayout::kFloat32, 4});
+  if (has_times) layout.fields.push_back({"time", Scalar::kFloat});
   std::string points;
   points.reserve(scan.labels.size() * layout.point_size());
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {

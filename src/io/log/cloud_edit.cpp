@@ -64,7 +64,7 @@ class CloudBytes {
     const std::size_t begin = field.bytes().size();
     field.string(kLabelField);
     field.number(cloud_.point_step());
-    field.number(CloudLayout::kUint8);
+    field.number(datatype_of(Scalar::kUint8));
     field.number(std::uint32_t{1});
     put(height_ + 8, fields_ + 1, head);
     head.insert(fields_end_, field.bytes(), begin);

@@ -16,6 +16,8 @@ namespace dynains {
 
 class McapWriter;
 
+inline constexpr std::uint64_t kSecondOfLog = 1000000000;  ///< ns
+
 /// How the fields of a message are serialised.
 enum class MessageEncoding : std::uint8_t {
   kRos1,  ///< little endian, without padding

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -32,10 +34,9 @@ class MessageWriter {
   }
   /// std_msgs/Header; `time`: ns.
   void header(std::uint64_t time, const std::string& frame) {
-    constexpr std::uint64_t kSecond = 1000000000;
     if (is_ros1_) number(std::uint32_t{0});  // sequence number
-    number(static_cast<std::uint32_t>(time / kSecond));
-    number(static_cast<std::uint32_t>(time % kSecond));
+    number(static_cast<std::uint32_t>(time / kSecondOfLog));
+    number(static_cast<std::uint32_t>(time % kSecondOfLog));
     string(frame);
   }
   void bytes(const std::string& values) { bytes_ += values; }
@@ -60,25 +61,28 @@ inline std::string transform_message(std::uint64_t time, const std::string& pare
   return out.bytes();
 }
 
+/// Types of fields; the datatype of sensor_msgs/PointField is the index plus 1.
+inline constexpr Scalar kFieldTypes[] = {Scalar::kInt8,   Scalar::kUint8, Scalar::kInt16,
+                                         Scalar::kUint16, Scalar::kInt32, Scalar::kUint32,
+                                         Scalar::kFloat,  Scalar::kDouble};
+inline std::uint8_t datatype_of(Scalar type) {
+  const auto* const found = std::find(std::begin(kFieldTypes), std::end(kFieldTypes), type);
+  return static_cast<std::uint8_t>(found - std::begin(kFieldTypes) + 1);
+}
+
 /// Fields of packed points.
 struct CloudLayout {
   struct Field {
     const char* name;
-    std::uint8_t datatype;  ///< of sensor_msgs/PointField
-    std::uint8_t size;      ///< bytes
+    Scalar type;
   };
-  static constexpr std::uint8_t kUint8 = 2;
-  static constexpr std::uint8_t kUint16 = 4;
-  static constexpr std::uint8_t kUint32 = 6;
-  static constexpr std::uint8_t kFloat32 = 7;
-  static constexpr std::uint8_t kFloat64 = 8;
 
   std::vector<Field> fields;
 
   std::uint32_t point_size() const {
-    std::uint32_t size = 0;
-    for (const Field& field : fields) size += field.size;
-    return size;
+    std::size_t size = 0;
+    for (const Field& field : fields) size += size_of(field.type);
+    return static_cast<std::uint32_t>(size);
   }
 };
 
@@ -96,9 +100,9 @@ inline std::string cloud_message(std::uint64_t time, const std::string& frame,
   for (const CloudLayout::Field& field : layout.fields) {
     out.string(field.name);
     out.number(offset);
-    out.number(field.datatype);
+    out.number(datatype_of(field.type));
     out.number(std::uint32_t{1});  // count
-    offset += field.size;
+    offset += static_cast<std::uint32_t>(size_of(field.type));
   }
   out.number(std::uint8_t{0});  // little endian
   out.number(step);

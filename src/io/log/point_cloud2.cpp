@@ -4,15 +4,15 @@
 #include <iterator>
 #include <optional>
 
+#include "message_writer.hpp"
+
 namespace dynains {
 namespace {
 
 /// By the datatype of sensor_msgs/PointField.
 std::optional<Scalar> scalar_of(std::uint8_t datatype) {
-  constexpr Scalar kTypes[] = {Scalar::kInt8,  Scalar::kUint8,  Scalar::kInt16, Scalar::kUint16,
-                               Scalar::kInt32, Scalar::kUint32, Scalar::kFloat, Scalar::kDouble};
-  if (datatype < 1 || datatype > std::size(kTypes)) return std::nullopt;
-  return kTypes[datatype - 1];
+  if (datatype < 1 || datatype > std::size(kFieldTypes)) return std::nullopt;
+  return kFieldTypes[datatype - 1];
 }
 
 }  // namespace

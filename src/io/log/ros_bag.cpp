@@ -59,9 +59,8 @@ std::string text_in(const Bytes& header, const std::string& name) {
 
 /// Seconds and nanoseconds as nanoseconds.
 std::uint64_t read_time(Bytes& in) {
-  constexpr std::uint64_t kSecond = 1000000000;
   const auto seconds = in.number<std::uint32_t>("seconds");
-  return kSecond * seconds + in.number<std::uint32_t>("nanoseconds");
+  return kSecondOfLog * seconds + in.number<std::uint32_t>("nanoseconds");
 }
 
 }  // namespace
