@@ -104,9 +104,9 @@ PointTimes range_of(const std::vector<double>& times, double least, double most)
 }  // namespace
 
 PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock) {
-  constexpr double kFinite = std::numeric_limits<double>::max();
+  const double finite = std::numeric_limits<double>::max();
   const double longest = clock.longest_scan / clock.unit;
-  const PointTimes all = range_of(scan.time, -kFinite, kFinite);
+  const PointTimes all = range_of(scan.time, -finite, finite);
   if (all.is_empty() || all.last - all.first <= longest) return all;
   const std::vector<double> times = times_with_return(scan);
   if (times.empty()) return {};

@@ -114,8 +114,8 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
 /// Has the same length for every number of points: a comment is padded.
 std::string PointFileWriter::header() const {
   const auto text = pcd_ ? pcd_header : ply_header;
-  constexpr std::size_t kMost = std::numeric_limits<std::size_t>::max();
-  const std::size_t length = text(kMost, columns_, "", viewpoint_).size();
+  const std::size_t most = std::numeric_limits<std::size_t>::max();
+  const std::size_t length = text(most, columns_, "", viewpoint_).size();
   const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
   return text(size_, columns_, std::string(length - needed, '.'), viewpoint_);
 }

@@ -55,22 +55,9 @@ std::string_view without_utf8_mark(std::string_view text) {
 std::optional<double> parse_number(std::string_view token) {
   if (token.size() > 1 && token[0] == '+' && token[1] != '-') token.remove_prefix(1);
   double value = 0.0;
-#ifdef __cpp_lib_to_chars
   const char* end = token.data() + token.size();
   const auto [stop, error] = std::from_chars(token.data(), end, value);
   if (token.empty() || error != std::errc{} || stop != end) return std::nullopt;
-#else
-  const std::string copy(token);
-  if (copy == "nan" || copy == "NaN" || copy == "-nan")
-    return std::numeric_limits<double>::quiet_NaN();
-  if (copy == "inf") return std::numeric_limits<double>::infinity();
-  if (copy == "-inf") return -std::numeric_limits<double>::infinity();
-  std::istringstream stream(copy);
-  stream.imbue(std::locale::classic());
-  if (!(stream >> value) || stream.peek() != std::istringstream::traits_type::eof()) {
-    return std::nullopt;
-  }
-#endif
   return value;
 }
 

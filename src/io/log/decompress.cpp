@@ -66,12 +66,12 @@ Decompressed decompress_zstd(const Block& input, Block& output) {
 #if defined(DYNAINS_HAS_BZ2)
 Decompressed decompress_bz2(const Block& input, Block& output) {
   // The library has no const, and counts in 32 bits; a longer input ends early.
-  constexpr std::size_t kMost = std::numeric_limits<unsigned>::max();
+  const std::size_t most = std::numeric_limits<unsigned>::max();
   auto size = static_cast<unsigned>(output.size());
   const int error =
       BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(output.data()), &size,
                                  reinterpret_cast<char*>(const_cast<std::uint8_t*>(input.data())),
-                                 static_cast<unsigned>(std::min(input.size(), kMost)), 0, 0);
+                                 static_cast<unsigned>(std::min(input.size(), most)), 0, 0);
   if (error != BZ_OK) return {0, "no valid bz2 data, or longer"};
   return {size, {}};
 }

@@ -12,12 +12,10 @@
 namespace dynains {
 
 void copy_log(LogFile& log, const std::filesystem::path& target, const EditMessage& edit) {
-  constexpr std::size_t kMostTopics = std::numeric_limits<std::uint16_t>::max();
-  if (log.topics().size() > kMostTopics) {
+  if (log.topics().size() > std::numeric_limits<std::uint16_t>::max()) {
     fail(log.path(), "expected at most 65535 topics, for MCAP has no more");
   }
-  constexpr bool kCompresses = true;
-  McapWriter writer(target, log.profile(), kCompresses);
+  McapWriter writer(target, log.profile(), McapWriter::Compression::kZstd);
   std::vector<std::uint16_t> channels;
   for (const LogTopic& topic : log.topics()) channels.push_back(writer.add_channel(topic));
   std::vector<std::uint8_t> bytes;

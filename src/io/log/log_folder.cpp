@@ -55,18 +55,9 @@ std::vector<std::string> listed_files(const fs::path& metadata) {
   return names;
 }
 
-std::string first_of(const std::vector<std::string>& names) {
-  constexpr std::size_t kShown = 4;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kShown, names.size()); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > kShown ? text + ", ..." : text;
-}
-
 std::string missing_text(const std::vector<std::string>& missing, std::size_t found) {
   return std::to_string(missing.size()) + " of " + std::to_string(missing.size() + found) +
-         " parts of the log are missing: " + first_of(missing);
+         " parts of the log are missing: " + text::listed(missing);
 }
 
 /// N of a name NAME_N.
@@ -105,7 +96,7 @@ std::vector<std::string> missing_by_number(const fs::path& folder, const LogPart
   if (numbers.size() != parts.files.size() || kinds.size() != 1) {
     std::vector<std::string> names;
     for (const fs::path& file : parts.files) names.push_back(file.filename().string());
-    fail(folder, "has " + std::to_string(names.size()) + " logs (" + first_of(names) +
+    fail(folder, "has " + std::to_string(names.size()) + " logs (" + text::listed(names) +
                      ") and no metadata.yaml; expected one log, or parts NAME_0, NAME_1, ... of "
                      "one; name one of the files");
   }

@@ -66,8 +66,8 @@ Fields list(const Pairs& pairs) {
 }  // namespace
 
 McapWriter::McapWriter(const std::filesystem::path& path, const std::string& profile,
-                       bool compresses)
-    : file_(path), compresses_(compresses) {
+                       Compression compression)
+    : file_(path), compression_(compression) {
   append(mcap::kMagic + record(mcap::kHeader, Fields().string(profile).string("dynains")));
 }
 
@@ -123,7 +123,8 @@ void McapWriter::finish_chunk() {
   const std::uint64_t records_size = records_.size();
   const std::uint32_t checksum =
       crc32(reinterpret_cast<const std::uint8_t*>(records_.data()), records_.size());
-  const std::string compression = compresses_ ? compress(records_) : std::string();
+  const std::string compression =
+      compression_ == Compression::kZstd ? compress(records_) : std::string();
   ChunkPlace chunk{first_time_,  last_time_,  position_, 0, records_.size(),
                    records_size, compression, {},        0};
   append(record(mcap::kChunk, Fields()

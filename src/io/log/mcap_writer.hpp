@@ -21,10 +21,11 @@ namespace dynains {
 /// `commit()`, or not at all. All members throw IoError.
 class McapWriter {
  public:
-  /// `profile`: "ros1" or "ros2". Chunks are compressed by zstd if `compresses` and this build has
-  /// it.
+  enum class Compression : std::uint8_t { kNone, kZstd };
+
+  /// `profile`: "ros1" or "ros2". `compression`: of chunks; none if this build lacks it.
   explicit McapWriter(const std::filesystem::path& path, const std::string& profile = "ros2",
-                      bool compresses = false);
+                      Compression compression = Compression::kNone);
 
   /// At most 65,535 times.
   std::uint16_t add_channel(const LogTopic& topic);
@@ -60,7 +61,7 @@ class McapWriter {
   std::string summary() const;
 
   AtomicFile file_;
-  bool compresses_;
+  Compression compression_;
   std::uint64_t position_ = 0;
   std::string definitions_;                       ///< records of schemas and channels
   std::map<std::string, std::uint16_t> schemas_;  ///< id by content
