@@ -12,7 +12,7 @@
 
 #include "failure.hpp"
 #include "input_file.hpp"
-#include "kitti_files.hpp"
+#include "io/poses/kitti_files.hpp"
 
 #if defined(DYNAINS_HAS_JSON)
 #include <nlohmann/json.hpp>

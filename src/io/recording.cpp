@@ -8,18 +8,18 @@
 #include <string_view>
 #include <utility>
 
-#include "bin_layout.hpp"
-#include "deskew.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
-#include "kitti_files.hpp"
-#include "log/log_scans.hpp"
+#include "io/poses/kitti_files.hpp"
+#include "logs/log_scans.hpp"
 #include "nuscenes.hpp"
-#include "point_clock.hpp"
+#include "points/bin_layout.hpp"
+#include "points/deskew.hpp"
+#include "points/point_clock.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"

@@ -4,12 +4,12 @@
 #include <string>
 #include <utility>
 
-#include "bin_layout.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
-#include "log/log_scans.hpp"
-#include "point_readers.hpp"
+#include "logs/log_scans.hpp"
+#include "points/bin_layout.hpp"
+#include "points/point_readers.hpp"
 
 namespace dynains {
 namespace {

@@ -11,7 +11,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/sensor/mounting.hpp"
-#include "io/finite_points.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "dynains/median.hpp"
-#include "io/finite_points.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains {
 namespace {

@@ -12,7 +12,7 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/parameters.hpp"
-#include "io/point_file_copy.hpp"
+#include "io/points/point_file_copy.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"

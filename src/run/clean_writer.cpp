@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/point_file_copy.hpp"
+#include "io/points/point_file_copy.hpp"
 #include "output_folder.hpp"
 
 namespace dynains::program {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynains/evaluation/text_table.hpp"
-#include "io/finite_points.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains::program {
 namespace {

@@ -11,9 +11,9 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "interrupt.hpp"
-#include "io/log/cloud_edit.hpp"
-#include "io/log/log_copy.hpp"
-#include "io/log/log_scans.hpp"
+#include "io/logs/cloud_edit.hpp"
+#include "io/logs/log_copy.hpp"
+#include "io/logs/log_scans.hpp"
 #include "labelled_sequence.hpp"
 
 namespace dynains::program {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "dynains/sensor/own_body.hpp"
-#include "io/finite_points.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains::program {
 

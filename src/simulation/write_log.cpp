@@ -3,9 +3,9 @@
 #include <string>
 
 #include "dynains/simulation/write_sequence.hpp"
-#include "io/log/mcap_writer.hpp"
-#include "io/log/message_types.hpp"
-#include "io/log/message_writer.hpp"
+#include "io/logs/mcap_writer.hpp"
+#include "io/logs/message_types.hpp"
+#include "io/logs/message_writer.hpp"
 #include "io/scalar.hpp"
 
 namespace dynains::simulation {

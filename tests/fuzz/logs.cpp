@@ -7,8 +7,8 @@
 #include "dynains/io/recording.hpp"
 #include "io/db3_writer.hpp"
 #include "io/files.hpp"
-#include "io/log/log_copy.hpp"
 #include "io/log_writer.hpp"
+#include "io/logs/log_copy.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {

@@ -11,8 +11,8 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
 #include "io/files.hpp"
-#include "io/kitti_files.hpp"
 #include "io/point_format_writer.hpp"
+#include "io/poses/kitti_files.hpp"
 #include "run/parameter_values.hpp"
 #include "targets.hpp"
 

@@ -1,5 +1,5 @@
 // Copies of logs with other clouds, by their readers and byte by byte.
-#include "io/log/log_copy.hpp"
+#include "io/logs/log_copy.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 #include "db3_writer.hpp"
 #include "files.hpp"
-#include "io/log/cloud_edit.hpp"
-#include "io/log/log_file.hpp"
+#include "io/logs/cloud_edit.hpp"
+#include "io/logs/log_file.hpp"
 #include "log_writer.hpp"
 #include "ros_writer.hpp"
 #include "support/catch.hpp"

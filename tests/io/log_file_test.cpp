@@ -1,4 +1,4 @@
-#include "io/log/log_file.hpp"
+#include "io/logs/log_file.hpp"
 
 #include <ctime>
 #include <string>
@@ -8,8 +8,8 @@
 #include "db3_writer.hpp"
 #include "dynains/errors.hpp"
 #include "files.hpp"
-#include "io/log/decompress.hpp"
-#include "io/log/log_copy.hpp"
+#include "io/logs/decompress.hpp"
+#include "io/logs/log_copy.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 #if defined(DYNAINS_HAS_ZSTD)

@@ -8,7 +8,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
-#include "io/log/decompress.hpp"
+#include "io/logs/decompress.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 

@@ -1,4 +1,4 @@
-#include "io/lzf.hpp"
+#include "io/points/lzf.hpp"
 
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 // Units and outliers of the times of points.
-#include "io/point_clock.hpp"
+#include "io/points/point_clock.hpp"
 
 #include <cmath>
 #include <functional>

@@ -1,5 +1,5 @@
 // Copies of point files keep every byte of the points that stay.
-#include "io/point_file_copy.hpp"
+#include "io/points/point_file_copy.hpp"
 
 #include <cstdint>
 #include <sstream>

@@ -1,4 +1,4 @@
-#include "io/log/ros_messages.hpp"
+#include "io/logs/ros_messages.hpp"
 
 #include <cmath>
 #include <limits>
@@ -7,7 +7,7 @@
 
 #include "dynains/errors.hpp"
 #include "files.hpp"
-#include "io/log/transform_tree.hpp"
+#include "io/logs/transform_tree.hpp"
 #include "ros_writer.hpp"
 #include "support/catch.hpp"
 

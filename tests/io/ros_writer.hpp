@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/log/ros_messages.hpp"
+#include "io/logs/ros_messages.hpp"
 
 namespace dynains::test {
 

@@ -11,8 +11,8 @@
 
 #include "dynains/io/kitti.hpp"
 #include "io/files.hpp"
-#include "io/log/log_file.hpp"
 #include "io/log_writer.hpp"
+#include "io/logs/log_file.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "byte_reader.hpp"
+#include "../byte_reader.hpp"
+#include "../text.hpp"
 #include "kitti_files.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "failure.hpp"
+#include "../failure.hpp"
+#include "../logs/bytes.hpp"
+#include "../logs/raw_file.hpp"
 #include "las_format.hpp"
-#include "log/bytes.hpp"
-#include "log/raw_file.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
 

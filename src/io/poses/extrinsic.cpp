@@ -8,15 +8,15 @@
 #include <sstream>
 #include <string_view>
 
+#include "../text.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "kitti_files.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {
 
-constexpr const char* kExpected = "expected \"x y z qx qy qz qw\" or a file with one pose";
+constexpr const char* kExpectedExtrinsic = "expected \"x y z qx qy qz qw\" or a file with one pose";
 
 /// The numbers that `text` consists of; empty if it has other words, or not `kCount` of them.
 template <std::size_t kCount>
@@ -34,10 +34,11 @@ Pose read_extrinsic(const std::string& text) {
   const auto numbers = numbers_of<7>(text);
   if (!numbers) {
     const bool is_number = text::parse_number(text.substr(0, text.find_first_of(" ,"))).has_value();
-    if (is_number) throw ConfigError("extrinsic \"" + text + "\": " + kExpected);
+    if (is_number) throw ConfigError("extrinsic \"" + text + "\": " + kExpectedExtrinsic);
     const Trajectory file = read_trajectory(text);
     if (file.poses.size() == 1) return file.poses.front();
-    throw IoError(text + ": has " + std::to_string(file.poses.size()) + " poses; " + kExpected);
+    throw IoError(text + ": has " + std::to_string(file.poses.size()) + " poses; " +
+                  kExpectedExtrinsic);
   }
   const auto& n = *numbers;
   const auto pose = rigid_pose({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});

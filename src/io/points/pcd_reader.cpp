@@ -7,14 +7,14 @@
 #include <string_view>
 #include <vector>
 
-#include "byte_reader.hpp"
-#include "kitti_files.hpp"
+#include "../byte_reader.hpp"
+#include "../poses/kitti_files.hpp"
+#include "../scalar.hpp"
+#include "../text.hpp"
 #include "lzf.hpp"
 #include "point_file_copy.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
-#include "scalar.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

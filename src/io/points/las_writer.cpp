@@ -3,11 +3,11 @@
 #include <iterator>
 #include <limits>
 
+#include "../failure.hpp"
+#include "../scalar.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/las_file.hpp"
-#include "failure.hpp"
 #include "las_format.hpp"
-#include "scalar.hpp"
 
 namespace dynains {
 namespace {

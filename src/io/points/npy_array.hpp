@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "log/bytes.hpp"
-#include "scalar.hpp"
+#include "../logs/bytes.hpp"
+#include "../scalar.hpp"
 
 namespace dynains {
 

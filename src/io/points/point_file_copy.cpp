@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "byte_reader.hpp"
-#include "failure.hpp"
-#include "text.hpp"
+#include "../byte_reader.hpp"
+#include "../failure.hpp"
+#include "../text.hpp"
 
 namespace dynains {
 

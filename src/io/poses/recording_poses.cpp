@@ -6,19 +6,19 @@
 #include <utility>
 #include <vector>
 
+#include "../failure.hpp"
+#include "../input_file.hpp"
+#include "../points/point_clock.hpp"
+#include "../scan_files.hpp"
+#include "../scan_reader.hpp"
+#include "../text.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/median.hpp"
 #include "dynains/pose.hpp"
-#include "failure.hpp"
-#include "input_file.hpp"
 #include "kitti_files.hpp"
-#include "point_clock.hpp"
-#include "scan_files.hpp"
-#include "scan_reader.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "scalar.hpp"
-#include "text.hpp"
+#include "../scalar.hpp"
+#include "../text.hpp"
 
 namespace dynains {
 namespace {

@@ -3,10 +3,10 @@
 #include <string_view>
 #include <vector>
 
-#include "byte_reader.hpp"
+#include "../byte_reader.hpp"
+#include "../text.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

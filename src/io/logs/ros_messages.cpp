@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "../kitti_files.hpp"
+#include "../poses/kitti_files.hpp"
 #include "message_reader.hpp"
 #include "point_cloud2.hpp"
 

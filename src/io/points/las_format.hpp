@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "scalar.hpp"
+#include "../scalar.hpp"
 
 namespace dynains::las {
 

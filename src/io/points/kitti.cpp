@@ -2,10 +2,10 @@
 
 #include <system_error>
 
-#include "byte_reader.hpp"
+#include "../byte_reader.hpp"
+#include "../failure.hpp"
+#include "../text.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "failure.hpp"
-#include "text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "scans and labels are little-endian and read as they stand");

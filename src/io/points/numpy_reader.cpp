@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "failure.hpp"
-#include "log/raw_file.hpp"
+#include "../failure.hpp"
+#include "../logs/raw_file.hpp"
 #include "npy_array.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"

@@ -5,13 +5,13 @@
 #include <string_view>
 #include <vector>
 
-#include "byte_reader.hpp"
-#include "failure.hpp"
+#include "../byte_reader.hpp"
+#include "../failure.hpp"
+#include "../scalar.hpp"
+#include "../text.hpp"
 #include "point_file_copy.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
-#include "scalar.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

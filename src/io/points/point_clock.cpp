@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "text.hpp"
+#include "../text.hpp"
 
 namespace dynains {
 namespace {

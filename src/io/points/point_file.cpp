@@ -7,10 +7,10 @@
 #include <system_error>
 #include <utility>
 
-#include "failure.hpp"
+#include "../failure.hpp"
+#include "../text.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

@@ -8,10 +8,10 @@
 #include <string_view>
 #include <system_error>
 
+#include "../failure.hpp"
+#include "../input_file.hpp"
+#include "../text.hpp"
 #include "dynains/pose.hpp"
-#include "failure.hpp"
-#include "input_file.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

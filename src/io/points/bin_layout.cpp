@@ -7,11 +7,11 @@
 #include <system_error>
 #include <utility>
 
+#include "../failure.hpp"
+#include "../logs/raw_file.hpp"
+#include "../text.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
-#include "failure.hpp"
-#include "log/raw_file.hpp"
-#include "text.hpp"
 
 namespace dynains {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "failure.hpp"
-#include "text.hpp"
+#include "../failure.hpp"
+#include "../text.hpp"
 
 namespace dynains {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
-#include "scalar.hpp"
 
 namespace dynains {
 
