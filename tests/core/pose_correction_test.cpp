@@ -136,7 +136,7 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
                     SensorFault{0.0, 0.075 * elevation, 0.0, 0.0, 0.0},
                     SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
                     SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
-  static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 60);
+  static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 30);
   PoseCorrection correction(0.003, kLongestObject, kHighestObject);
   correction.begin_epoch(scans.front().T_world_sensor);
   std::size_t residuals = 0;
@@ -159,7 +159,7 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
 // The errors allowed are those along the street, the direction with the least information.
 TEST_CASE("a perturbed pose is found and corrected") {
   constexpr double kMetres = 0.035, kDegreesLeft = 0.05;
-  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
+  static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
   const Eigen::Isometry3d& T_truth = scans.back().T_world_sensor;
   const GroundSplit split = split_of(scans.back());
   const auto [metres, turn] =

@@ -341,7 +341,7 @@ TEST_CASE("a scan on which a stage throws is dropped, and a new window begins") 
   config.clusterer.failing_call = failing;
   config.threads = threads;
   Remover remover(config);
-  const std::vector<Scan> scans = drive(oncoming(), 48, 0.0);
+  static const std::vector<Scan> scans = drive(oncoming(), 48, 0.0);
   std::vector<std::size_t> finished;  // number of points of each scan, in the order of verdicts
   std::vector<std::size_t> expected;
   const auto take = [&](const ScanVerdict& verdict) {
