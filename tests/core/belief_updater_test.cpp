@@ -146,13 +146,5 @@ TEST_CASE("observations without any occupied cell leave the belief as it is") {
   CHECK(posterior_after({}, {{}}, {}) == 0.5);
 }
 
-TEST_CASE("log-odds and probabilities are inverse to each other") {
-  for (const double p : {1e-6, 0.1, 0.4, 0.5, 0.7, 0.999999}) {
-    CHECK(probability(log_odds(p)) == Approx(p).epsilon(1e-12));
-  }
-  CHECK(probability(1e4) == 1.0);
-  CHECK(probability(-1e4) == 0.0);
-}
-
 }  // namespace
 }  // namespace dynains::test

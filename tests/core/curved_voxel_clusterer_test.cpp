@@ -147,34 +147,6 @@ TEST_CASE("cluster numbers do not depend on the order of the points") {
   }
 }
 
-TEST_CASE("voxels that touch at a corner join, voxels one apart do not") {
-  const Config config = with_voxels(1.0, 10.0, 10.0);
-  // Azimuth voxels begin at multiples of 10 deg, elevation voxels too, range voxels at whole
-  // metres.
-  const auto at = [](PolarBuffer& points, double distance, double azimuth, double elevation) {
-    add(points, distance * std::cos(elevation * kRadiansPerDegree), azimuth,
-        distance * std::sin(elevation * kRadiansPerDegree));
-  };
-  PolarBuffer points;
-  at(points, 5.5, 5.0, 5.0);
-  SECTION("corner in all three coordinates") {
-    at(points, 6.5, 15.0, 15.0);
-    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 0});
-  }
-  SECTION("one free voxel in range") {
-    at(points, 7.5, 5.0, 5.0);
-    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
-  }
-  SECTION("one free voxel in azimuth") {
-    at(points, 5.5, 25.0, 5.0);
-    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
-  }
-  SECTION("one free voxel in elevation") {
-    at(points, 5.5, 5.0, 25.0);
-    CHECK(clusters(config, points.view()) == std::vector<std::uint32_t>{0, 1});
-  }
-}
-
 TEST_CASE("an object behind the sensor is one cluster, +180 and -180 degrees are neighbours") {
   PolarBuffer points;
   add(points, 10.0, 179.9, 0.0);

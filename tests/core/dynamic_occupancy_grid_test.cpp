@@ -62,18 +62,6 @@ Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_qua
   return last.verdicts[0];
 }
 
-TEST_CASE("a static sample is removed if nearly all samples of its cell are dynamic") {
-  // The point itself counts as one that stays.
-  CHECK(verdict_behind(4, 0).cause == Cause::kDynamicOccupancy);  // 4 of 5
-  CHECK(verdict_behind(3, 0).cause == Cause::kOccupied);          // 3 of 4: not above the share
-  CHECK(verdict_behind(7, 1).cause == Cause::kDynamicOccupancy);  // 7 of 9
-  CHECK(verdict_behind(6, 1).cause == Cause::kOccupied);          // 6 of 8
-  FreeSpaceConfig half = three_quarters();
-  half.dynamic_grid_ratio = 0.5;
-  CHECK(verdict_behind(3, 0, half).cause == Cause::kDynamicOccupancy);
-  CHECK(verdict_behind(2, 0, half).cause == Cause::kOccupied);  // two samples may be chance
-}
-
 TEST_CASE(
     "the belief in a dynamic cell is its ratio of dynamic samples, if that is the higher one") {
   CHECK(verdict_behind(4, 0).belief == Approx(0.8F));

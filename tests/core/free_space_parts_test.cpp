@@ -69,21 +69,6 @@ InstanceSamples supervoxels_at(const std::vector<std::array<int, 3>>& places, in
   return samples;
 }
 
-TEST_CASE("groups of supervoxels connect over faces, edges and corners, and only over these") {
-  const InstanceSamples samples = supervoxels_at(
-      {{0, 0, 0}, {1, 1, 1}, {5, 0, 0}, {7, 0, 0}, {-1, -1, 1}, {0, 0, -40}, {0, 1, -40}}, 2);
-  SupervoxelGroups groups;
-  std::vector<std::uint32_t> members = {0, 1, 2, 3, 4, 5, 6};
-  groups.keep_large(samples, 4, members);
-  std::sort(members.begin(), members.end());
-  CHECK(members == std::vector<std::uint32_t>{0, 1, 4, 5, 6});
-  // Three supervoxels of two samples reach six samples, two reach four.
-  members = {0, 1, 2, 3, 4, 5, 6};
-  groups.keep_large(samples, 5, members);
-  std::sort(members.begin(), members.end());
-  CHECK(members == std::vector<std::uint32_t>{0, 1, 4});
-}
-
 TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
   Random random(3);
   SupervoxelGroups groups;
@@ -139,40 +124,10 @@ std::vector<std::size_t> find_under(const GroundFootprint& footprint, const Poin
   return found;
 }
 
-// Whether a point is higher than the removed points around it.
-bool is_under(const GroundFootprint& footprint, float x, float y, float z) {
-  PointBuffer point;
-  point.push_back(x, y, z);
-  return !find_under(footprint, point, {0.0F, 0.0F}).empty();
-}
-
 void add(GroundFootprint& footprint, float x, float y, float z) {
   PointBuffer point;
   point.push_back(x, y, z);
   footprint.add(point, 1);
-}
-
-TEST_CASE("a footprint keeps the lowest point of a cell and of its neighbours, until cleared") {
-  GroundFootprint footprint(0.2, 50.0);
-  CHECK(footprint.empty());
-  add(footprint, 10.05F, -3.05F, 0.7F);
-  add(footprint, 10.05F, -3.05F, 0.4F);
-  CHECK_FALSE(footprint.empty());
-  CHECK_FALSE(is_under(footprint, 10.05F, -3.05F, 0.4F));
-  CHECK(is_under(footprint, 10.05F, -3.05F, 0.41F));
-  CHECK_FALSE(is_under(footprint, 10.25F, -3.25F, 0.4F));
-  CHECK(is_under(footprint, 10.25F, -3.25F, 0.41F));
-  CHECK_FALSE(is_under(footprint, 10.45F, -3.05F, 1e6F));
-  footprint.clear();
-  CHECK(footprint.empty());
-  CHECK_FALSE(is_under(footprint, 10.05F, -3.05F, 1e6F));
-  // Points out of reach and NaN are neither kept nor found.
-  add(footprint, 60.0F, 0.0F, 0.0F);
-  add(footprint, std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F);
-  add(footprint, -1e30F, 1e30F, 0.0F);
-  CHECK(footprint.empty());
-  CHECK_FALSE(is_under(footprint, 60.0F, 0.0F, 1e6F));
-  CHECK_FALSE(is_under(footprint, std::numeric_limits<float>::infinity(), 0.0F, 1e6F));
 }
 
 TEST_CASE("a footprint gives the points that a search over all removed points gives") {
@@ -228,48 +183,6 @@ TEST_CASE("a footprint gives the points that a search over all removed points gi
     CHECK_FALSE(found.empty());
     footprint.clear();
   }
-}
-
-// A box of points with its centre at (x, y).
-void add_box(PointBuffer& points, std::vector<std::uint32_t>& instance_of, std::uint32_t instance,
-             float x, float y, float length) {
-  for (float dx = -0.5F * length; dx < 0.5F * length; dx += 0.2F) {
-    for (float dz = 0.0F; dz < 1.4F; dz += 0.2F) {
-      points.push_back(x + dx, y, dz);
-      instance_of.push_back(instance);
-    }
-  }
-}
-
-TEST_CASE("instances of consecutive scans are linked where they overlap") {
-  InstanceSampler sampler(0.6, 80.0, kNoLimit);
-  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
-  InstanceSamples samples[2];
-  TrackedInstances tracked[2];
-  for (int scan = 0; scan < 2; ++scan) {
-    // The sensor and the first box drive 1 m ahead. The second box stands, the third is new, and
-    // the fourth is too long for a track.
-    const float sensor = static_cast<float>(scan);
-    PointBuffer points;
-    std::vector<std::uint32_t> instance_of;
-    add_box(points, instance_of, 0, 10.0F + sensor - sensor, 4.0F, 4.0F);
-    add_box(points, instance_of, 1, 20.0F - sensor, -4.0F, 4.0F);
-    if (scan == 1) add_box(points, instance_of, 2, 30.0F, 12.0F, 4.0F);
-    add_box(points, instance_of, scan == 0 ? 2 : 3, 10.0F - sensor, 20.0F, 25.0F);
-    Eigen::Isometry3d T_origin_sensor = Eigen::Isometry3d::Identity();
-    T_origin_sensor.translation().x() = static_cast<double>(sensor);
-    sampler.sample(points, instance_of, scan == 0 ? 3 : 4, samples[scan]);
-    linker.measure(samples[scan], T_origin_sensor, tracked[scan]);
-  }
-  linker.link(tracked[0], tracked[1]);
-  CHECK(tracked[1].instances[0].past.instance == 0);
-  CHECK(tracked[1].instances[1].past.instance == 1);
-  CHECK(tracked[1].instances[2].past.instance == kNoCluster);
-  CHECK(tracked[1].instances[3].past.instance == kNoCluster);
-  CHECK(tracked[0].instances[0].future.instance == 0);
-  CHECK(tracked[0].instances[1].future.instance == 1);
-  CHECK_FALSE(tracked[1].shapes[3].carried);
-  CHECK(tracked[1].shapes[0].length == Approx(3.8).margin(0.3));
 }
 
 // Instances that occupy the given cells of a row.
@@ -451,12 +364,6 @@ TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter
     }
     CHECK(gaps_in_bands(across, along, 0.5, 0.25) == expected);
   }
-}
-
-TEST_CASE("a gap between angles counts if it is larger than the smallest one") {
-  const std::vector<float> across = {1.0F, 1.0F, 1.0F}, along = {0.5F, -180.0F, 180.0F};
-  CHECK(gaps_in_bands(across, along, 0.1, 179.5) == std::vector<float>{180.5F});
-  CHECK(gaps_in_bands(across, along, 0.1, 179.49) == std::vector<float>{180.5F, 179.5F});
 }
 
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {

@@ -13,16 +13,6 @@
 namespace dynains::test {
 namespace {
 
-TEST_CASE("the mean of the lowest values takes those above a floor, or all if they are few") {
-  std::vector<float> kept;
-  const std::vector<float> values = {4.0F, -9.0F, 2.0F, 1.0F, 2.0F, -3.0F};
-  CHECK(detail::mean_of_lowest(values, 3, -4.0F, kept) == 0.0F);
-  CHECK(detail::mean_of_lowest(values, 3, -3.0F, kept) == 0.0F);
-  CHECK(detail::mean_of_lowest(values, 9, 2.0F, kept) == 8.0F / 3.0F);
-  CHECK(detail::mean_of_lowest(values, 1, -100.0F, kept) == -9.0F);
-  CHECK(detail::mean_of_lowest(values, 1, 5.0F, kept) == 5.0F);
-}
-
 TEST_CASE("Ingest takes good points in order and marks the others, in any mixture") {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();

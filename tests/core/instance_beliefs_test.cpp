@@ -79,52 +79,6 @@ struct Scan {
   std::vector<std::size_t> hits;
 };
 
-TEST_CASE("one reference changes the belief of a supervoxel by one of three steps") {
-  enum Hit { kNone, kContested, kOccupied };
-  struct Case {
-    std::uint32_t samples;
-    Scan::Seen seen;
-    float level;
-    Hit hit;
-  };
-  for (const Case& c : {
-           Case{4, {4, 0}, 2.0F * kFreeStep, kNone},  // wholly free
-           Case{10, {9, 1}, kFreeStep, kNone},        // 0.9 is not more than 0.9
-           Case{20, {19, 1}, 2.0F * kFreeStep, kNone},
-           Case{5, {3, 2}, kFreeStep, kNone},         // 0.6 raises the belief
-           Case{9, {5, 4}, 0.0F, kNone},              // 0.56 does not change the belief
-           Case{8, {2, 0}, 2.0F * kFreeStep, kNone},  // others are not seen
-           Case{10, {3, 7}, 0.0F, kOccupied},         // one is not enough
-           Case{9, {3, 6}, 0.0F, kNone},              // 0.33 is not
-           Case{4, {0, 2}, 0.0F, kOccupied},          // two hits
-           Case{4, {0, 1}, 0.0F, kContested},  // a single hit of several samples may be chance
-           Case{1, {0, 1}, 0.0F, kOccupied},   // the only sample is hit
-           Case{12, {0, 2}, 0.0F, kOccupied},  // two hits of many
-           Case{4, {0, 0}, 0.0F, kNone},       // not seen
-       }) {
-    Scan scan(Instances{{c.samples}});
-    scan.see({c.seen});
-    INFO(c.samples << " samples, " << c.seen.free << " free, " << c.seen.hit << " hit");
-    CHECK(scan.belief().level == Approx(c.level));
-    CHECK(scan.belief().peak == Approx(c.level));
-    CHECK((scan.belief().contested != 0) == (c.hit != kNone));
-    CHECK((scan.belief().occupied != 0) == (c.hit == kOccupied));
-  }
-}
-
-TEST_CASE("a single hit contests free space, and alone it decides nothing") {
-  Scan scan(Instances{{4}});
-  scan.see({{0, 1}});
-  CHECK(scan.beliefs.counts[0].decided == 0);
-  scan.see({{1, 0}});
-  CHECK_FALSE(scan.is_free());  // without the hit, 1.69 would be enough
-  CHECK(scan.beliefs.counts[0].decided == 0);
-  scan.see({{0, 1}});
-  CHECK(scan.belief().level == Approx(std::max(0.0F, 2.0F * kFreeStep + kHitStep)).margin(1e-6));
-  scan.see({{0, 2}});
-  CHECK(scan.beliefs.counts[0].decided == 4);
-}
-
 TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
   Scan scan(Instances{{4}});
   scan.see({{4, 0}});

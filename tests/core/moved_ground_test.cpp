@@ -20,7 +20,6 @@ namespace {
 using namespace detail;
 
 constexpr float kUnknown = SurroundingGround::kUnknown;
-constexpr float kAnyRise = 100.0F;  // m, so that every point is kept
 
 // A street that falls to the right and rises ahead.
 float street(float x, float y) { return -1.7F + 0.1F * x - 0.05F * y; }
@@ -37,62 +36,6 @@ PointBuffer street_about(float x, float y, float reach, LeaveOut&& leave_out) {
   return points;
 }
 constexpr auto kNothing = [](float, float) { return false; };
-
-TEST_CASE("heights over a slope are derived from the ground around, under any object") {
-  SurroundingGround ground(80.0);
-  PointBuffer points = street_about(21.0F, -9.0F, 4.0F, kNothing);
-  const auto off = [&] { return std::abs(ground.height(21.0F, -9.0F, street(21.0F, -9.0F))); };
-  ground.assign(points, 0.03F);
-  CHECK(off() < 1e-4F);
-  CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) + 0.1F) == Approx(0.1F).margin(1e-4));
-  CHECK(ground.height(20.5F, -8.5F, street(20.5F, -8.5F) - 0.1F) == Approx(-0.1F).margin(1e-4));
-
-  for (int i = 0; i < 12; ++i) points.push_back(21.2F, -9.2F, street(21.2F, -9.2F) + 0.5F);
-  ground.assign(points, kAnyRise);
-  CHECK(off() > 0.03F);
-  ground.assign(points, 0.1F);
-  CHECK(off() < 1e-4F);
-}
-
-TEST_CASE("too few points, or points on a line, do not define the plane of the ground") {
-  SurroundingGround ground(80.0);
-  PointBuffer points;
-  ground.assign(points, 0.03F);
-  CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
-
-  for (int i = 0; i < 7; ++i) {
-    points.push_back(0.3F + static_cast<float>(i % 2) * 3.0F, 0.4F * static_cast<float>(i), 0.0F);
-  }
-  ground.assign(points, 0.03F);
-  CHECK(ground.height(1.0F, 1.0F, 0.0F) == kUnknown);
-  points.push_back(3.3F, 0.0F, 0.0F);
-  ground.assign(points, 0.03F);
-  CHECK(ground.height(1.0F, 1.0F, 0.25F) == Approx(0.25F).margin(1e-5));
-
-  // Two lines: the variance across them is 0.4 m^2 at a distance of 1.265 m.
-  for (const float apart : {0.0F, 1.26F, 1.27F}) {
-    PointBuffer lines;
-    for (int i = 0; i < 20; ++i) {
-      const float x = 0.2F * static_cast<float>(i);
-      lines.push_back(x, 0.5F, 0.0F);
-      lines.push_back(x, 0.5F + apart, 0.0F);
-    }
-    ground.assign(lines, 0.03F);
-    CAPTURE(apart);
-    CHECK((ground.height(1.0F, 1.0F, 0.0F) == kUnknown) == (apart < 1.265F));
-  }
-}
-
-TEST_CASE("points beyond the range of the ground around change nothing within") {
-  SurroundingGround ground(20.0);
-  PointBuffer points = street_about(5.0F, 5.0F, 3.0F, kNothing);
-  for (const float far : {1e3F, -1e3F, 1e30F}) {
-    for (int i = 0; i < 20; ++i) points.push_back(far, -far, far);
-  }
-  ground.assign(points, 0.03F);
-  CHECK(ground.height(5.0F, 5.0F, street(5.0F, 5.0F)) == Approx(0.0F).margin(1e-4));
-  CHECK_NOTHROW(ground.height(-1e30F, 1e30F, 0.0F));
-}
 
 // Height over the plane through all points in the nine cells around a place, by Eigen.
 float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& at) {

@@ -44,27 +44,6 @@ TEST_CASE("a pose that jumps within the scene at an impossible speed removes not
   CHECK(dynamic_share(scans, run(config, scans)) > 5e-3);
 }
 
-TEST_CASE("scans before a gap and after it have no influence on each other") {
-  const Config config = GENERATE(Config::paper(), Config());
-  std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
-  for (std::size_t i = 4; i < scans.size(); ++i) scans[i].time += config.max_gap;
-  const Run whole = run(config, scans);
-  const Run before = run(config, {scans.begin(), scans.begin() + 4});
-  for (std::size_t i = 0; i < 4; ++i) CHECK((whole.final[i].labels == before.final[i].labels));
-
-  // The first scan also gives the model of the sensor, which is kept across the gap.
-  std::vector<Scan> after = {scans[0]};
-  after.insert(after.end(), scans.begin() + 4, scans.end());
-  const Run second = run(config, after);
-  for (std::size_t i = 4; i < 8; ++i) {
-    CHECK((whole.newest[i].labels == second.newest[i - 3].labels));
-    CHECK((whole.final[i].labels == second.final[i - 3].labels));
-  }
-  // Without the gap, the results differ: the test can fail.
-  const Run together = run(config, drive(oncoming(), 8, 5.0));
-  CHECK((whole.newest[4].labels != together.newest[4].labels));
-}
-
 TEST_CASE("a repeated scan shows no motion and adds nothing to the map") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> once = {oncoming().scan(sensor_at(0.0), 0.0)};
@@ -103,25 +82,6 @@ TEST_CASE("standing still for two minutes removes nothing, and the map stops gro
   CHECK(static_cast<double>(moving) < 1e-4 * static_cast<double>(points));
   CHECK(map_in_the_middle > 10000);
   CHECK(remover.map().size() <= map_in_the_middle + map_in_the_middle / 1000);
-}
-
-TEST_CASE("times that decrease or repeat are refused and change nothing") {
-  const Config config = GENERATE(Config::paper(), Config());
-  const std::vector<Scan> scans = drive(oncoming(), 6, 5.0);
-  const Run expected = run(config, scans);
-  DynaInsRemover remover(config);
-  std::vector<Verdict> final;
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const Scan& scan = scans[i];
-    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-    CHECK((Verdict(frame.newest) == expected.newest[i]));
-    if (frame.finished) final.emplace_back(*frame.finished);
-    for (const double time : {scan.time, scan.time - 0.05, -1e9}) {
-      CHECK_THROWS_AS(remover.push(scans[0].points, scan.T_world_sensor, time), PoseError);
-    }
-  }
-  remover.flush([&](const ScanVerdict& verdict) { final.emplace_back(verdict); });
-  CHECK((final == expected.final));
 }
 
 TEST_CASE("with every third scan dropped, moving objects are removed and static ones stay") {
