@@ -54,7 +54,7 @@ Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec
 
 Primitive make_tapered_box(const Material& material, Vec3 centre, Vec3 half, float taper_x,
                            float taper_y, const Mat3& rotation) {
-  Primitive result = make_primitive(Shape::kTaperedBox, material, centre, half, rotation);
+  Primitive result = make_primitive(Shape::kBox, material, centre, half, rotation);
   result.taper_x = taper_x / half.x;
   result.taper_y = taper_y / half.y;
   return result;
@@ -73,15 +73,7 @@ Interval intersect(const Primitive& primitive, Vec3 origin, Vec3 direction) {
   const Vec3 d = primitive.to_unit * direction;
   Interval interval{-kInfinity, kInfinity};
   switch (primitive.shape) {
-    case Shape::kBox:
-      clip(o.x - 1, d.x, interval);
-      clip(-o.x - 1, -d.x, interval);
-      clip(o.y - 1, d.y, interval);
-      clip(-o.y - 1, -d.y, interval);
-      clip(o.z - 1, d.z, interval);
-      clip(-o.z - 1, -d.z, interval);
-      break;
-    case Shape::kTaperedBox: {
+    case Shape::kBox: {
       // At height z the half extent is 1 - lean * (z + 1).
       const float lean_x = 0.5F * primitive.taper_x, lean_y = 0.5F * primitive.taper_y;
       clip(o.z - 1, d.z, interval);
@@ -110,8 +102,7 @@ Vec3 surface_normal(const Primitive& primitive, Vec3 point) {
   const float ax = std::abs(p.x), ay = std::abs(p.y), az = std::abs(p.z);
   Vec3 unit;
   switch (primitive.shape) {
-    case Shape::kBox:
-    case Shape::kTaperedBox: {
+    case Shape::kBox: {
       const float lean_x = 0.5F * primitive.taper_x, lean_y = 0.5F * primitive.taper_y;
       const float x = ax + lean_x * (p.z + 1), y = ay + lean_y * (p.z + 1);
       if (az >= x && az >= y) {

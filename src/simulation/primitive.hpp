@@ -10,10 +10,9 @@ namespace dynains::simulation {
 
 /// Unit shapes, all within [-1, 1]^3.
 enum class Shape : std::uint8_t {
-  kBox,         ///< the whole cube
-  kTaperedBox,  ///< a box whose sides lean inwards towards the top
-  kCylinder,    ///< x^2 + y^2 <= 1, |z| <= 1
-  kEllipsoid,   ///< the unit ball
+  kBox,        ///< the cube, whose sides may lean inwards towards the top
+  kCylinder,   ///< x^2 + y^2 <= 1, |z| <= 1
+  kEllipsoid,  ///< the unit ball
 };
 
 /// How a surface answers to light. Constants live in materials.hpp.
@@ -33,7 +32,7 @@ struct Primitive {
   Vec3 centre;
   Mat3 to_unit;                          ///< p_unit = to_unit * (p - centre)
   Mat3 from_unit;                        ///< inverse of to_unit; columns are the half axes
-  float taper_x = 0.0F, taper_y = 0.0F;  ///< tapered box: how far each side has moved at the top
+  float taper_x = 0.0F, taper_y = 0.0F;  ///< of a box: how far each side has moved at the top
 };
 
 /// `half` are the half extents along the axes of `rotation`.

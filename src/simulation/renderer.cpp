@@ -86,14 +86,14 @@ void Renderer::start(const BeamTable& beams, float max_range, std::uint64_t seed
   glass_passes_ = glass_passes;
   drawn_.clear();
   order_.clear();
-  hits_.assign(beams.size(), Hit{max_range, kNothing, 0});
+  hits_.assign(beams.size(), Hit{max_range, nullptr, 0});
 }
 
-void Renderer::add(const Primitive& primitive, std::uint32_t object, std::uint64_t salt) {
+void Renderer::add(const Primitive& primitive, std::uint32_t label, std::uint64_t salt) {
   const float near = nearest_distance(primitive);
   if (near > max_range_) return;
   order_.push_back({near, static_cast<std::uint32_t>(drawn_.size())});
-  drawn_.push_back({primitive, object, salt});
+  drawn_.push_back({primitive, label, salt});
 }
 
 Renderer::Bounds Renderer::bounds_of(const Primitive& primitive) {
@@ -131,13 +131,11 @@ Renderer::Bounds Renderer::bounds_of(const Primitive& primitive) {
   return bounds;
 }
 
-void Renderer::draw_slots(const Drawn& drawn, std::uint32_t index, std::size_t begin,
-                          std::size_t end) {
+void Renderer::draw_slots(const Drawn& drawn, float near, std::size_t begin, std::size_t end) {
   const Primitive& primitive = drawn.primitive;
   const bool porous = primitive.material->density > 0;
   const bool windows = primitive.material->window_spacing > 0;
   const bool pane = glass_passes_ > 0 && primitive.material == &materials::kGlass;
-  const float near = order_[index].first;
   for (std::size_t slot = begin; slot < end; ++slot) {
     Hit& hit = hits_[slot];
     if (hit.range <= near) continue;
@@ -154,15 +152,15 @@ void Renderer::draw_slots(const Drawn& drawn, std::uint32_t index, std::size_t b
                           mix(seed_ ^ drawn.salt, slot), range, loss);
     }
     if (range <= 0 || range >= hit.range) continue;
-    hit = {range, order_[index].second, loss};
+    hit = {range, &drawn, loss};
   }
 }
 
 void Renderer::draw() {
   // From near to far: most beams are short when a distant primitive comes.
   std::sort(order_.begin(), order_.end());
-  for (std::uint32_t i = 0; i < order_.size(); ++i) {
-    const Drawn& drawn = drawn_[order_[i].second];
+  for (const auto& [near, index] : order_) {
+    const Drawn& drawn = drawn_[index];
     const Bounds bounds = bounds_of(drawn.primitive);
     const int first_row = BeamTable::row_of(bounds.low), last_row = BeamTable::row_of(bounds.high);
     int first = 0, last = BeamTable::kColumns - 1;
@@ -174,11 +172,11 @@ void Renderer::draw() {
     }
     for (int row = first_row; row <= last_row; ++row) {
       if (split) {
-        draw_slots(drawn, i, beams_->first_slot(row, 0), beams_->last_slot(row, last));
-        draw_slots(drawn, i, beams_->first_slot(row, first),
+        draw_slots(drawn, near, beams_->first_slot(row, 0), beams_->last_slot(row, last));
+        draw_slots(drawn, near, beams_->first_slot(row, first),
                    beams_->last_slot(row, BeamTable::kColumns - 1));
       } else {
-        draw_slots(drawn, i, beams_->first_slot(row, first), beams_->last_slot(row, last));
+        draw_slots(drawn, near, beams_->first_slot(row, first), beams_->last_slot(row, last));
       }
     }
   }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
+#include <utility>
 #include <vector>
 
 #include "simulation/beams.hpp"
@@ -14,29 +14,26 @@ namespace dynains::simulation {
 /// the beams within its solid angle and keeps those that it shortens.
 class Renderer {
  public:
-  static constexpr std::uint32_t kNothing = std::numeric_limits<std::uint32_t>::max();
-
   struct Drawn {
-    Primitive primitive;  ///< sensor frame
-    std::uint32_t object = 0;
-    std::uint64_t salt = 0;  ///< lasting identity, for gaps in leaves and rooms behind windows
+    Primitive primitive;      ///< sensor frame
+    std::uint32_t label = 0;  ///< as of a point; without a class: that of the material
+    std::uint64_t salt = 0;   ///< lasting identity, for gaps in leaves and rooms behind windows
   };
 
   struct Hit {
     float range = 0;
-    std::uint32_t drawn = kNothing;  ///< index into drawn()
-    float extra_loss = 0;            ///< chance of no return at all: glass
+    const Drawn* drawn = nullptr;  ///< valid until start(); null: nothing
+    float extra_loss = 0;          ///< chance of no return at all: glass
   };
 
   /// Forgets the last scan; every beam can see as far as `max_range`. A share of the beams passes
   /// through the panes of vehicles.
   void start(const BeamTable& beams, float max_range, std::uint64_t seed, float glass_passes = 0);
   /// Takes note of a primitive, unless it is out of reach.
-  void add(const Primitive& primitive, std::uint32_t object, std::uint64_t salt);
+  void add(const Primitive& primitive, std::uint32_t label, std::uint64_t salt);
   /// Finds the nearest primitive of every beam; random numbers depend on seed, beam and salt only.
   void draw();
 
-  const std::vector<Drawn>& drawn() const { return drawn_; }
   const std::vector<Hit>& hits() const { return hits_; }
 
  private:
@@ -44,7 +41,8 @@ class Renderer {
     double azimuth = 0, half_azimuth = 0, low = 0, high = 0;
   };
   static Bounds bounds_of(const Primitive& primitive);
-  void draw_slots(const Drawn& drawn, std::uint32_t index, std::size_t begin, std::size_t end);
+  /// `near`: m, no part of it lies nearer.
+  void draw_slots(const Drawn& drawn, float near, std::size_t begin, std::size_t end);
 
   const BeamTable* beams_ = nullptr;
   float max_range_ = 0;

@@ -46,19 +46,6 @@ Pose product(const Pose& a, const Pose& b) {
   return result;
 }
 
-Pose inverse(const Pose& t) {
-  Pose result = Pose::Identity();
-  for (int r = 0; r < 3; ++r) {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      result(r, k) = t(k, r);
-      sum -= t(k, r) * t(k, 3);
-    }
-    result(r, 3) = sum;
-  }
-  return result;
-}
-
 Rigid to_rigid(const Pose& t) {
   auto f = [&t](int r, int c) { return static_cast<float>(t(r, c)); };
   return {{{f(0, 0), f(0, 1), f(0, 2)}, {f(1, 0), f(1, 1), f(1, 2)}, {f(2, 0), f(2, 1), f(2, 2)}},
@@ -154,7 +141,7 @@ class Simulator::Implementation {
   /// the motion is known.
   void deskew(const Moment& stamp, const Moment& now, std::size_t first,
               SimulatedScan& scan) const {
-    const Pose step = product(inverse(stamp.T_world_sensor), now.T_world_sensor);
+    const Pose step = product(detail::inverted(stamp.T_world_sensor), now.T_world_sensor);
     const double share = config_.deskewed;
     // Turns within a scan are small.
     const Eigen::Matrix3d turn =
@@ -313,7 +300,7 @@ class Simulator::Implementation {
   }
 
   void draw_world(const Moment& moment, std::vector<ObjectState>& states) {
-    const Pose T_sensor_world = inverse(moment.T_world_sensor);
+    const Pose T_sensor_world = detail::inverted(moment.T_world_sensor);
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
@@ -324,7 +311,7 @@ class Simulator::Implementation {
           // Subtract first: large coordinates must not cost precision.
           Primitive near = primitive;
           near.centre = near.centre - origin;
-          renderer_.add(transformed(turn, near), static_object(model), mix(salt, 1));
+          renderer_.add(transformed(turn, near), static_instance(model) << 16, mix(salt, 1));
         });
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
@@ -333,7 +320,8 @@ class Simulator::Implementation {
           person ? upright(pose.at)
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
       const std::uint32_t instance = object.instance == 0 ? pose.object + 1 : object.instance;
-      states.push_back({instance, label_of(pose), T_world_object, pose.speed, object.size.length,
+      const std::uint32_t label = label_of(pose);
+      states.push_back({instance, label, T_world_object, pose.speed, object.size.length,
                         object.size.width, object.size.height});
       const Rigid T_sensor_object = to_rigid(product(T_sensor_world, T_world_object));
       Model shape;
@@ -344,15 +332,15 @@ class Simulator::Implementation {
         shape = cyclist_model(object.size, object.seed, pose.phase);
       }
       for (const Primitive& primitive : object.model.empty() ? shape : object.model) {
-        renderer_.add(transformed(T_sensor_object, primitive),
-                      static_cast<std::uint32_t>(states.size() - 1), mix(pose.object, 2));
+        renderer_.add(transformed(T_sensor_object, primitive), label | (instance << 16),
+                      mix(pose.object, 2));
       }
     }
     if (config_.ego_points) {
       renderer_.add(make_primitive(Shape::kBox, materials::kEgoRoof,
                                    {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
                                    {1.9F, 0.85F, 0.55F}, rotation_z(-model_.yaw)),
-                    kStatic, 3);
+                    0, 3);
     }
     renderer_.draw();
   }
@@ -384,20 +372,14 @@ class Simulator::Implementation {
   }
 
   /// The object that the renderer found along a beam.
-  std::optional<Surface> object_surface(const Renderer::Hit& hit, Vec3 direction,
-                                        const std::vector<ObjectState>& objects) const {
-    if (hit.drawn == Renderer::kNothing) return std::nullopt;
-    const Renderer::Drawn& drawn = renderer_.drawn()[hit.drawn];
+  std::optional<Surface> object_surface(const Renderer::Hit& hit, Vec3 direction) const {
+    if (hit.drawn == nullptr) return std::nullopt;
+    const Renderer::Drawn& drawn = *hit.drawn;
     const Material& material = *drawn.primitive.material;
     Surface surface;
     surface.range = hit.range;
-    surface.label = material.label;
-    if (drawn.object >= kStatic) {
-      surface.label |= (drawn.object - kStatic) << 16;
-    } else {
-      const ObjectState& state = objects[drawn.object];
-      surface.label = state.label | (state.instance << 16);
-    }
+    surface.label = drawn.label;
+    if ((drawn.label & 0xFFFF) == 0) surface.label |= material.label;
     surface.reflectivity = material.reflectivity;
     surface.roughness = material.roughness;
     surface.loss = hit.extra_loss + material.loss;
@@ -416,13 +398,13 @@ class Simulator::Implementation {
                     static_cast<float>(config_.glass_passes));
     std::vector<ObjectState> states;
     draw_world(moment, states);
-    measure(moment, states, columns, scan, seed);
+    measure(moment, columns, scan, seed);
     if (columns.first == 0) scan.objects = std::move(states);
   }
 
   /// Turns surfaces into points with noise, losses and labels.
-  void measure(const Moment& moment, const std::vector<ObjectState>& objects,
-               BeamTable::Columns columns, SimulatedScan& scan, std::uint64_t scan_seed) {
+  void measure(const Moment& moment, BeamTable::Columns columns, SimulatedScan& scan,
+               std::uint64_t scan_seed) {
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Vec3 origin = T_world_sensor.translation;
     world_.terrain.prepare({moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)},
@@ -436,7 +418,7 @@ class Simulator::Implementation {
       const Vec3 direction = beams_.direction(slot);
       const Vec3 world_direction = T_world_sensor.rotation * direction;
       std::optional<Surface> surface = ground_surface(origin, world_direction, hit.range);
-      if (!surface) surface = object_surface(hit, direction, objects);
+      if (!surface) surface = object_surface(hit, direction);
       surfaces_.push_back(surface);
     }
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -480,13 +462,11 @@ class Simulator::Implementation {
     return (1 / norm(beside)) * beside;
   }
 
-  /// Number of a static thing for the renderer: kStatic and its instance id, or kStatic alone.
-  std::uint32_t static_object(std::uint32_t model) const {
-    constexpr std::uint32_t kIds = kFirstChange - kFirstStatic;
-    return config_.static_instances ? kStatic + kFirstStatic + model % kIds : kStatic;
+  /// Instance id of a static thing; 0: none.
+  std::uint32_t static_instance(std::uint32_t model) const {
+    if (!config_.static_instances) return 0;
+    return kFirstStatic + model % (kFirstChange - kFirstStatic);
   }
-
-  static constexpr std::uint32_t kStatic = 0x80000000;
 
   Config config_;
   SensorModel model_;

@@ -53,8 +53,7 @@ double Route::nearest(Vec2 p) const {
 }
 
 Route Route::shifted(double begin, double end, const std::function<double(double)>& lateral) const {
-  constexpr double kStep = 1.0;
-  const auto count = static_cast<std::size_t>(std::max(1.0, std::abs(end - begin) / kStep));
+  const auto count = static_cast<std::size_t>(std::max(1.0, std::abs(end - begin)));
   std::vector<Vec2> result;
   for (std::size_t i = 0; i <= count; ++i) {
     const double s = begin + (end - begin) * static_cast<double>(i) / static_cast<double>(count);

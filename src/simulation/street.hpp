@@ -31,8 +31,8 @@ class Route {
   /// Arc length of the nearest vertex.
   double nearest(Vec2 p) const;
 
-  /// A route along this one from `begin` to `end` (backwards if end < begin), `lateral(s)` metres
-  /// to the left of this line's own direction.
+  /// A route of points a metre apart along this one from `begin` to `end` (backwards if end <
+  /// begin), `lateral(s)` metres to the left of this line's own direction.
   Route shifted(double begin, double end, const std::function<double(double)>& lateral) const;
 
  private:

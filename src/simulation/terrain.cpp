@@ -63,17 +63,17 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
 }
 
 /// The corridors, with the segments that can be nearest to a point within `radius` of `centre`.
-std::vector<Corridor> nearest_within(std::vector<Corridor> corridors, Vec2 centre, double radius) {
-  for (Corridor& corridor : corridors) {
+std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
+                                     double radius) {
+  std::vector<Corridor> result;
+  for (const Corridor& corridor : corridors) {
     const double reach = corridor.distance(centre) + 2 * radius;
-    auto& segments = corridor.segments;
-    segments.erase(std::remove_if(segments.begin(), segments.end(),
-                                  [&](const Segment& segment) {
-                                    return std::sqrt(segment.squared_distance(centre)) > reach;
-                                  }),
-                   segments.end());
+    Corridor& kept = result.emplace_back(Corridor{corridor.street, {}});
+    for (const Segment& segment : corridor.segments) {
+      if (std::sqrt(segment.squared_distance(centre)) <= reach) kept.segments.push_back(segment);
+    }
   }
-  return corridors;
+  return result;
 }
 
 struct Ground {
@@ -218,6 +218,8 @@ double Terrain::height(Vec2 p) {
 }
 
 void Terrain::prepare(Vec2 centre, double radius) {
+  constexpr std::size_t kKeep = 1500;
+  if (tiles_.size() > kKeep) tiles_.clear();  // most are left behind; others are made again
   near_x_ = tile_index(centre.x, kTile) - kSide / 2;
   near_y_ = tile_index(centre.y, kTile) - kSide / 2;
   near_.fill(nullptr);
@@ -238,19 +240,6 @@ void Terrain::prepare(Vec2 centre, double radius) {
   }
   low_ -= 1;
   high_ += 1;
-  // Tiles that were left behind are made again if they are needed again.
-  constexpr std::size_t kKeep = 1500;
-  if (tiles_.size() > kKeep) {
-    for (auto it = tiles_.begin(); it != tiles_.end();) {
-      const bool used = std::find(near_.begin(), near_.end(), it->second.get()) != near_.end();
-      it = used ? std::next(it) : tiles_.erase(it);
-    }
-  }
-}
-
-const Terrain::Tile* Terrain::near_tile(float u, float v) const {
-  if (u <= -1 || v <= -1 || u >= kSide * kCells || v >= kSide * kCells) return nullptr;
-  return near_[grid_index(static_cast<int>(v) / kCells, static_cast<int>(u) / kCells, kSide)];
 }
 
 float Terrain::height_near(float x, float y) const {

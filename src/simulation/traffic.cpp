@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dynains::simulation {
 namespace {
 
 constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; objects beyond stand still
-constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
 
@@ -104,33 +102,32 @@ void Traffic::fill(const Flow& flow) {
 
 void Traffic::collect_bodies(Vec2 centre, double radius) {
   bodies_.clear();
-  auto add = [&](const Waypoint& at, double speed, std::size_t object, std::size_t driver) {
+  auto add = [&](const Waypoint& at, double speed, std::size_t object, const Driver* driver) {
     bodies_.push_back({footprint_of(object, at), speed * direction(at.heading), driver,
                        objects[object].kind == Kind::kPedestrian});
   };
-  for (std::size_t i = 0; i < drivers.size(); ++i) {
-    if (!drivers[i].active) continue;
-    const Waypoint at = place_of(drivers[i]);
-    if (norm(at.position - centre) < radius) add(at, drivers[i].speed, drivers[i].object, i);
+  for (const Driver& driver : drivers) {
+    if (!driver.active) continue;
+    const Waypoint at = place_of(driver);
+    if (norm(at.position - centre) < radius) add(at, driver.speed, driver.object, &driver);
   }
   for (const Walker& walker : walkers) {
     if (norm(walker.position - centre) > radius) continue;
-    add({walker.position, walker.heading}, norm(walker.velocity), walker.object, kNobody);
+    add({walker.position, walker.heading}, norm(walker.velocity), walker.object, nullptr);
   }
   for (const ObjectPose& pose : parked) {
-    if (norm(pose.at.position - centre) < radius) add(pose.at, 0, pose.object, kNobody);
+    if (norm(pose.at.position - centre) < radius) add(pose.at, 0, pose.object, nullptr);
   }
 }
 
-double Traffic::free_distance(const Driver& driver, std::size_t index, double reach,
-                              double& speed_ahead) const {
+double Traffic::free_distance(const Driver& driver, double reach, double& speed_ahead) const {
   const Lane& lane = lanes[driver.lane];
   const Size& size = objects[driver.object].size;
   const double clearance = size.width / 2 + 0.3;
   const Vec2 here = place_of(driver).position;
   std::vector<const Body*> near;
   for (const Body& body : bodies_) {
-    if (body.driver == index) continue;
+    if (body.driver == &driver) continue;
     const double far = reach + size.length + body.footprint.half_length + 4;
     if (norm(body.footprint.centre - here) < far) near.push_back(&body);
   }
@@ -162,7 +159,7 @@ double Traffic::free_distance(const Driver& driver, std::size_t index, double re
   return reach;
 }
 
-double Traffic::wanted_speed(const Driver& driver, std::size_t index) const {
+double Traffic::wanted_speed(const Driver& driver) const {
   const Lane& lane = lanes[driver.lane];
   double cruise = driver.cruise;
   for (const auto& change : driver.schedule) {
@@ -171,7 +168,7 @@ double Traffic::wanted_speed(const Driver& driver, std::size_t index) const {
   if (driver.waits_for_gap && driver.speed < 0.1 && cruise > 0) {
     const Waypoint at = place_of(driver);
     for (const Body& body : bodies_) {
-      if (body.driver == index || norm(body.velocity) < 1) continue;
+      if (body.driver == &driver || norm(body.velocity) < 1) continue;
       const Vec2 towards = at.position - body.footprint.centre;
       const double distance = norm(towards);
       if (distance < 25 && dot(towards, body.velocity) > 0.7 * distance * norm(body.velocity)) {
@@ -192,16 +189,16 @@ double Traffic::wanted_speed(const Driver& driver, std::size_t index) const {
   return cruise;
 }
 
-double Traffic::wanted_acceleration(const Driver& driver, std::size_t index) const {
+double Traffic::wanted_acceleration(const Driver& driver) const {
   const Lane& lane = lanes[driver.lane];
   const Size& size = objects[driver.object].size;
-  const double cruise = wanted_speed(driver, index);
+  const double cruise = wanted_speed(driver);
   const double v = driver.speed;
   if (cruise <= 0.01) return v > 0.05 ? -2.0 : -v / 0.1;
 
   const double reach = v * v / 4 + 2.0 * v + 8;
   double speed_ahead = 0;
-  double gap = free_distance(driver, index, reach, speed_ahead);
+  double gap = free_distance(driver, reach, speed_ahead);
   bool blocked = gap < reach;
   const double front = driver.s + size.length / 2;
   for (const StopLine& line : lane.stop_lines) {
@@ -323,15 +320,10 @@ void Traffic::walk(Walker& walker, double dt) {
 void Traffic::step(double dt) {
   const Vec2 centre = place_of(drivers[0]).position;
   collect_bodies(centre, kActiveRadius + 40);
-  for (std::size_t i = 0; i < drivers.size(); ++i) {
-    Driver& driver = drivers[i];
+  for (Driver& driver : drivers) {
     if (!driver.active) continue;
-    const Vec2 at = place_of(driver).position;
-    if (norm(at - centre) > kActiveRadius) {
-      driver.acceleration = 0;
-      continue;
-    }
-    driver.acceleration = wanted_acceleration(driver, i);
+    const bool is_near = norm(place_of(driver).position - centre) <= kActiveRadius;
+    driver.acceleration = is_near ? wanted_acceleration(driver) : 0;
   }
   for (Driver& driver : drivers) {
     const double before = driver.speed;

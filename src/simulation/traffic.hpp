@@ -151,18 +151,17 @@ class Traffic {
   struct Body {
     Footprint footprint;
     Vec2 velocity;
-    std::size_t driver;  ///< or kNobody
+    const Driver* driver;  ///< null if it is none
     bool person;
   };
 
   Kind random_kind(const Flow& flow);
   void enter(Flow& flow, double s);
   void collect_bodies(Vec2 centre, double radius);
-  double free_distance(const Driver& driver, std::size_t index, double reach,
-                       double& speed_ahead) const;
+  double free_distance(const Driver& driver, double reach, double& speed_ahead) const;
   /// Speed (m/s) on a free road: schedule, gaps in cross traffic, bends.
-  double wanted_speed(const Driver& driver, std::size_t index) const;
-  double wanted_acceleration(const Driver& driver, std::size_t index) const;
+  double wanted_speed(const Driver& driver) const;
+  double wanted_acceleration(const Driver& driver) const;
   /// Velocity (m/s) towards the walker's goal; takes the next goal near the current one.
   static Vec2 wanted_velocity(Walker& walker);
   /// Acceleration (m/s^2): towards the wanted velocity, away from others and from obstacles.

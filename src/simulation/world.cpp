@@ -25,10 +25,10 @@ void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
 namespace {
 
 World build_scene(const Config& config) {
-  static constexpr World (*kScenes[])(const Config&) = {
+  static constexpr World (*kScenes[])(const Config&, Random) = {
       urban,    highway, vegetation, crowd,  stop_and_go, canopy, hill,
       car_park, urban,   hall,       forest, garage,      mixed};
-  return kScenes[static_cast<std::size_t>(config.scene)](config);
+  return kScenes[static_cast<std::size_t>(config.scene)](config, Random(mix(config.seed, 77)));
 }
 
 }  // namespace

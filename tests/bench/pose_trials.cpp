@@ -251,7 +251,7 @@ int main(int argc, char** argv) {
   const fs::path folder = ::mkdtemp(pattern.data());
   fs::create_directory(folder / "velodyne");
   std::size_t number = 0;
-  for (const std::string scene : simulation::kSceneNames) {
+  for (const std::string scene : value_names(simulation::Scene())) {
     for (const char* const sensor : {"hdl64", "vlp16", "os1-64", "hdl32", "livox"}) {
       if (scene == "static" || number++ % every != 0) continue;
       if (only != "all" && scene != only) continue;

@@ -223,11 +223,11 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
   };
   const Mount mounts[] = {{1.73, 0, 0},  {0.5, 0, 0},   {1.0, -20, 10}, {1.73, 30, 0},
                           {2.5, 5, -25}, {0.7, 0, -30}, {2.0, -10, 0}};
-  for (std::size_t i = 0; i < 2 * sim::kSceneNames.size(); ++i) {
+  for (std::size_t i = 0; i < 2 * value_names(sim::Scene()).size(); ++i) {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
     sim::Config config;
-    config.scene = static_cast<sim::Scene>(i % sim::kSceneNames.size());
-    config.sensor = static_cast<sim::Sensor>(i % sim::kSensorNames.size());
+    config.scene = static_cast<sim::Scene>(i % value_names(sim::Scene()).size());
+    config.sensor = static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size());
     config.scans = 1;
     config.seed = 11 + i;
     config.sensor_height = mount.height;

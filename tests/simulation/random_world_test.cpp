@@ -41,7 +41,7 @@ TEST_CASE("a seed is a world, and worlds differ in scene, sensor and carrier") {
     gaits.insert(config.gait);
   }
   CHECK(scenes.size() == 12);  // all but the one in which nothing moves
-  CHECK(sensors.size() == kSensorNames.size());
+  CHECK(sensors.size() == value_names(Sensor()).size());
   CHECK(gaits.size() == 3);
 
   Config config = random_world(3);

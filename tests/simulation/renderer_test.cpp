@@ -73,8 +73,8 @@ TEST_CASE("a wall hides everything behind it") {
   renderer.draw();
   std::size_t wall = 0;
   for (const Renderer::Hit& hit : renderer.hits()) {
-    if (hit.drawn == Renderer::kNothing) continue;
-    CHECK(renderer.drawn()[hit.drawn].object == 2);
+    if (hit.drawn == nullptr) continue;
+    CHECK(hit.drawn->label == 2);
     ++wall;
   }
   CHECK(wall > 1000);
@@ -94,7 +94,7 @@ TEST_CASE("porous shapes let the expected share of beams through") {
     for (std::size_t slot = 0; slot < beams.size(); ++slot) {
       if (beams.direction(slot).x < 0.9997F) continue;  // within 1.4 deg of the middle
       ++met;
-      passed += renderer.hits()[slot].drawn == Renderer::kNothing;
+      passed += renderer.hits()[slot].drawn == nullptr;
     }
   }
   REQUIRE(met >= 1000);
@@ -111,7 +111,7 @@ TEST_CASE("a share of the beams passes through panes of vehicles, none through o
     renderer.add(make_primitive(Shape::kBox, material, {10, 0, 0}, {0.5F, 5, 5}), 1, 5);
     renderer.draw();
     return std::count_if(renderer.hits().begin(), renderer.hits().end(),
-                         [](const auto& hit) { return hit.drawn != Renderer::kNothing; });
+                         [](const auto& hit) { return hit.drawn != nullptr; });
   };
   const auto all = static_cast<double>(met(materials::kGlass, 0));
   REQUIRE(all > 5000);

@@ -81,10 +81,12 @@ TEST_CASE(
 }
 
 TEST_CASE("every scene and every sensor gives points") {
-  for (std::size_t number = 0; number < 2 * kSceneNames.size(); ++number) {
-    const std::size_t scene = number % kSceneNames.size();
-    const std::size_t sensor = number % kSensorNames.size();
-    INFO(kSceneNames[scene] << ' ' << kSensorNames[sensor]);
+  const auto scenes = value_names(Scene());
+  const auto sensors = value_names(Sensor());
+  for (std::size_t number = 0; number < 2 * scenes.size(); ++number) {
+    const std::size_t scene = number % scenes.size();
+    const std::size_t sensor = number % sensors.size();
+    INFO(scenes[scene] << ' ' << sensors[sensor]);
     Simulator simulator(small(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
     const SimulatedScan scan = simulator.scan(0);
     // Most beams of the dome end in the sky.

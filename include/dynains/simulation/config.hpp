@@ -25,10 +25,10 @@ enum class Scene {
   kGarage,      ///< one storey of a multi-storey car park: low ceiling, columns, walls
   kMixed,       ///< a street whose every part is drawn from the seed
 };
-inline constexpr std::array<const char*, 13> kSceneNames = {
-    "urban",    "highway", "vegetation", "crowd",  "stop-and-go", "canopy", "hill",
-    "car-park", "static",  "hall",       "forest", "garage",      "mixed"};
-constexpr const std::array<const char*, 13>& value_names(Scene) { return kSceneNames; }
+constexpr std::array<const char*, 13> value_names(Scene) {
+  return {"urban",    "highway", "vegetation", "crowd",  "stop-and-go", "canopy", "hill",
+          "car-park", "static",  "hall",       "forest", "garage",      "mixed"};
+}
 
 /// Beam pattern with a typical mounting height and range.
 enum class Sensor {
@@ -43,10 +43,10 @@ enum class Sensor {
   kRaster,    ///< solid state: 126 rows of 630 beams, 120 by 25 deg forward
   kRings,     ///< 16 to 128 beams around, all numbers drawn from the seed
 };
-inline constexpr std::array<const char*, 10> kSensorNames = {
-    "hdl64",    "vlp16", "hdl32",   "os1-64", "os0-128",
-    "pandar64", "livox", "mid-360", "raster", "rings"};
-constexpr const std::array<const char*, 10>& value_names(Sensor) { return kSensorNames; }
+constexpr std::array<const char*, 10> value_names(Sensor) {
+  return {"hdl64",    "vlp16", "hdl32",   "os1-64", "os0-128",
+          "pandar64", "livox", "mid-360", "raster", "rings"};
+}
 
 /// Rule for the moving labels of an object.
 enum class Labelling {
@@ -55,8 +55,7 @@ enum class Labelling {
   kEver,
   kInstant,  ///< the points in scans at which the object is faster than 0.5 m/s
 };
-inline constexpr std::array<const char*, 2> kLabellingNames = {"ever", "instant"};
-constexpr const std::array<const char*, 2>& value_names(Labelling) { return kLabellingNames; }
+constexpr std::array<const char*, 2> value_names(Labelling) { return {"ever", "instant"}; }
 
 /// How the sensor is carried.
 enum class Gait {
@@ -64,16 +63,16 @@ enum class Gait {
   kHandHeld,  ///< by a walking person, who looks around with up to 40 deg/s
   kLegged,    ///< on a trotting robot
 };
-inline constexpr std::array<const char*, 3> kGaitNames = {"vehicle", "hand-held", "legged"};
-constexpr const std::array<const char*, 3>& value_names(Gait) { return kGaitNames; }
+constexpr std::array<const char*, 3> value_names(Gait) {
+  return {"vehicle", "hand-held", "legged"};
+}
 
 /// Shape of trees, bushes and hedges.
 enum class Foliage {
   kSolid,  ///< crowns and hedges without large gaps
   kOpen,   ///< branches with separate clumps of leaves or bare twigs, hedges with gaps
 };
-inline constexpr std::array<const char*, 2> kFoliageNames = {"solid", "open"};
-constexpr const std::array<const char*, 2>& value_names(Foliage) { return kFoliageNames; }
+constexpr std::array<const char*, 2> value_names(Foliage) { return {"solid", "open"}; }
 
 /// Parameters of one sequence. visit() gives their bounds.
 struct Config {

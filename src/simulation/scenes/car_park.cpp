@@ -248,12 +248,11 @@ void roof_over(Builder& builder, Random& random, const Street& street) {
   });
 }
 
-World parking_level(const Config& config, bool roofed) {
-  Random random(mix(config.seed, 77));
+World parking_level(const Config& config, Random& random, bool roofed) {
   const double aisle = random.uniform(60, 90);
   const double drive = travel(config, kAisleSpeed);
-  std::vector<Street> streets;
-  streets.push_back({route_of_bends(serpentine(aisle, 2 * kStartInAisle + drive + 60)), 3.3, 0});
+  std::vector<Street> streets{
+      {route_of_bends(serpentine(aisle, 2 * kStartInAisle + drive + 60)), 3.3, 0}};
   TerrainConfig ground;
   ground.kerb = 0;
   ground.roughness = 0.03;
@@ -292,7 +291,7 @@ World parking_level(const Config& config, bool roofed) {
 
 }  // namespace
 
-World car_park(const Config& config) { return parking_level(config, false); }
-World garage(const Config& config) { return parking_level(config, true); }
+World car_park(const Config& config, Random random) { return parking_level(config, random, false); }
+World garage(const Config& config, Random random) { return parking_level(config, random, true); }
 
 }  // namespace dynains::simulation

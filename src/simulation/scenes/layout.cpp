@@ -25,8 +25,8 @@ double travel(const Config& config, double usual_speed) {
   return speed * config.scans / config.rate;
 }
 
-std::vector<Bend> winding(Random& random, double length, double gentle, double corner_chance,
-                          double corner_radius) {
+Route winding(Random& random, double length, double gentle, double corner_chance,
+              double corner_radius) {
   std::vector<Bend> bends{{60, 0}};
   double done = 60;
   int turn = random.chance(0.5) ? 1 : -1;
@@ -43,7 +43,7 @@ std::vector<Bend> winding(Random& random, double length, double gentle, double c
     turn = -turn;
   }
   bends.push_back({60, 0});
-  return bends;
+  return route_of_bends(bends);
 }
 
 std::vector<Crossing> add_side_streets(Random& random, std::vector<Street>& streets, double spacing,

@@ -23,8 +23,9 @@ Route route_of_bends(const std::vector<Bend>& bends);
 double travel(const Config& config, double usual_speed);
 
 /// Gentle bends and now and then a corner, alternating so that the street never meets itself.
-std::vector<Bend> winding(Random& random, double length, double gentle, double corner_chance,
-                          double corner_radius);
+/// `corner_radius`: m, about.
+Route winding(Random& random, double length, double gentle, double corner_chance,
+              double corner_radius = 17);
 
 /// Straight streets across the main one, where that is straight.
 struct Crossing {

@@ -113,9 +113,8 @@ void add_vehicles(Builder& builder, Random& random, const StreetLanes& lanes, do
 
 }  // namespace
 
-World mixed(const Config& config) {
+World mixed(const Config& config, Random random) {
   const double speed = usual_speed(config), way = travel(config, speed);
-  Random random(mix(config.seed, 77));
   const double length = 2 * kBefore + way + 30;
   const double width = random.unit();
   const bool angled = width > 0.65;
@@ -124,9 +123,7 @@ World mixed(const Config& config) {
                                            : random.uniform(5.6, 7.2);
   const double pavement = is_carried(config) ? random.uniform(3, 6) : random.uniform(0.5, 5);
   const double gentle = random.uniform(0.001, 0.015), corners = random.uniform(0, 0.4);
-  std::vector<Street> streets;
-  streets.push_back(
-      {route_of_bends(winding(random, length, gentle, corners, 17)), half_width, pavement});
+  std::vector<Street> streets{{winding(random, length, gentle, corners), half_width, pavement}};
   const auto crossings = random.chance(0.6)
                              ? add_side_streets(random, streets, random.uniform(50, 140), 4.0)
                              : std::vector<Crossing>();

@@ -1,0 +1,265 @@
+// Scenes at walking pace.
+#include "simulation/materials.hpp"
+#include "simulation/scenes/lanes.hpp"
+#include "simulation/scenes/scenes.hpp"
+
+namespace dynains::simulation {
+namespace {
+
+constexpr double kStartOnSquare = 80;  // m along the street
+
+/// Trees, street furniture and stalls between the walkers.
+void furnish_square(Builder& builder, Random& random, const Street& street, double length,
+                    double side_of_ego) {
+  for (double s = 5; s < length - 5; s += random.uniform(7, 14)) {
+    const double lateral = random.either_sign(0.5, 0.85) * street.half_width;
+    const Waypoint at = street.centre.beside(s, lateral);
+    Random model_random = random.fork(random.bits());
+    const double kind = random.unit();
+    if (std::abs(lateral - side_of_ego) < 2.2) continue;
+    if (kind < 0.45) {
+      const double tall = model_random.uniform(5, 9), radius = model_random.uniform(1.5, 2.8);
+      builder.tree(at.position, tall, radius, 2.3);
+    } else if (kind < 0.8) {
+      builder.place(furniture_model(model_random), {at.position, at.heading, 0.8, 0.35});
+    } else {
+      builder.place(shelter_model(3, 2.2, 2.4), {at.position, at.heading, 1.5, 1.1});
+    }
+  }
+}
+
+/// One group of one to four people; a quarter of the groups walk along a wall.
+void add_group(Builder& builder, Random& random, const Street& street, double from, double to) {
+  const double half = street.half_width;
+  const double s = random.uniform(from, to), mood = random.unit(), when = random.uniform(1.5, 11);
+  const bool along_wall = random.chance(0.25);
+  const double side = random.chance(0.5) ? 1 : -1;
+  const double lateral = along_wall ? side * (half - 0.1) : random.uniform(-0.85, 0.85) * half;
+  const double run = random.either_sign(15, 60);
+  const double drift = along_wall ? 0 : random.uniform(-0.3, 0.3) * half;
+  const double pace = random.uniform(0.7, 1.7);
+  const auto company = random.chance(0.35) ? 1 + random.index(3) : 0;
+  const double start = mood < 0.12 ? 1e9 : mood < 0.25 ? when : 0;
+  const double stop = mood > 0.9 ? when : 1e9;
+  for (std::size_t k = 0; k <= company; ++k) {
+    const std::size_t row = k / 2;  // two walk side by side
+    const double beside = 0.65 * static_cast<double>(k % 2);
+    const double behind = -0.7 * static_cast<double>(row);
+    std::vector<Vec2> goals;
+    for (int step = 0; step <= 3; ++step) {
+      const double u = step / 3.0;
+      const double l = std::clamp(lateral + drift * u + beside * (lateral > 0 ? -1 : 1),
+                                  -half + 0.05, half - 0.05);
+      goals.push_back(street.centre.beside(s + run * u + behind, l).position);
+    }
+    const Vec2 ego = builder.traffic().lanes[0].route.at(kStartOnSquare).position;
+    if (norm(goals[0] - ego) < 2.0) continue;
+    builder.walker(std::move(goals), pace, start, stop);
+  }
+}
+
+void add_cyclists(Builder& builder, Random& random, const Street& street, double length) {
+  for (int i = 0; i < 3; ++i) {
+    const double s = kStartOnSquare + random.uniform(-40, 60), side = random.chance(0.5) ? 1 : -1;
+    const double lateral = side * random.uniform(0.2, 0.45) * street.half_width;
+    const bool with = random.chance(0.5);
+    const std::size_t object = builder.traffic().add_object(Kind::kCyclist);
+    const std::size_t path = builder.traffic().add_lane(street.centre.shifted(
+        with ? 0 : length, with ? length : 0, [lateral](double) { return lateral; }));
+    const double along = with ? s : builder.traffic().lanes[path].route.length() - s;
+    if (std::abs(s - kStartOnSquare) < 5) {
+      builder.traffic().objects.pop_back();
+      continue;
+    }
+    builder.traffic().add_driver(object, path, along, 3.2);
+  }
+}
+
+constexpr double kPanel = 8.0;  // m, of walls and of the ceiling
+
+/// The hall extends along x from 0, and to both sides of y = 0.
+struct Hall {
+  double length, half_width, height;  // m
+};
+
+/// Ceiling with beams, end walls, a side wall, and a glass front on the other side.
+void build_shell(Builder& builder, const Hall& hall) {
+  for (double x = kPanel / 2; x < hall.length; x += kPanel) {
+    for (double y = -hall.half_width; y < hall.half_width; y += kPanel) {
+      builder.place_anyway(slab_model(kPanel, kPanel, hall.height, hall.height + 0.3),
+                           {{x, y + kPanel / 2}, 0});
+    }
+    builder.place_anyway(slab_model(0.3, 2 * hall.half_width, hall.height - 0.6, hall.height),
+                         {{x, 0}, 0});
+    builder.place_anyway(wall_model(kPanel, hall.height), {{x, hall.half_width}, 0});
+    builder.place_anyway(glass_front_model(kPanel, hall.height), {{x, -hall.half_width}, kPi});
+  }
+  for (double y = -hall.half_width + kPanel / 2; y < hall.half_width; y += kPanel) {
+    builder.place_anyway(wall_model(kPanel, hall.height), {{0, y}, kPi / 2});
+    builder.place_anyway(wall_model(kPanel, hall.height), {{hall.length, y}, -kPi / 2});
+  }
+}
+
+/// Columns, stalls and furniture beside the way of the sensor.
+void furnish(Builder& builder, Random& random, const Hall& hall) {
+  for (double x = 8; x < hall.length - 4; x += 8) {
+    for (const double side : {-0.55, 0.55}) {
+      builder.place(column_model(0.6, hall.height), {{x, side * hall.half_width}, 0, 0.3, 0.3});
+    }
+  }
+  for (double x = 4; x < hall.length - 4; x += random.uniform(3, 6)) {
+    const double y = random.either_sign(0.3, 0.95) * hall.half_width;
+    Random model_random = random.fork(random.bits());
+    const double heading = random.uniform(-0.2, 0.2), kind = random.unit();
+    if (std::abs(y) < 2.5) continue;
+    if (kind < 0.5) {
+      const double length = model_random.uniform(2, 4), depth = model_random.uniform(1.5, 2.5);
+      builder.place(stall_model(length, depth, model_random),
+                    {{x, y}, heading, length / 2, depth / 2});
+    } else {
+      builder.place(furniture_model(model_random), {{x, y}, heading, 0.8, 0.35});
+    }
+  }
+}
+
+/// People who walk from place to place, or stand at stalls for some time.
+void add_people(Builder& builder, Random& random, const Hall& hall, double from, double to) {
+  const int people = builder.count(std::min(0.9 * (to - from), 1000.0));
+  for (int i = 0; i < people; ++i) {
+    std::vector<Vec2> goals{
+        {random.uniform(from, to), random.uniform(-0.9, 0.9) * hall.half_width}};
+    for (int step = 0; step < 4; ++step) {
+      const double x = std::clamp(goals.back().x + random.either_sign(4, 20), 2.0, hall.length - 2);
+      goals.push_back({x, random.uniform(-0.9, 0.9) * hall.half_width});
+    }
+    const double pace = random.uniform(0.6, 1.5), mood = random.unit();
+    const double when = random.uniform(2, 12);
+    builder.walker(std::move(goals), pace,
+                   mood < 0.15  ? 1e9
+                   : mood < 0.3 ? when
+                                : 0,
+                   mood > 0.85 ? when : 1e9);
+  }
+}
+
+/// Passers-by and a road outside, seen through the glass.
+void add_outside(Builder& builder, Random& random, const Hall& hall, double from, double to) {
+  for (int i = 0; i < builder.count(8); ++i) {
+    const double x = random.uniform(from, to), y = -hall.half_width - random.uniform(1.5, 4);
+    const double run = random.either_sign(20, 60);
+    builder.walker({{x, y}, {x + run / 2, y}, {x + run, y}}, random.uniform(1.0, 1.7));
+  }
+}
+
+/// Trees from the edge of the track on, dense at first.
+void add_trees(Builder& builder, Random& random, const Street& street) {
+  const double per_100_m = random.uniform(110, 180);
+  const auto trees = static_cast<int>(street.centre.length() / 100 * per_100_m);
+  for (int i = 0; i < trees; ++i) {
+    const double s = random.uniform(0, street.centre.length()), u = random.unit();
+    const double lateral = street.half_width + 0.6 + 35 * u * std::sqrt(u);
+    const double size = random.unit();
+    const Vec2 at = street.centre.beside(s, random.chance(0.5) ? lateral : -lateral).position;
+    const double height = random.chance(0.25) ? 2 + 4 * size : 9 + 12 * size;  // young or grown
+    builder.tree(at, height, 0.15 * height + 0.5, 0.35 * height * random.uniform(0.4, 1.2));
+  }
+}
+
+/// Walkers, in twos at times, and cyclists on the track.
+void add_people(Builder& builder, Random& random, const Street& street, double from, double to) {
+  for (int i = 0; i < builder.count(16); ++i) {
+    const double s = random.uniform(from, to), pace = random.uniform(1.0, 2.6);
+    const double run = random.either_sign(30, 90), lateral = random.either_sign(0.3, 1.3);
+    const double stop = random.chance(0.2) ? random.uniform(2, 10) : 1e9;
+    const bool in_company = random.chance(0.4);
+    for (int k = 0; k <= (in_company ? 1 : 0); ++k) {
+      std::vector<Vec2> goals;
+      for (int step = 0; step <= 4; ++step) {
+        goals.push_back(
+            street.centre.beside(s + run * step / 4, lateral + (lateral > 0 ? -0.7 : 0.7) * k)
+                .position);
+      }
+      builder.walker(std::move(goals), pace, 0, stop);
+    }
+  }
+}
+
+}  // namespace
+
+World crowd(const Config& config, Random random) {
+  const double speed = 1.2;
+  const double drive = travel(config, speed), length = 2 * kStartOnSquare + drive + 20;
+  const double half = random.uniform(6, 11);
+  std::vector<Street> streets{{winding(random, length, 0.008, 0), half, 0}};
+  TerrainConfig ground;
+  ground.street_label = semantic::kSidewalk;
+  ground.kerb = 0;
+  ground.hill_slope = random.uniform(0.002, 0.02);
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const double side_of_ego = random.uniform(-0.3, 0.3) * half;
+  const std::size_t lane = builder.traffic().add_lane(street.centre.shifted(
+      0, length, [side_of_ego](double s) { return side_of_ego + 0.6 * std::sin(s / 9); }));
+  builder.ego(lane, kStartOnSquare, speed);
+  make_robot(builder.traffic());
+
+  Frontage look;
+  look.buildings = 0.95;
+  look.setback = 0.6;
+  look.parked = 0;
+  for (const int side : {-1, 1}) builder.furnish(street, side, look);
+  furnish_square(builder, random, street, length, side_of_ego);
+  const double from = kStartOnSquare - 45, to = kStartOnSquare + drive + 55;
+  const int number = builder.count(std::min(0.85 * (to - from), 2000.0));
+  for (int i = 0; i < number; ++i) add_group(builder, random, street, from, to);
+  if (builder.lively()) add_cyclists(builder, random, street, length);
+  return builder.finish();
+}
+
+World hall(const Config& config, Random random) {
+  const double speed = 1.0;
+  const double drive = travel(config, speed), start = 15;
+  const Hall hall{2 * start + drive + 20, random.uniform(9, 18), random.uniform(3.5, 7)};
+  std::vector<Street> streets{
+      {Route({{0, 0}, {hall.length / 2, 0}, {hall.length, 0}}), hall.half_width, 0}};
+  TerrainConfig ground;
+  ground.hill_slope = 0.0005;
+  ground.roughness = 0.003;
+  ground.kerb = 0;
+  ground.street_label = semantic::kSidewalk;
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  const std::size_t way = builder.traffic().add_lane(
+      street.centre.shifted(0, hall.length, [](double s) { return 1.2 * std::sin(s / 7); }));
+  builder.ego(way, start, speed);
+  builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
+  build_shell(builder, hall);
+  furnish(builder, random, hall);
+  add_people(builder, random, hall, start - 12, start + drive + 20);
+  add_outside(builder, random, hall, start - 12, start + drive + 20);
+  return builder.finish();
+}
+
+World forest(const Config& config, Random random) {
+  const double speed = 1.4;
+  const double drive = travel(config, speed), start = 60;
+  const double length = 2 * start + drive + 40;
+  std::vector<Street> streets{{winding(random, length, 0.03, 0), 1.7, 0}};
+  TerrainConfig ground;
+  ground.hill_slope = random.uniform(0.02, 0.08);
+  ground.hill_length = 60;
+  ground.roughness = 0.18;
+  ground.kerb = 0;
+  ground.street_label = ground.open_label;
+  Builder builder(config, ground, std::move(streets));
+  const Street& street = builder.street(0);
+  builder.ego(builder.lane(street, -0.4), start, speed);
+  builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
+  add_trees(builder, random, street);
+  builder.plant(street, street.half_width + 0.3, 20, 0, random.uniform(60, 120));
+  if (builder.lively()) fill_lane(builder, builder.lane(street, 0.5), 35, 4, 0, 0, 1);
+  add_people(builder, random, street, start - 40, start + drive + 50);
+  return builder.finish();
+}
+
+}  // namespace dynains::simulation
