@@ -10,6 +10,7 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
 #include "evaluation_options.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/input_files.hpp"
@@ -123,7 +124,7 @@ void add_eval_command(CLI::App& app) {
       .add_option("--map", options->maps,
                   "map file to judge (PLY or PCD, world frame of the poses); can be repeated")
       ->allow_extra_args(false);
-  add_window_options(command, options->window);
+  ScanWindow::visit(options->window, SettingFlags{command});
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,
                    "also tell where the first run went wrong: by class, instance, range and cause");

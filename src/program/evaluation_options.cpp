@@ -45,22 +45,6 @@ evaluation::EvaluationConfig EvaluationOptions::config() const {
   return config;
 }
 
-void add_window_options(CLI::App& command, ScanWindow& window) {
-  // Taken as a number, -1 would be the largest one.
-  const CLI::Validator is_number(
-      [](const std::string& text) {
-        const bool is_digits = !text.empty() && text.size() <= 18 &&
-                               text.find_first_not_of("0123456789") == std::string::npos;
-        return is_digits ? std::string() : "expected the number of a scan, found " + text;
-      },
-      "UINT");
-  const auto add = [&](const char* name, std::optional<std::size_t>& value, const char* help) {
-    command.add_option(name, value, help)->check(is_number)->type_name("");
-  };
-  add("--start", window.start, "number of the first scan");
-  add("--end", window.end, "number of the last scan (inclusive)");
-}
-
 TextFile::TextFile(const std::string& path) {
   if (!path.empty()) file_.emplace(path, true, InputFiles());
 }

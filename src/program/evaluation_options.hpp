@@ -28,9 +28,6 @@ class EvaluationOptions {
   std::string unlabeled_;
 };
 
-/// `--start` and `--end`.
-void add_window_options(CLI::App& command, ScanWindow& window);
-
 /// A file for text that takes long to compute. Opening it tells beforehand whether it can be
 /// written.
 class TextFile {

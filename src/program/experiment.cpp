@@ -16,6 +16,7 @@
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/recording.hpp"
 #include "evaluation_options.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "published_table.hpp"
 #include "recording_options.hpp"
@@ -49,7 +50,7 @@ struct ScoreOptions : ExperimentOptions {
   ScoreOptions(CLI::App& command, const std::string& what, const std::string& unlabeled,
                const std::string& prefix)
       : ExperimentOptions(command, what), evaluation(command, unlabeled, prefix) {
-    add_window_options(command, window);
+    ScanWindow::visit(window, SettingFlags{command});
     command.add_flag("--quiet", quiet, "no progress");
   }
 

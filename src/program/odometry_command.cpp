@@ -7,7 +7,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "evaluation_options.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/output_folder.hpp"
 #include "run/run_doubts.hpp"
@@ -30,7 +30,7 @@ struct OdometryFlags {
 
 /// Says what a run with these poses would say.
 void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
-  const ScanRange range{0, recording.size() - 1};
+  const ScanRange range = whole_of(recording);
   const StartCheck start = check_start(recording, range, DynaInsRemover::Config(), true);
   for (const std::string& text : start.warnings) print_warning(text);
   const RunDoubts doubts = find_doubts(recording, range, estimate.timing);
@@ -85,7 +85,7 @@ void add_odometry_command(CLI::App& app) {
       ->required()
       ->type_name("FILE");
   command.add_flag("--force", flags->force, "replace the file of --out if it exists");
-  add_window_options(command, flags->window);
+  ScanWindow::visit(flags->window, SettingFlags{command});
   add_compensated_flag(command, flags->is_compensated);
   command.add_flag("--one-thread", flags->one_thread, "the thread that registers also reads");
   command.add_flag("-q,--quiet", flags->quiet, "print errors only");

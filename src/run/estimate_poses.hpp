@@ -8,8 +8,8 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
-#include "labelled_sequence.hpp"
 #include "run_timing.hpp"
+#include "scan_range.hpp"
 
 namespace dynains::program {
 

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/threads/background.hpp"
+#include "scan_range.hpp"
 
 namespace dynains::program {
 
@@ -26,12 +26,6 @@ std::vector<std::uint32_t> read_run_labels(const std::filesystem::path& file, st
 
 /// Class id of a label.
 constexpr std::uint32_t class_of(std::uint32_t label) { return label & 0xffffU; }
-
-/// Scan numbers, both inclusive; an empty end is that of the sequence.
-struct ScanWindow {
-  std::optional<std::size_t> start;
-  std::optional<std::size_t> end;
-};
 
 /// Folder of one run and the subfolder of the labels to judge.
 struct RunLabels {

@@ -41,6 +41,16 @@ std::optional<T> parse_value(const std::string& text) {
   }
 }
 
+/// The number that a text is, for a field that may be empty; without a sign, that of a scan. Throws
+/// ConfigError.
+template <class T>
+std::optional<T> read_number(const std::string& text) {
+  const std::optional<T> value = parse_value<T>(text);
+  if (value) return value;
+  const std::string what = std::is_unsigned_v<T> ? "the number of a scan" : "a number";
+  throw ConfigError("expected " + what + ", found " + text);
+}
+
 /// The shortest text that reads back to the same value.
 std::string format_value(double value);
 std::string format_value(float value);

@@ -11,10 +11,11 @@
 
 namespace dynains::program {
 
-/// A text as it is, of a string or a path.
+/// A setting of a string or a path, which is the text as it is.
 template <class T>
-T read_text(const std::string& text) {
-  return T(text);
+auto plain_text(const char* name, T& value, const char* values, const char* help) {
+  const auto read = [](const std::string& text) { return std::remove_const_t<T>(text); };
+  return TextParameter{name, value, read, values, help};
 }
 
 /// m of "m", "cm" or "mm". Throws ConfigError.
@@ -48,14 +49,12 @@ template <class Self, class Visitor>
 void RecordingSettings::visit(Self& self, Visitor&& visitor) {
   auto& o = self.options;
   auto& c = o.convention;
-  constexpr auto kPath = &read_text<std::filesystem::path>;
-  constexpr auto kText = &read_text<std::string>;
-  visitor(TextParameter{
-      "poses", o.poses, kPath, "FILE",
+  visitor(plain_text(
+      "poses", o.poses, "FILE",
       "file of poses: 12 numbers a row (KITTI), time x y z qx qy qz qw (TUM), or CSV with named "
-      "columns; interpolated if rows and scans have times [of the recording]"});
-  visitor(TextParameter{"times", o.times, kPath, "FILE",
-                        "file with the time of each scan, s [of the recording]"});
+      "columns; interpolated if rows and scans have times [of the recording]"));
+  visitor(plain_text("times", o.times, "FILE",
+                     "file with the time of each scan, s [of the recording]"));
   visitor(Parameter{"frame", o.frame, Bounds(), "", "frame of the points"});
   visitor(Parameter{"invert_poses", c.invert, Bounds(), "",
                     "poses are from the world to the sensor, not from it"});
@@ -103,22 +102,22 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                     "a scan at time t has the pose at t + S, for clocks that differ"});
   visitor(Parameter{"pose_gap", o.pose_gap, closed(0.0, 1000.0), "s",
                     "longest time between two poses of a file for interpolation"});
-  visitor(TextParameter{"cloud_topic", o.cloud_topic, kText, "NAME",
-                        "topic of the clouds of a log [the only one]"});
-  visitor(TextParameter{"frame_id", o.cloud_frame, kText, "NAME",
-                        "frame of the clouds of a log that count, if several sensors share their "
-                        "topic [the only one]"});
-  visitor(TextParameter{"nuscenes_scene", o.scene, kText, "NAME",
-                        "scene of nuScenes, for example scene-0061 [the only one]"});
-  visitor(TextParameter{"pose_topic", o.pose_topic, kText, "NAME",
-                        "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, "
-                        "else TF]"});
-  visitor(TextParameter{"pose_frame_id", o.pose_frame, kText, "NAME",
-                        "take the poses of a log from TF, in this fixed frame [the root of the "
-                        "tree]"});
-  visitor(TextParameter{"sensor_frame", o.sensor_frame, kText, "NAME",
-                        "frame of the lidar in TF of a log; gives the sensor origin [that of the "
-                        "clouds]"});
+  visitor(plain_text("cloud_topic", o.cloud_topic, "NAME",
+                     "topic of the clouds of a log [the only one]"));
+  visitor(plain_text("frame_id", o.cloud_frame, "NAME",
+                     "frame of the clouds of a log that count, if several sensors share their "
+                     "topic [the only one]"));
+  visitor(plain_text("nuscenes_scene", o.scene, "NAME",
+                     "scene of nuScenes, for example scene-0061 [the only one]"));
+  visitor(plain_text("pose_topic", o.pose_topic, "NAME",
+                     "topic of the poses of a log: Odometry, PoseStamped or TF [the only one, "
+                     "else TF]"));
+  visitor(plain_text("pose_frame_id", o.pose_frame, "NAME",
+                     "take the poses of a log from TF, in this fixed frame [the root of the "
+                     "tree]"));
+  visitor(plain_text("sensor_frame", o.sensor_frame, "NAME",
+                     "frame of the lidar in TF of a log; gives the sensor origin [that of the "
+                     "clouds]"));
 }
 
 }  // namespace dynains::program

@@ -6,28 +6,16 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <type_traits>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/config.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/recording/static_policy.hpp"
-#include "labelled_sequence.hpp"
 #include "parameter_values.hpp"
 #include "recording_settings.hpp"
 #include "run_results.hpp"
 
 namespace dynains::program {
-
-/// The number that a text is, for a field that may be empty; without a sign, that of a scan. Throws
-/// ConfigError.
-template <class T>
-std::optional<T> read_number(const std::string& text) {
-  const std::optional<T> value = parse_value<T>(text);
-  if (value) return value;
-  const std::string what = std::is_unsigned_v<T> ? "the number of a scan" : "a number";
-  throw ConfigError("expected " + what + ", found " + text);
-}
 
 struct RunSettings {
   RunOutputs outputs;                   ///< as asked for
@@ -68,19 +56,14 @@ struct RunSettings {
 
 template <class Self, class Visitor>
 void RunSettings::visit_common(Self& self, Visitor&& visitor) {
-  constexpr auto kPath = &read_text<std::filesystem::path>;
   visitor(
       Parameter{"force", self.force, Bounds(), "",
                 "replace the results of an earlier run, and its files of map and write_log, "
                 "when the new ones are complete: until then the earlier ones stay. Nothing else "
                 "is replaced"});
-  visitor(TextParameter{"start", self.window.start, &read_number<std::uint64_t>, "N",
-                        "number of the first scan"});
-  visitor(TextParameter{"end", self.window.end, &read_number<std::uint64_t>, "N",
-                        "number of the last scan (inclusive)"});
-  visitor(
-      TextParameter{"map", self.outputs.map, kPath, "FILE",
-                    "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"});
+  ScanWindow::visit(self.window, visitor);
+  visitor(plain_text("map", self.outputs.map, "FILE",
+                     "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"));
   visitor(Parameter{"passes", self.passes, closed(1, 2), "",
                     "2: after the last scan, scans of the whole recording remove what came or went "
                     "at any time, and bring back what stands; 1: the verdicts of the stream"});
@@ -97,36 +80,33 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
 
 template <class Self, class Visitor>
 void RunSettings::visit_more(Self& self, Visitor&& visitor) {
-  constexpr auto kText = &read_text<std::string>;
-  constexpr auto kPath = &read_text<std::filesystem::path>;
   visitor(Parameter{"map_attributes", self.outputs.map_attributes, Bounds(), "",
                     "the map holds intensity, time and label of its points, as far as scans have "
                     "them; a map of LAS holds its attributes always"});
-  visitor(TextParameter{"crs", self.outputs.crs, kText, "EPSG:N",
-                        "coordinate reference system of the poses, for a map of LAS [none]"});
-  visitor(
-      TextParameter{"update", self.update, kText, "CITY",
-                    "also adds the session to this map of many sessions, a folder, when the run "
-                    "is complete"});
-  visitor(TextParameter{"session", self.session, kText, "NAME",
-                        "name of the session in that map [name of the recording]"});
+  visitor(plain_text("crs", self.outputs.crs, "EPSG:N",
+                     "coordinate reference system of the poses, for a map of LAS [none]"));
+  visitor(plain_text("update", self.update, "CITY",
+                     "also adds the session to this map of many sessions, a folder, when the run "
+                     "is complete"));
+  visitor(plain_text("session", self.session, "NAME",
+                     "name of the session in that map [name of the recording]"));
   visitor(TextParameter{"session_begin", self.session_begin, &read_number<double>, "S",
                         "time by which sessions are ordered [time of the first scan]"});
   visitor(Parameter{"align", self.align, Bounds(), "",
                     "moves the session into the frame of that map: registers scans to its points "
                     "from a start that is within 2 m and 5 degrees; ends before anything is "
                     "written if they do not fit"});
-  visitor(TextParameter{"align_start", self.align_start, kText, "POSE",
-                        "start of the alignment, pose of the session's frame in that of the map: "
-                        "\"x y z qx qy qz qw\", or a file [identity]"});
+  visitor(plain_text("align_start", self.align_start, "POSE",
+                     "start of the alignment, pose of the session's frame in that of the map: "
+                     "\"x y z qx qy qz qw\", or a file [identity]"));
   visitor(Parameter{"write_online", self.outputs.write_online, Bounds(), "",
                     "also write the verdicts without latency, to the folder online"});
   visitor(Parameter{"write_clean", self.outputs.write_clean, Bounds(), "",
                     "also write every scan without its moving points, to the folder clean, in the "
                     "form it has in the recording"});
-  visitor(TextParameter{"write_log", self.outputs.log, kPath, "FILE",
-                        "also write the log of the recording again, as MCAP: all messages as they "
-                        "are, except that clouds of the topic have no moving points"});
+  visitor(plain_text("write_log", self.outputs.log, "FILE",
+                     "also write the log of the recording again, as MCAP: all messages as they "
+                     "are, except that clouds of the topic have no moving points"));
   visitor(Parameter{"mark", self.outputs.mark_log, Bounds(), "",
                     "clouds of that log keep all points and get a field `label` (uint8): 251 "
                     "moving, 9 static, 0 not judged"});
