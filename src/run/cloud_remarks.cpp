@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "dynains/evaluation/text_table.hpp"
+#include "dynains/sensor/mounting.hpp"
 #include "io/points/finite_points.hpp"
 
 namespace dynains::program {
 namespace {
-
-constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
 /// Whether nearly all coordinates of an axis in the frame `file` lie multiples of `step` (m) apart.
 bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::Index axis,
@@ -61,13 +60,12 @@ std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan) {
 
 /// The normal of all scans of a sample that lies nearest to the z axis of the world; empty if they
 /// have none in common.
-std::optional<Eigen::Vector3d> common_normal(const Recording& recording) {
+std::optional<Eigen::Vector3d> common_normal(const Recording& recording, const ScanRange& range) {
   constexpr double kNear = 0.99;  // cosine
-  const std::size_t last = recording.size() - 1;
   std::vector<Eigen::Vector3d> common;
-  for (const std::size_t i : {std::size_t{0}, last / 2, last}) {
+  for (const std::size_t i : range.sample()) {
     const std::vector<Eigen::Vector3d> found = sideways_normals(recording.read_scan(i));
-    if (i == 0) common = found;
+    if (i == range.first) common = found;
     const auto is_missing = [&](const Eigen::Vector3d& normal) {
       return std::none_of(found.begin(), found.end(),
                           [&](const Eigen::Vector3d& n) { return n.dot(normal) > kNear; });
@@ -75,23 +73,11 @@ std::optional<Eigen::Vector3d> common_normal(const Recording& recording) {
     common.erase(std::remove_if(common.begin(), common.end(), is_missing), common.end());
   }
   if (common.empty()) return std::nullopt;
-  const Eigen::Vector3d z_sensor = recording.T_world_sensor(0).linear().row(2);
+  const Eigen::Vector3d z_sensor = recording.T_world_sensor(range.first).linear().row(2);
   return *std::max_element(common.begin(), common.end(),
                            [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
                              return a.dot(z_sensor) < b.dot(z_sensor);
                            });
-}
-
-/// The mounting of a sensor that lies on one of its sides; empty if scans do not show it.
-std::optional<std::string> remark_on_tilt(const Recording& recording) {
-  const auto up = common_normal(recording);
-  if (!up) return std::nullopt;
-  const auto degrees = [](double radians) {
-    return std::to_string(std::lround(kDegrees * radians));
-  };
-  return "the sensor seems to be tilted by " + degrees(std::acos(std::clamp(up->z(), -1.0, 1.0))) +
-         " deg: pass --mounting-pitch " + degrees(std::asin(std::clamp(-up->x(), -1.0, 1.0))) +
-         " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
 }
 
 /// A remark if the points of a scan lie on a grid of 5 cm or more.
@@ -116,11 +102,8 @@ bool is_repeated(const Recording& recording, std::size_t i) {
   return std::memcmp(a.xyzi.data(), b.xyzi.data(), a.xyzi.size() * sizeof(float)) == 0;
 }
 
-}  // namespace
-
 std::optional<std::string> remark_on_stripes(const Recording& recording) {
   constexpr double kLeast = 0.01;  // m
-  if (recording.size() == 0) return std::nullopt;
   const RecordedScan scan = recording.read_scan(0);
   if (recording.frame() != PointFrame::kWorld) return remark_on_grid(scan, Pose::Identity());
   const Pose& T_world_sensor = recording.T_world_sensor(0);
@@ -142,10 +125,9 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
 }
 
 std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {
-  constexpr std::size_t kPlaces = 3;
   constexpr double kLeastMotion = 0.05;  // m
-  for (std::size_t k = 0; k < kPlaces && range.size() > 2; ++k) {
-    const std::size_t first = range.first + k * (range.size() - 3) / (kPlaces - 1);
+  if (range.size() < 3) return std::nullopt;
+  for (const std::size_t first : ScanRange{range.first, range.last - 2}.sample()) {
     for (std::size_t i = first; i < first + 2; ++i) {
       const Pose T = recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + 1);
       if (T.translation().norm() > kLeastMotion && is_repeated(recording, i)) {
@@ -157,21 +139,28 @@ std::optional<std::string> remark_on_copies(const Recording& recording, const Sc
   return std::nullopt;
 }
 
-std::optional<std::string> remark_on_mounting(const Recording& recording,
-                                              const Mounting& mounting) {
-  if (mounting.known || recording.size() == 0) return std::nullopt;
-  const auto tilt = remark_on_tilt(recording);
-  if (tilt) return tilt;
-  return "no ground in sight below the sensor, so that height and tilt are not known; if it is "
-         "tilted by more than 45 deg: --mounting-pitch, --mounting-roll";
+}  // namespace
+
+std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range) {
+  std::vector<std::string> remarks;
+  for (auto& remark : {remark_on_stripes(recording), remark_on_copies(recording, range)}) {
+    if (remark) remarks.push_back(*remark);
+  }
+  return remarks;
 }
 
-std::optional<std::string> remark_on_tilted_scans(const Recording& recording,
-                                                  const ScanRange& range) {
-  for (const std::size_t i : {range.first, range.first + range.size() / 2, range.last}) {
+std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range) {
+  for (const std::size_t i : range.sample()) {
     if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
   }
-  return remark_on_tilt(recording);
+  const auto up = common_normal(recording, range);
+  if (!up) return std::nullopt;
+  const auto degrees = [](double radians) {
+    return std::to_string(std::lround(180.0 / M_PI * radians));
+  };
+  return "the sensor seems to be tilted by " + degrees(std::acos(std::clamp(up->z(), -1.0, 1.0))) +
+         " deg: pass --mounting-pitch " + degrees(std::asin(std::clamp(-up->x(), -1.0, 1.0))) +
+         " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
 }
 
 }  // namespace dynains::program

@@ -13,12 +13,10 @@
 namespace dynains::program {
 namespace {
 
-constexpr double kDegreesPerRadian = 180.0 / 3.14159265358979323846;
-
 /// "12 cm and 0.3 deg from one scan to the next".
 std::string error_text(const Diagnosis& d) {
   return evaluation::format_number(100.0 * d.translation_error, 0) + " cm and " +
-         evaluation::format_number(kDegreesPerRadian * d.rotation_error, 1) +
+         evaluation::format_number(180.0 / M_PI * d.rotation_error, 1) +
          " deg from one scan to the next";
 }
 

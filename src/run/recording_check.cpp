@@ -57,11 +57,16 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
 /// Adds the findings that need more scans than the diagnosis reads. Throws IoError.
 void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
   if (recording.size() == 0) return;
-  for (const auto& remark :
-       {remark_on_stripes(recording), remark_on_copies(recording, {0, recording.size() - 1}),
-        remark_on_mounting(recording, d.mounting)}) {
-    if (remark) text << "note: " << *remark << '\n';
+  for (const std::string& remark : remarks_on_clouds(recording, whole_of(recording))) {
+    text << "note: " << remark << '\n';
   }
+  if (d.mounting.known) return;
+  text << "note: "
+       << remark_on_tilt(recording, whole_of(recording))
+              .value_or(
+                  "no ground in sight below the sensor, so that height and tilt are not known; if "
+                  "it is tilted by more than 45 deg: --mounting-pitch, --mounting-roll")
+       << '\n';
 }
 
 /// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
@@ -124,7 +129,7 @@ RecordingCheck check_recording(const Recording& recording) {
   check.findings = describe(recording, check.diagnosis);
   std::optional<std::string> lone;
   if (recording.size() > 1) {
-    lone = remark_on_lone_scans(recording, {0, recording.size() - 1}, RemoverConfig());
+    lone = remark_on_lone_scans(recording, whole_of(recording), RemoverConfig());
   }
   check.passed = sound && !lone;
   if (!lone || !sound) check.advice = advice(recording, check.diagnosis) + '\n';

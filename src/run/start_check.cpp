@@ -45,7 +45,7 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
                   bool unit_is_given) {
   constexpr double kFarthestReturn = 250.0;  // m, of most points of a LiDAR
   std::vector<double> ranges;
-  for (const std::size_t i : {range.first, range.first + range.size() / 2, range.last}) {
+  for (const std::size_t i : range.sample()) {
     add_ranges(recording.read_scan(i), ranges);
   }
   if (ranges.empty()) return;
@@ -103,10 +103,9 @@ StartCheck check_start(const Recording& recording, const ScanRange& range,
     if (remark) result.warnings.push_back(*remark);
   };
   warn_if(remark_on_lone_scans(recording, range, config));
-  warn_if(remark_on_stripes(recording));
-  warn_if(remark_on_copies(recording, range));
+  for (const std::string& text : remarks_on_clouds(recording, range)) warn_if(text);
   if (config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0) {
-    warn_if(remark_on_tilted_scans(recording, range));
+    warn_if(remark_on_tilt(recording, range));
   }
   return result;
 }
