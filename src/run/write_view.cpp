@@ -48,8 +48,8 @@ class Collector {
         max_points_(max_points),
         // A third is left for the moving points.
         static_(max_points - max_points / 3, std::max(map_voxel, kSmallestCell),
-                ThinnedPoints::Time::kAllScans),
-        moving_(max_points, kSmallestCell, ThinnedPoints::Time::kSeparateScans) {
+                ViewPoint::kMostScans + 1),
+        moving_(max_points, kSmallestCell, 1) {
     if (range.size() > ViewPoint::kMostScans) {
       throw ConfigError("a page shows at most 65535 scans, not " + std::to_string(range.size()));
     }

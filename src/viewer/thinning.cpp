@@ -20,8 +20,8 @@ std::uint64_t mixed(std::uint64_t value) {
 
 }  // namespace
 
-ThinnedPoints::ThinnedPoints(std::size_t budget, double cell, Time time)
-    : budget_(budget), cell_(cell), time_(time) {}
+ThinnedPoints::ThinnedPoints(std::size_t budget, double cell, std::size_t scans)
+    : budget_(budget), cell_(cell), scans_per_cell_(scans) {}
 
 void ThinnedPoints::add(const ViewPoint& point) {
   if (!is_first(point)) return;
@@ -37,8 +37,7 @@ std::vector<ViewPoint> ThinnedPoints::take(std::size_t most) {
 }
 
 bool ThinnedPoints::is_first(const ViewPoint& point) {
-  std::uint64_t key =
-      time_ == Time::kSeparateScans ? std::uint64_t{point.scan} / scans_per_cell_ : 0;
+  std::uint64_t key = point.scan / scans_per_cell_;
   for (int axis = 0; axis < 3; ++axis) {
     const double cell = std::floor(static_cast<double>(point.local[axis]) / cell_);
     key = mixed(key) + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
@@ -47,11 +46,10 @@ bool ThinnedPoints::is_first(const ViewPoint& point) {
 }
 
 void ThinnedPoints::thin() {
-  if (cell_ < kWidestCell || time_ == Time::kAllScans) {
+  if (cell_ < kWidestCell || scans_per_cell_ > ViewPoint::kMostScans) {
     cell_ *= kGrowth;
   } else {
     scans_per_cell_ *= 2;
-    if (scans_per_cell_ > ViewPoint::kMostScans) time_ = Time::kAllScans;
   }
   occupied_.clear();
   std::size_t kept = 0;

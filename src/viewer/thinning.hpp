@@ -11,13 +11,11 @@
 namespace dynains::viewer {
 
 /// Keeps one point per cell and scan, the first one. Cells grow until at most `budget` points are
-/// left; when they are 0.6 m wide, neighbouring scans share cells as well. Same input, same points.
+/// left; when they are 0.6 m wide, more and more scans share them first. Same input, same points.
 class ThinnedPoints {
  public:
-  enum class Time { kSeparateScans, kAllScans };
-
-  /// `cell`: edge of the first cells, m.
-  ThinnedPoints(std::size_t budget, double cell, Time time);
+  /// `cell`: edge of the first cells, m. `scans`: so many in a row share the first cells.
+  ThinnedPoints(std::size_t budget, double cell, std::size_t scans);
 
   void add(const ViewPoint& point);
 
@@ -30,8 +28,7 @@ class ThinnedPoints {
 
   std::size_t budget_;
   double cell_;
-  Time time_;
-  unsigned scans_per_cell_ = 1;
+  std::size_t scans_per_cell_;
   std::vector<ViewPoint> points_;
   std::unordered_set<std::uint64_t> occupied_;
 };

@@ -13,15 +13,15 @@
 
 namespace dynains::viewer {
 
-/// Verdict of a run on a point, as the label files have it.
-enum class ViewLabel : std::uint8_t { kNotJudged = 0, kStatic = 1, kMoving = 2 };
+/// Verdict of a run on a point. The page has the numbers of these and of ViewTruth, from 0.
+enum class ViewLabel : std::uint8_t { kNotJudged, kStatic, kMoving };
 
 /// Ground truth of a point.
 enum class ViewTruth : std::uint8_t {
-  kUnknown = 0,
-  kStatic = 1,  ///< ground
-  kMoving = 2,
-  kStaticObject = 3,  ///< anything else that stands
+  kUnknown,
+  kStatic,  ///< ground
+  kMoving,
+  kStaticObject,  ///< anything else that stands
 };
 
 /// A measured point with its verdict.
