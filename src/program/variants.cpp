@@ -10,59 +10,44 @@
 namespace dynains::program {
 namespace {
 
-/// Both passes over the window for one variant.
-class RevisedVerdicts {
- public:
-  RevisedVerdicts(std::size_t scans, const FreeSpaceConfig& evidence)
-      : evidence_(evidence), verdicts_(scans) {}
+/// What the second pass needs of the first.
+struct FirstPass {
+  explicit FirstPass(std::size_t scans) : verdicts(scans) {}
 
-  void compare(const FrameResult& frame) { compared_.add(frame); }
-  void take(const ScanVerdict& verdict) { verdicts_[verdict.scan].take(verdict, false); }
+  std::vector<VerdictArrays> verdicts;
+  ComparedPoses compared;
+};
 
-  /// Calls `visit(verdict)` with the verdicts of the second pass.
-  template <class Visitor>
-  void revise(LabelledSequence& sequence, Visitor&& visit) {
-    MemoryStore store;
-    SecondPassConfig config;
-    config.evidence = evidence_;
-    SecondPass pass(store, config);
-    for_each_scan(sequence, [&](const ScanVerdict& verdict) {
-      pass.add(points_, verdict, compared_[verdict.scan]);
-    });
-    pass.test();
-    for_each_scan(sequence, [&](const ScanVerdict& verdict) {
-      pass.revise(points_, static_cast<std::uint32_t>(verdict.scan), verdicts_[verdict.scan]);
-      visit(verdict);
-    });
-  }
-
- private:
-  // Calls `visit(verdict)`, which refers to the arrays, with the points of the scan in points_.
-  template <class Visitor>
-  void for_each_scan(LabelledSequence& sequence, Visitor&& visit) {
-    evaluation::LabelledScan scan;
+/// Revises the verdicts. Calls `visit(verdict)` with the revised ones.
+template <class Visitor>
+void revise(LabelledSequence& sequence, const FreeSpaceConfig& evidence, FirstPass& first,
+            Visitor&& visit) {
+  MemoryStore store;
+  SecondPassConfig config;
+  config.evidence = evidence;
+  SecondPass pass(store, config);
+  evaluation::LabelledScan scan;
+  PointBuffer points;
+  for (const bool is_tested : {false, true}) {
+    if (is_tested) pass.test();
     for (std::size_t i = 0; sequence.read(i, scan); ++i) {
-      points_.clear();
+      points.clear();
       for (std::size_t p = 0; p < scan.size(); ++p) {
         const float* const at = scan.xyz + p * scan.stride;
-        points_.push_back(at[0], at[1], at[2]);
+        points.push_back(at[0], at[1], at[2]);
       }
-      ScanVerdict verdict;
-      verdict.scan = i;
-      verdict.time = scan.time;
-      verdict.T_world_sensor = orthonormalized(scan.T_world_sensor);
-      verdict.labels = verdicts_[i].labels;
-      verdict.causes = verdicts_[i].causes;
-      verdict.instances = verdicts_[i].instances;
-      visit(verdict);
+      VerdictArrays& arrays = first.verdicts[i];
+      const ScanVerdict verdict =
+          arrays.verdict(i, scan.time, orthonormalized(scan.T_world_sensor));
+      if (is_tested) {
+        pass.revise(points, static_cast<std::uint32_t>(i), arrays);
+        visit(verdict);
+      } else {
+        pass.add(points, verdict, first.compared[i]);
+      }
     }
   }
-
-  FreeSpaceConfig evidence_;
-  std::vector<VerdictArrays> verdicts_;
-  ComparedPoses compared_;
-  PointBuffer points_;
-};
+}
 
 }  // namespace
 
@@ -87,10 +72,10 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   };
 
   std::vector<DynaInsRemover> removers;
-  std::vector<std::optional<RevisedVerdicts>> revised(variants.size());
+  std::vector<std::optional<FirstPass>> first(variants.size());
   const auto take_first = [&](std::size_t variant, const ScanVerdict& verdict) {
-    if (revised[variant]) {
-      revised[variant]->take(verdict);
+    if (first[variant]) {
+      first[variant]->verdicts[verdict.scan].take(verdict, false);
     } else {
       take(variant, verdict);
     }
@@ -98,7 +83,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
-    if (variant.passes > 1) revised[removers.size()].emplace(sequence.size(), config.evidence);
+    if (variant.passes > 1) first[removers.size()].emplace(sequence.size());
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;
@@ -109,7 +94,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
         return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
                                 scan.T_world_sensor, scan.time);
       });
-      if (revised[v]) revised[v]->compare(frame);
+      if (first[v]) first[v]->compared.add(frame);
       if (answer == Answer::kNewest) {
         take(v, frame.newest);
       } else if (frame.finished) {
@@ -121,9 +106,10 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   if (answer == Answer::kFinal) {
     for (std::size_t v = 0; v < removers.size(); ++v) {
       removers[v].flush([&](const ScanVerdict& verdict) { take_first(v, verdict); });
-      if (!revised[v]) continue;
-      revised[v]->revise(sequence, [&](const ScanVerdict& verdict) { take(v, verdict); });
-      revised[v].reset();
+      if (!first[v]) continue;
+      revise(sequence, variants[v].config.evidence, *first[v],
+             [&](const ScanVerdict& verdict) { take(v, verdict); });
+      first[v].reset();
     }
   }
   return in_map;

@@ -139,22 +139,10 @@ void RunResults::take_newest(const FrameResult& frame) {
       [this, i = range_.first + verdict.scan] { online_labels_->write(recording_.name(i)); });
 }
 
-void JudgedScan::take(const ScanVerdict& other, bool with_beliefs) {
-  arrays.take(other, with_beliefs);
-  verdict = other;
-  refer_to_arrays();
-}
-
-void JudgedScan::refer_to_arrays() {
-  verdict.labels = arrays.labels;
-  verdict.instances = arrays.instances;
-  verdict.beliefs = arrays.beliefs;
-  verdict.causes = arrays.causes;
-}
-
 void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
-  judged_.take(verdict, needs_beliefs_);
+  judged_.arrays.take(verdict, needs_beliefs_);
+  judged_.verdict = judged_.arrays.verdict(verdict.scan, verdict.time, verdict.T_world_sensor);
   judged_.compared = compared_[verdict.scan];
   if (scan != nullptr) std::swap(judged_.scan, *scan);
   writing_.begin([this, reads = scan == nullptr] {
@@ -187,7 +175,6 @@ void RunResults::revise(const StaticMapAccumulator::Config& map,
   JudgedScan judged;
   for (std::size_t i = 0; i < finished_; ++i) {
     const std::size_t index = range_.first + i;
-    const Pose T_world_sensor = orthonormalized(recording_.T_world_sensor(index));
     judged.scan = reader.next(std::move(judged.scan));
     copy_points(judged.scan, judged.points);
     final_labels_.read(recording_.name(index), judged.scan, judged.arrays);
@@ -195,11 +182,8 @@ void RunResults::revise(const StaticMapAccumulator::Config& map,
         second_pass_->revise(judged.points, static_cast<std::uint32_t>(i), judged.arrays);
     finish();
     std::swap(judged_, judged);
-    judged_.verdict = ScanVerdict();
-    judged_.verdict.scan = i;
-    judged_.verdict.time = recording_.time(index);
-    judged_.verdict.T_world_sensor = T_world_sensor;
-    judged_.refer_to_arrays();
+    judged_.verdict = judged_.arrays.verdict(i, recording_.time(index),
+                                             orthonormalized(recording_.T_world_sensor(index)));
     writing_.begin([this, is_revised] { write_revised(is_revised); });
     progress(i + 1);
   }

@@ -88,10 +88,6 @@ struct JudgedScan {
   ComparedPose compared;
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
-
-  /// Copies the verdict; without `with_beliefs`, the copy has none.
-  void take(const ScanVerdict& other, bool with_beliefs);
-  void refer_to_arrays();
 };
 
 /// Takes verdicts as they come and streams them to files.

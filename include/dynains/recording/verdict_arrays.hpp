@@ -23,6 +23,11 @@ struct VerdictArrays {
     beliefs.clear();
     if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
   }
+
+  /// A verdict with these arrays, which outlive it.
+  ScanVerdict verdict(std::uint64_t scan, double time, const Pose& T_world_sensor) const {
+    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+  }
 };
 
 }  // namespace dynains
