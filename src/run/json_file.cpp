@@ -31,7 +31,7 @@ std::string reason_of(const nlohmann::json::exception& error) {
 }  // namespace
 
 Json read_json_file(const fs::path& path) {
-  const std::string text = read_text_file(path, kMaxJsonBytes);
+  const std::string text = read_text_file(path);
   // Many functions of the JSON library call themselves for each level.
   const auto check_depth = [&](int depth, Json::parse_event_t event, const Json&) {
     const bool begins =

@@ -1,7 +1,6 @@
 // JSON files from untrusted sources.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,8 +13,6 @@ namespace dynains::program {
 
 /// Arrays and objects within each other that a JSON file may have.
 inline constexpr int kMaxJsonDepth = 64;
-/// Bytes that a JSON file may have.
-inline constexpr std::uint64_t kMaxJsonBytes = std::uint64_t{64} << 20U;
 
 /// Reads a JSON file. Throws IoError with path, line, column and expectation.
 nlohmann::ordered_json read_json_file(const std::filesystem::path& path);
@@ -32,12 +29,16 @@ std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::o
   const nlohmann::ordered_json::json_pointer where(pointer);
   if (!json.contains(where) || json[where].is_null()) return std::nullopt;
   const nlohmann::ordered_json& value = json[where];
-  constexpr bool kIsBool = std::is_same_v<T, bool>, kIsNumber = std::is_same_v<T, double>;
-  const bool fits = kIsBool     ? value.is_boolean()
-                    : kIsNumber ? value.is_number()
-                                : value.is_string();
+  const char* expected = "a string";
+  bool fits = value.is_string();
+  if constexpr (std::is_same_v<T, bool>) {
+    expected = "true or false";
+    fits = value.is_boolean();
+  } else if constexpr (std::is_same_v<T, double>) {
+    expected = "a number";
+    fits = value.is_number();
+  }
   if (fits) return value.get<T>();
-  const char* const expected = kIsBool ? "true or false" : kIsNumber ? "a number" : "a string";
   throw IoError(path.string() + ": " + pointer + ": expected " + expected + ", found " +
                 value.type_name());
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "io/text.hpp"
 
@@ -78,9 +79,8 @@ LasOptions las_options_near(const Eigen::Vector3d& position) {
 }
 
 double las_intensity_scale(float most) {
-  constexpr double kMost = 65535.0;
   if (!(most > 0.0F && most <= 255.0F)) return 1.0;
-  return kMost / (most <= 1.0F ? 1.0 : 255.0);
+  return std::numeric_limits<std::uint16_t>::max() / (most <= 1.0F ? 1.0 : 255.0);
 }
 
 }  // namespace dynains::program

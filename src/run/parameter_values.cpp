@@ -42,8 +42,7 @@ std::string format_value(double value) { return format_real(value); }
 std::string format_value(float value) { return format_real(value); }
 
 ParameterValues read_config_file(const std::filesystem::path& path) {
-  constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20U;
-  std::istringstream file(read_text_file(path, kMaxBytes));
+  std::istringstream file(read_text_file(path));
   ParameterValues values;
   std::map<std::string, std::size_t> seen;
   std::size_t number = 0;

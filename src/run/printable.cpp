@@ -1,5 +1,7 @@
 #include "printable.hpp"
 
+#include <array>
+#include <cstdio>
 #include <utility>
 
 namespace dynains::program {
@@ -8,8 +10,9 @@ namespace {
 constexpr unsigned char kLeadOfControls = 0xC2;  // first byte of U+0080 to U+00BF
 
 std::string escaped(unsigned char c) {
-  constexpr const char* kDigits = "0123456789ABCDEF";
-  return {'\\', 'x', kDigits[c / 16], kDigits[c % 16]};
+  std::array<char, 5> code{};
+  std::snprintf(code.data(), code.size(), "\\x%02X", static_cast<unsigned>(c));
+  return code.data();
 }
 
 bool is_control(unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; }

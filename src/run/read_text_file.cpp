@@ -8,12 +8,12 @@
 
 namespace dynains::program {
 
-std::string read_text_file(const std::filesystem::path& path, std::uint64_t max_bytes) {
+std::string read_text_file(const std::filesystem::path& path) {
   std::ifstream file = open_input(path);
   const std::uintmax_t size = std::filesystem::file_size(path);
-  if (size > max_bytes) {
+  if (size > kMaxTextBytes) {
     throw IoError(path.string() + ": has " + std::to_string(size) + " bytes, more than " +
-                  std::to_string(max_bytes));
+                  std::to_string(kMaxTextBytes));
   }
   std::string text(static_cast<std::size_t>(size), '\0');
   file.read(text.data(), static_cast<std::streamsize>(size));

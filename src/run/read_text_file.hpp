@@ -7,8 +7,10 @@
 
 namespace dynains::program {
 
-/// The bytes of a regular file of at most `max_bytes`. Throws IoError, also for a folder, a device
-/// or a larger file.
-std::string read_text_file(const std::filesystem::path& path, std::uint64_t max_bytes);
+/// Bytes that a text file may have.
+inline constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20U;
+
+/// The bytes of a regular file. Throws IoError, also for a folder, a device or a larger file.
+std::string read_text_file(const std::filesystem::path& path);
 
 }  // namespace dynains::program
