@@ -38,11 +38,12 @@ void find_closures(const Recording& recording, const CheckFlags& flags) {
 
 void check(const CheckFlags& given) {
   const RecordingFlags& flags = given.recording;
-  const Recording recording(flags.folder(), flags.options());
+  const Recording recording(flags.folder, flags.settings.checked());
   const RecordingCheck check = check_recording(recording);
   std::cout << check.findings << check.advice << std::flush;
   if (!check.flags.empty()) {
-    std::cout << "    dynains run " << flags.as_given(check.flags) << " --out OUT\n";
+    std::cout << "    dynains run " << flags.settings.as_given(flags.folder, check.flags)
+              << " --out OUT\n";
   }
   std::cout << check.remark << std::flush;
   if (!given.closures.empty()) find_closures(recording, given);

@@ -75,13 +75,12 @@ double edge_by_spacing(const std::vector<Eigen::Vector3d>& map, double least) {
 /// Interrupted.
 void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
                MapAlignment& alignment, MapVotes& votes) {
-  const auto& names = out.listing().scans;
-  Progress progress(names.size(), "scans", quiet);
+  const std::vector<std::size_t> scans = scans_of_run(out, recording);
+  Progress progress(scans.size(), "scans", quiet);
   RecordedScan scan;
   PointBuffer standing;
   std::size_t done = 0;
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (names.count(listed_name(recording.name(i))) == 0) continue;
+  for (const std::size_t i : scans) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     recording.read_scan(i, scan);
     const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
@@ -104,9 +103,6 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
     }
     progress.update(++done);
   }
-  if (done == names.size()) return;
-  throw IoError(recording.folder().string() + ": has " + std::to_string(done) + " of the " +
-                std::to_string(names.size()) + " scans of the run; expected its recording");
 }
 
 struct Verdicts {
@@ -135,8 +131,8 @@ Verdicts judge(const MapVotes& votes, std::size_t count, const fs::path& map) {
 void clean(CleanOptions& options) {
   const fs::path target = whole_path(target_of(options));
   const ResultFolder out = open_finished_run(options.run);
-  const Recording recording = options.sequence.open_of_run(
-      out.marker_path(), out.marker(), "dynains clean " + options.map + ' ' + options.run);
+  const Recording recording =
+      options.sequence.open_of_run(out, "dynains clean " + options.map + ' ' + options.run);
   InputFiles inputs(recording);
   for (const fs::path& read :
        {fs::path(options.map), recording.scan_folder(), out.path(), out.path() / "labels"}) {

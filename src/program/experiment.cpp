@@ -141,8 +141,9 @@ std::vector<Variant> table1_variants() {
 
 void table1(const Table1Options& options) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
-  const std::vector<Task> tasks = find_tasks(options.sequence.folder(), options.window);
-  if (tasks.size() > 1 && options.sequence.names_files()) {
+  const std::vector<Task> tasks = find_tasks(options.sequence.folder, options.window);
+  const RecordingOptions& files = options.sequence.settings.options;
+  if (tasks.size() > 1 && !(files.poses.empty() && files.times.empty())) {
     throw ConfigError("--poses and --times need one sequence, not " + std::to_string(tasks.size()));
   }
   const std::vector<Variant> variants = table1_variants();

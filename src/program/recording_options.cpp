@@ -3,7 +3,6 @@
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "run/json_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -14,7 +13,7 @@ constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ fi
 
 RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required) {
   command
-      .add_option("SEQ", folder_,
+      .add_option("SEQ", folder,
                   what +
                       ": KITTI or SemanticKITTI folder (velodyne/, poses.txt; optional calib.txt, "
                       "times.txt), folder of scans (.pcd, .ply, .bin, .las, .npy, .xyz or "
@@ -23,30 +22,27 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->required(required)
       ->type_name("");
   RecordingSettings::visit(
-      settings_, SettingFlags{command, kGroup, [this](const auto& flag, const auto& text) {
-                                settings_.flags[flag] = text;
-                              }});
+      settings, SettingFlags{command, kGroup, [this](const auto& flag, const auto& text) {
+                               settings.flags[flag] = text;
+                             }});
 }
 
-Recording RecordingFlags::open_of_run(const std::filesystem::path& report_file,
-                                      const nlohmann::ordered_json& report,
-                                      const std::string& command) {
-  const auto folder = required_json_field<std::string>(report_file, report, "/sequence");
-  if (folder_.empty()) folder_ = folder;
+Recording RecordingFlags::open_of_run(const ResultFolder& out, const std::string& command) {
+  if (folder.empty()) folder = out.field<std::string>("/sequence");
   try {
-    complete(report.value("sequence_flags", nlohmann::ordered_json::object()));
+    settings.complete(out.marker().value("sequence_flags", nlohmann::ordered_json::object()));
   } catch (const ConfigError& error) {
-    throw IoError(report_file.string() + ": /sequence_flags: " + error.what());
+    throw IoError(out.marker_path().string() + ": /sequence_flags: " + error.what());
   }
-  if (!std::filesystem::exists(folder_)) {
-    throw IoError(folder_ + ": no such recording; name the place of the run's recording: " +
-                  command + " SEQ");
+  if (!std::filesystem::exists(folder)) {
+    throw IoError(
+        folder + ": no such recording; name the place of the run's recording: " + command + " SEQ");
   }
   return open();
 }
 
-Recording RecordingFlags::open(const std::filesystem::path& folder) const {
-  Recording recording(folder, settings_.checked());
+Recording RecordingFlags::open(const std::filesystem::path& other) const {
+  Recording recording(other, settings.checked());
   for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }
@@ -56,13 +52,13 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
        {"--poses", "--invert-poses", "--pose-units", "--pose-scale", "--quaternion-order",
         "--pose-frame", "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset",
         "--pose-gap", "--pose-topic", "--pose-frame-id"}) {
-    if (!settings_.flags.contains(flag)) continue;
+    if (!settings.flags.contains(flag)) continue;
     throw ConfigError(std::string(flag) + " tells of given poses, which the odometry does not use");
   }
-  RecordingOptions options = settings_.checked();
+  RecordingOptions options = settings.checked();
   options.without_poses = true;
   options.is_compensated = is_compensated;
-  Recording recording(folder_, options);
+  Recording recording(folder, options);
   for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }

@@ -4,7 +4,6 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,6 @@
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/json_file.hpp"
 #include "run/label_writer.hpp"
 #include "run/naming_scan.hpp"
 #include "run/output_folder.hpp"
@@ -47,64 +45,27 @@ struct RemapOptions {
   bool quiet = false;
 };
 
-/// The finished run whose labels are used.
-struct EarlierRun {
-  fs::path report_file;
-  Json report;
-  std::set<std::string> scans;
-  bool has_points_in_world = false;
-  double map_voxel = 0.0;  // m
-};
-
-EarlierRun read_run(const ResultFolder& out) {
-  EarlierRun run;
-  run.report_file = out.marker_path();
-  run.report = out.marker();
-  run.scans = out.listing().scans;
-  run.has_points_in_world =
-      required_json_field<bool>(run.report_file, run.report, "/request/points_in_world");
-  run.map_voxel =
-      required_json_field<double>(run.report_file, run.report, "/configuration/map_voxel");
-  return run;
-}
-
 /// The recording with the poses for the new map.
-Recording open_corrected(const RemapOptions& options, const EarlierRun& run) {
-  RecordingOptions corrected = options.sequence.options();
-  corrected.frame = run.has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
-  return Recording(options.sequence.folder(), corrected);
+Recording open_corrected(const RecordingFlags& flags, bool has_points_in_world) {
+  RecordingOptions corrected = flags.settings.checked();
+  corrected.frame = has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
+  return Recording(flags.folder, corrected);
 }
 
-/// Indices of the scans of the run. Throws IoError if the recording lacks one.
-std::vector<std::size_t> scans_of(const Recording& recording, const EarlierRun& run) {
-  std::vector<std::size_t> scans;
-  std::set<std::string> missing = run.scans;
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (missing.erase(listed_name(recording.name(i))) > 0) scans.push_back(i);
-  }
-  if (missing.empty()) return scans;
-  throw IoError(recording.folder().string() + ": has no pose or no scan for " +
-                std::to_string(missing.size()) + " of " + std::to_string(run.scans.size()) +
-                " scans of the run, " + *missing.begin() +
-                " first; expected the recording of the run, and a pose for each of its scans");
-}
-
-/// The recording as the run read it, if its points are in the frame of the world: the poses of the
-/// run lead back to the frame of the sensor. Empty for points in the frame of the sensor.
-std::optional<Recording> open_original(const RemapOptions& options, const EarlierRun& run) {
-  if (!run.has_points_in_world) return std::nullopt;
-  RecordingOptions original = options.sequence.options();
+/// The recording as the run read it, whose points are in the frame of the world: the poses of the
+/// run lead back to the frame of the sensor.
+Recording open_original(const RecordingFlags& flags, const ResultFolder& out) {
+  RecordingOptions original = flags.settings.checked();
   original.poses.clear();
   original.pose_topic.clear();
   original.pose_frame.clear();
   original.time_offset = 0.0;
   original.convention.T_body_sensor.setIdentity();
   original.frame = PointFrame::kWorld;
-  Recording recording(options.sequence.folder(), original);
-  const std::vector<std::size_t> scans = scans_of(recording, run);
+  Recording recording(flags.folder, original);
+  const std::vector<std::size_t> scans = scans_of_run(out, recording);
   const std::string now = pose_fingerprint(recording, {scans.front(), scans.back()});
-  if (now !=
-      required_json_field<std::string>(run.report_file, run.report, "/request/poses_and_times")) {
+  if (now != out.field<std::string>("/request/poses_and_times")) {
     throw IoError(recording.folder().string() +
                   ": points are in the frame of the world, and the poses of the recording are not "
                   "those of the run, which lead back to the frame of the sensor");
@@ -146,9 +107,8 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
     original.read_scan(i, scan);
     copy_points(scan, points);
     files.read(original.name(i), scan, arrays);
-    ScanVerdict verdict;
-    verdict.labels = arrays.labels;
-    verdict.T_world_sensor = orthonormalized(corrected.T_world_sensor(i));
+    const ScanVerdict verdict =
+        arrays.verdict(i, original.time(i), orthonormalized(corrected.T_world_sensor(i)));
     const std::vector<std::uint8_t> keep =
         static_points(points, arrays.labels, folder / "labels" / (original.name(i) + ".label"));
     map.insert(points, keep, verdict.T_world_sensor);
@@ -164,11 +124,12 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
 }
 
 /// The session that --update replaces.
-SessionRequest session_of(const RemapOptions& options, const EarlierRun& run,
+SessionRequest session_of(const RemapOptions& options, const ResultFolder& out,
                           const std::string& fingerprint) {
   std::string name = options.session;
   if (name.empty()) {
-    const auto of_run = json_field<std::string>(run.report_file, run.report, "/request/session");
+    const auto of_run =
+        json_field<std::string>(out.marker_path(), out.marker(), "/request/session");
     if (!of_run) throw ConfigError("the run has added no session; name one by --session");
     name = *of_run;
   }
@@ -186,16 +147,17 @@ class NewMap {
     if (is_las(path_)) {
       throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
     }
-    if (path_.parent_path() != folder) {
-      outside_.emplace(path_, options.force, inputs);
-    } else if (path_.filename() == kRemappedMap) {
-      added_.emplace(out, kRemappedMap);
-    } else {
+    is_inside_ = path_.parent_path() == folder;
+    if (is_inside_ && path_.filename() != kRemappedMap) {
       throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
                         kRemappedMap);
     }
-    writer_ =
-        open_map(outside_ ? outside_->path() : added_->path(), recording, range, RunOutputs());
+    if (is_inside_) {
+      file_.emplace(out, kRemappedMap);
+    } else {
+      file_.emplace(path_, options.force, inputs);
+    }
+    writer_ = open_map(file_->path(), recording, range, RunOutputs());
   }
 
   const fs::path& path() const { return path_; }
@@ -205,15 +167,15 @@ class NewMap {
   void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
     map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
     writer_->commit();
-    if (outside_) {
-      publish_more();
-      return outside_->put_in_place();
-    }
+    if (!is_inside_) return file_->put_in_place(publish_more);
     Json report = out_.marker();
     report.erase(kField);
-    added_->put_in_place(report, publish_more);
+    file_->put_in_place([&] {
+      out_.mark_with(report, kRemappedMap);
+      publish_more();
+    });
     report[kField] = description;
-    out_.mark(report, OutputListing(out_.listing()));
+    out_.mark_with(report, kRemappedMap);
   }
 
  private:
@@ -221,18 +183,10 @@ class NewMap {
 
   ResultFolder& out_;
   fs::path path_;
-  std::optional<OutputFile> outside_;
-  std::optional<AddedFile> added_;
+  bool is_inside_ = false;  // the folder of the run
+  std::optional<OutputFile> file_;
   std::unique_ptr<MapFile> writer_;
 };
-
-void check_run_folder(const fs::path& folder) {
-  std::error_code error;
-  const fs::file_type type = fs::status(folder, error).type();
-  if (type == fs::file_type::directory) return;
-  if (type == fs::file_type::none) throw IoError(folder.string() + ": " + error.message());
-  throw IoError(folder.string() + ": is not a folder; expected the results of dynains run");
-}
 
 void check_poses(const Recording& recording, const std::vector<std::size_t>& scans) {
   for (const std::size_t i : scans) {
@@ -242,24 +196,26 @@ void check_poses(const Recording& recording, const std::vector<std::size_t>& sca
 }
 
 /// The flags that tell how the points of the run are stored.
-Json point_flags(const EarlierRun& run) {
+Json point_flags(const ResultFolder& out) {
   Json flags = Json::object();
-  for (const char* const flag : kPointFlags) {
-    const auto& request = run.report.at("request");
-    if (request.contains(flag)) flags[flag] = request[flag];
+  const Json of_run = out.marker().value("sequence_flags", Json::object());
+  for (const char* const flag :
+       {"--point-units", "--point-time-unit", "--bin-columns", "--self-box"}) {
+    if (of_run.contains(flag)) flags[flag] = of_run[flag];
   }
   return flags;
 }
 
 void remap(RemapOptions& options) {
-  check_run_folder(options.run);
   ResultFolder out = open_finished_run(options.run);
-  const EarlierRun run = read_run(out);
-  options.sequence.complete(point_flags(run));
-  const Recording corrected = open_corrected(options, run);
-  const std::vector<std::size_t> scans = scans_of(corrected, run);
+  const bool has_points_in_world = out.field<bool>("/request/points_in_world");
+  const double map_voxel = out.field<double>("/configuration/map_voxel");
+  options.sequence.settings.complete(point_flags(out));
+  const Recording corrected = open_corrected(options.sequence, has_points_in_world);
+  const std::vector<std::size_t> scans = scans_of_run(out, corrected);
   check_poses(corrected, scans);
-  const std::optional<Recording> original = open_original(options, run);
+  std::optional<Recording> original;
+  if (has_points_in_world) original.emplace(open_original(options.sequence, out));
   const ScanRange range{scans.front(), scans.back()};
   InputFiles inputs(corrected);
   if (original) inputs.add(*original);
@@ -270,10 +226,10 @@ void remap(RemapOptions& options) {
   const std::string fingerprint = pose_fingerprint(corrected, range);
   std::optional<SessionContribution> session;
   if (!options.update.empty()) {
-    session.emplace(session_of(options, run, fingerprint), SessionWriter::Mode::kReplace);
+    session.emplace(session_of(options, out, fingerprint), SessionWriter::Mode::kReplace);
   }
   StaticMapAccumulator::Config config;
-  config.map_voxel = options.map_voxel.value_or(run.map_voxel);
+  config.map_voxel = options.map_voxel.value_or(map_voxel);
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path(), config,
                 options.quiet, session ? &*session : nullptr);

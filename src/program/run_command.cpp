@@ -103,9 +103,9 @@ void run_as_asked(RunFlags& flags) {
   settings.config_file = flags.remover.config_file();
   settings.find_own_body =
       !has_ranges_of_paper(settings.preset) && !flags.remover.sets("min-range");
-  settings.recording = flags.recording.folder();
-  settings.recording_as_given = flags.recording.as_given();
-  settings.recording_flags = flags.recording.given_flags();
+  settings.recording = flags.recording.folder;
+  settings.recording_as_given = flags.recording.settings.as_given(settings.recording);
+  settings.recording_flags = flags.recording.settings.flags;
 
   check_settings(settings);
   std::optional<Progress> progress;

@@ -28,8 +28,8 @@ struct ViewOptions {
 void view(ViewOptions& options) {
   const fs::path page = add_page(
       options.out,
-      [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
-        return options.sequence.open_of_run(report_file, report, "dynains view " + options.out);
+      [&](const ResultFolder& out) {
+        return options.sequence.open_of_run(out, "dynains view " + options.out);
       },
       options.max_points);
   if (!options.quiet) std::cout << "page: " << page.string() << std::endl;

@@ -13,7 +13,6 @@
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "recording.hpp"
-#include "run/json_file.hpp"
 #include "run/preset.hpp"
 #include "run/run_plan.hpp"
 #include "run/write_view.hpp"
@@ -99,7 +98,7 @@ program::RunListener listen(const RunArguments& run) {
   listener.second_signal = program::SecondSignal::kAsksAgain;
   listener.warn = [](const std::string& text) {
     const py::gil_scoped_acquire acquire;
-    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+    warn(text);
   };
   listener.progress = [&run](std::size_t done, std::size_t total) {
     const py::gil_scoped_acquire acquire;
@@ -118,18 +117,16 @@ program::RunListener listen(const RunArguments& run) {
   if (outcome.signal == SIGINT) {
     PyErr_SetString(PyExc_KeyboardInterrupt, text.c_str());
   } else {
-    constexpr int kSignalled = 128;
-    PyErr_SetObject(PyExc_SystemExit, py::int_(kSignalled + outcome.signal).ptr());
+    PyErr_SetObject(PyExc_SystemExit, py::int_(128 + outcome.signal).ptr());
   }
   throw py::error_already_set();
 }
 
-// Results of a run, and the content of report.json.
+// Files and numbers of a run; counts are those of the report.
 struct RunResult {
-  RunOutcome outcome;
+  fs::path folder;
+  std::optional<fs::path> static_map, page;
   py::dict report;
-
-  fs::path file(const char* name) const { return outcome.outputs.folder / name; }
 };
 
 // A run that is about to begin.
@@ -162,40 +159,36 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
     outcome = program::run(prepared.arguments.settings, prepared.recording->get(), listener);
   }
   if (!outcome.complete) raise_signal(outcome);
-  RunResult result{std::move(outcome), {}};
-  const py::object text =
-      py::module_::import("pathlib").attr("Path")(result.file("report.json")).attr("read_bytes")();
+  const program::RunOutputs& outputs = outcome.outputs;
+  RunResult result{outputs.folder, {}, {}, {}};
+  if (!outputs.map.empty()) result.static_map = outputs.folder / outputs.map_name();
+  if (!outcome.page.empty()) result.page = outcome.page;
+  const py::object text = py::module_::import("pathlib")
+                              .attr("Path")(outputs.folder / "report.json")
+                              .attr("read_bytes")();
   result.report = py::module_::import("json").attr("loads")(text);
   return result;
 }
 
 std::string represent(const RunResult& result) {
-  const auto field = [&](const char* name) {
-    return py::str(result.report[name]).cast<std::string>();
-  };
-  return "<dynains.RunResult: " + field("scans") + " scans in " +
-         result.outcome.outputs.folder.string() + '>';
+  return "<dynains.RunResult: " + py::str(result.report["scans"]).cast<std::string>() +
+         " scans in " + result.folder.string() + '>';
 }
 
 /// Writes the page of a finished run. The recording and its options are those of the run unless
 /// they are given.
 fs::path write_page(const fs::path& out, const py::object& recording, std::size_t max_points) {
-  const auto open = [&](const fs::path& report_file, const nlohmann::ordered_json& report) {
+  const auto open = [&](const program::ResultFolder& finished) {
     if (!recording.is_none()) {
       const py::gil_scoped_acquire acquire;
       return to_recording(recording, py::dict())->get();
     }
     program::RecordingSettings settings;
-    settings.complete(report.value("sequence_flags", nlohmann::ordered_json::object()));
-    return Recording(program::required_json_field<std::string>(report_file, report, "/sequence"),
-                     settings.checked());
+    settings.complete(finished.marker().value("sequence_flags", nlohmann::ordered_json::object()));
+    return Recording(finished.field<std::string>("/sequence"), settings.checked());
   };
   const py::gil_scoped_release release;
   return program::add_page(out, open, max_points);
-}
-
-py::object path_or_none(const fs::path& path) {
-  return path.empty() ? py::object(py::none()) : py::cast(path);
 }
 
 }  // namespace
@@ -204,39 +197,26 @@ void bind_run(py::module_& module) {
   const auto count = [](const char* name) {
     return [name](const RunResult& result) { return py::object(result.report[name]); };
   };
+  const auto file = [](const char* name) {
+    return [name](const RunResult& result) { return result.folder / name; };
+  };
   py::class_<RunResult>(module, "RunResult", "Results of a run.")
-      .def_property_readonly(
-          "folder", [](const RunResult& result) { return result.outcome.outputs.folder; },
-          "Folder of the results.")
+      .def_readonly("folder", &RunResult::folder, "Folder of the results.")
       .def_property_readonly("scans", count("scans"), "Number of scans.")
       .def_property_readonly("points", count("points"), "Number of points of all scans.")
       .def_property_readonly(
           "label_counts", count("labels"),
           "Number of points by label: invalid, out_of_range, ground, static, dynamic.")
-      .def_property_readonly(
-          "static_map",
-          [](const RunResult& result) {
-            const program::RunOutputs& outputs = result.outcome.outputs;
-            return path_or_none(outputs.map.empty() ? fs::path()
-                                                    : outputs.folder / outputs.map_name());
-          },
-          "File of the static map; None without a map.")
-      .def_property_readonly(
-          "moving_points",
-          [](const RunResult& result) { return result.file("dynamic_points.ply"); },
-          "File of the moving points.")
-      .def_property_readonly(
-          "labels", [](const RunResult& result) { return result.file("labels"); },
-          "Folder of the labels, a file for each scan.")
-      .def_property_readonly(
-          "picture", [](const RunResult& result) { return result.file(program::kOverviewPicture); },
-          "Picture: before, after, removed.")
-      .def_property_readonly(
-          "page", [](const RunResult& result) { return path_or_none(result.outcome.page); },
-          "Page for a browser; None unless view=True.")
-      .def_property_readonly(
-          "report", [](const RunResult& result) { return result.report; },
-          "The content of report.json.")
+      .def_readonly("static_map", &RunResult::static_map,
+                    "File of the static map; None without a map.")
+      .def_property_readonly("moving_points", file("dynamic_points.ply"),
+                             "File of the moving points.")
+      .def_property_readonly("labels", file("labels"),
+                             "Folder of the labels, a file for each scan.")
+      .def_property_readonly("picture", file(program::kOverviewPicture),
+                             "Picture: before, after, removed.")
+      .def_readonly("page", &RunResult::page, "Page for a browser; None unless view=True.")
+      .def_readonly("report", &RunResult::report, "The content of report.json.")
       .def("__repr__", [](const RunResult& result) { return represent(result); });
 
   const std::string doc =

@@ -1,14 +1,11 @@
 #include "output_folder.hpp"
 
-#include <unistd.h>
-
 #include <system_error>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
-#include "json_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -150,23 +147,15 @@ void ResultFolder::remove_results() const {
   folder_.remove_file(kind_.marker);
 }
 
-MissingFolders::MissingFolders(const fs::path& folder) {
-  std::error_code ignored;
-  for (fs::path path = folder; path.has_relative_path() && !fs::exists(path, ignored);
-       path = path.parent_path()) {
-    created_.push_back(path);
-  }
-  create_folder(folder);
-}
-
-MissingFolders::~MissingFolders() {
-  for (const fs::path& folder : created_) ::rmdir(folder.c_str());
+void ResultFolder::mark_with(const Json& marker, const std::string& file) {
+  OutputListing listing = listing_;
+  listing.files.insert(listed_name(file));
+  mark(marker, listing);
 }
 
 PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
                              const OutputListing& listing, const InputFiles& inputs)
-    : missing_(target.parent_path()),
-      parent_(target.parent_path()),
+    : parent_((create_folder(target.parent_path()), target.parent_path())),
       target_(target.filename().string()),
       name_(target_ + kPartialEnd) {
   parent_.make_folder(name_);
@@ -279,53 +268,41 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
 
 OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
     : target_(allowed_target(target, inputs)),
-      lock_(target_.parent_path(), FolderLock::Mode::kShared) {
-  const Folder parent(target_.parent_path());
-  if (const auto entry = parent.find(target_.filename().string())) {
-    if (entry->kind != Folder::Kind::kFile) {
-      throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
-    }
-    if (!may_replace) {
-      throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
-    }
-    replaces_ = true;
-  }
+      lock_(std::in_place, target_.parent_path(), FolderLock::Mode::kShared) {
   const std::string name = target_.filename().string();
-  partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
-}
-
-void OutputFile::put_in_place() {
-  sync_files(partial_->path());
-  partial_->keep();  // the file is whole
-  partial_->results().folder().rename(partial_->target(), partial_->parent(), partial_->target(),
-                                      replaces_ ? Folder::Rename::kReplace : Folder::Rename::kNew);
-  partial_->parent().sync();
-  partial_->remove();
-}
-
-AddedFile::AddedFile(ResultFolder& results, const std::string& name)
-    : results_(results),
-      name_(name),
-      partial_(whole_path(results.path()).concat('.' + name), file_kind(), listing_of_file(name),
-               InputFiles()) {
-  const std::optional<Folder::Entry> entry = results.folder().find(name);
-  if (!entry || (entry->kind == Folder::Kind::kFile && results.listing().contains("", name))) {
-    return;
+  const auto entry = Folder(target_.parent_path()).find(name);
+  if (entry && entry->kind != Folder::Kind::kFile) {
+    throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
   }
-  throw IoError((results.path() / name).string() + ": is in the way, and no part of the results (" +
-                results.kind().marker + " does not list it); move it away");
+  if (entry && !may_replace) {
+    throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
+  }
+  if (!entry) how_ = Folder::Rename::kNew;
+  partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
+  folder_ = &partial_->parent();
 }
 
-void AddedFile::put_in_place(const Json& marker, const std::function<void()>& publish_more) {
-  sync_files(partial_.path());
-  OutputListing listing = results_.listing();
-  listing.files.insert(listed_name(name_));
-  // Listed first: a file that is not listed would count as one of the user.
-  results_.mark(marker, listing);
+OutputFile::OutputFile(const ResultFolder& results, const std::string& name)
+    : target_(whole_path(results.path()) / name), folder_(&results.folder()) {
+  const std::optional<Folder::Entry> entry = folder_->find(name);
+  if (entry && (entry->kind != Folder::Kind::kFile || !results.listing().contains("", name))) {
+    throw IoError((results.path() / name).string() +
+                  ": is in the way, and no part of the results (" + results.kind().marker +
+                  " does not list it); move it away");
+  }
+  // Beside the folder, in which a file that is not listed is one of the user.
+  partial_.emplace(whole_path(results.path()).concat('.' + name), file_kind(),
+                   listing_of_file(name), InputFiles());
+}
+
+void OutputFile::put_in_place(const std::function<void()>& publish_more) {
+  sync_files(partial_->path());
   publish_more();
-  partial_.results().folder().rename(name_, results_.folder(), name_, Folder::Rename::kReplace);
-  results_.folder().sync();
-  partial_.remove();
+  partial_->keep();  // the file is whole
+  const std::string name = target_.filename().string();
+  partial_->results().folder().rename(name, *folder_, name, how_);
+  folder_->sync();
+  partial_->remove();
 }
 
 }  // namespace dynains::program

@@ -16,6 +16,7 @@
 #include "dynains/io/folder_lock.hpp"
 #include "folder.hpp"
 #include "input_files.hpp"
+#include "json_file.hpp"
 #include "output_listing.hpp"
 
 namespace dynains::program {
@@ -51,6 +52,11 @@ class ResultFolder {
   /// Null if there is none.
   const nlohmann::ordered_json& marker() const { return marker_; }
   bool has_results() const { return !marker_.is_null(); }
+  /// See required_json_field().
+  template <class T>
+  T field(const std::string& pointer) const {
+    return required_json_field<T>(marker_path(), marker_, pointer);
+  }
   const OutputListing& listing() const { return listing_; }
   /// Whether the marker has `"complete": true`.
   bool is_complete() const;
@@ -59,6 +65,9 @@ class ResultFolder {
   void check(const InputFiles& inputs) const;
   /// Replaces the marker, with this listing in the field `outputs`. It is on the disk afterwards.
   void mark(nlohmann::ordered_json marker, const OutputListing& listing);
+  /// Replaces the marker, and lists one more file. A file that is not listed counts as one of the
+  /// user.
+  void mark_with(const nlohmann::ordered_json& marker, const std::string& file);
   /// Removes the listed files, and at last the marker. Files of others stay.
   void remove_results() const;
 
@@ -74,25 +83,12 @@ class ResultFolder {
   OutputListing listing_;
 };
 
-/// Folders that were missing above an output. The destructor removes those that are still empty.
-class MissingFolders {
- public:
-  /// Creates them.
-  explicit MissingFolders(const std::filesystem::path& folder);
-  ~MissingFolders();
-  MissingFolders(const MissingFolders&) = delete;
-  MissingFolders& operator=(const MissingFolders&) = delete;
-
- private:
-  std::vector<std::filesystem::path> created_;  // innermost first
-};
-
 /// The folder TARGET.partial. The destructor removes it unless it was renamed or kept.
 class PartialFolder {
  public:
-  /// Creates the folder with a marker of this listing. What a killed command of this kind has left
-  /// there is removed before. Throws IoError if anything else has the name, or `inputs` are there;
-  /// UsageError if another command writes the target.
+  /// Creates the folder, and those above it, with a marker of this listing. What a killed command
+  /// of this kind has left there is removed before. Throws IoError if anything else has the name,
+  /// or `inputs` are there; UsageError if another command writes the target.
   PartialFolder(const std::filesystem::path& target, const OutputKind& kind,
                 const OutputListing& listing, const InputFiles& inputs);
   ~PartialFolder();
@@ -105,8 +101,6 @@ class PartialFolder {
   const nlohmann::ordered_json& left() const { return left_; }
   /// The folder of the target.
   const Folder& parent() const { return parent_; }
-  /// Name of the target there.
-  const std::string& target() const { return target_; }
   /// Moves this folder to the target, in place of the results that are there, if any.
   void replace(ResultFolder* earlier);
   /// The folder stays as it is.
@@ -115,7 +109,6 @@ class PartialFolder {
   void remove();
 
  private:
-  MissingFolders missing_;
   Folder parent_;
   std::string target_;
   std::string name_;
@@ -156,45 +149,31 @@ class OutputFolder {
   std::optional<PartialFolder> partial_;
 };
 
-/// A file as an output of its own.
+/// A file as an output of its own, or in the folder of finished results.
 class OutputFile {
  public:
   /// Throws IoError if `target` cannot be written, is one of `inputs`, or exists and must not be
   /// replaced; UsageError if another command writes it or its folder.
   OutputFile(const std::filesystem::path& target, bool may_replace, const InputFiles& inputs);
+  /// A file of `results`, which outlive this: a new one, or in place of the listed one. Throws
+  /// IoError if a file of others has the name.
+  OutputFile(const ResultFolder& results, const std::string& name);
 
   /// The file to write, of the name of the target.
   std::filesystem::path path() const { return partial_->path() / target_.filename(); }
   /// By whole_path().
   const std::filesystem::path& target() const { return target_; }
   /// The file is at the target, and on the disk. If it cannot be put there, it stays in path().
+  /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   /// Throws IoError.
-  void put_in_place();
+  void put_in_place(const std::function<void()>& publish_more = [] {});
 
  private:
   std::filesystem::path target_;
-  FolderLock lock_;
-  bool replaces_ = false;
+  std::optional<FolderLock> lock_;
+  Folder::Rename how_ = Folder::Rename::kReplace;
   std::optional<PartialFolder> partial_;
-};
-
-/// A file that is added to finished results, or replaces the one that was added before.
-class AddedFile {
- public:
-  /// `results` outlive this. Throws IoError if a file of others has the name.
-  AddedFile(ResultFolder& results, const std::string& name);
-
-  /// The file to write.
-  std::filesystem::path path() const { return partial_.path() / name_; }
-  /// The marker lists the file, and the file is in place. Calls `publish_more()` when all bytes
-  /// are on the disk and only names are left to change. Throws IoError.
-  void put_in_place(
-      const nlohmann::ordered_json& marker, const std::function<void()>& publish_more = [] {});
-
- private:
-  ResultFolder& results_;
-  std::string name_;
-  PartialFolder partial_;
+  const Folder* folder_;  // of the target
 };
 
 }  // namespace dynains::program

@@ -191,8 +191,8 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ord
   }
   if (outputs.write_page) {
     outcome.page = plan.settings.outputs.folder / kViewPage;
-    write_page(outputs.folder / kViewPage, outputs.folder, report, plan.sequence,
-               kDefaultViewPoints);
+    write_page(outputs.folder / kViewPage, outputs.folder, plan.sequence, plan.range,
+               plan.settings.config.map.map_voxel, kDefaultViewPoints);
   }
   out.finish(report, [&] {
     if (outside.map) outside.map->put_in_place();

@@ -153,7 +153,7 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
 
 ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
   const auto number = [&](std::size_t i) { return sequence.number(i); };
-  ScanRange range{0, sequence.size() - 1};
+  ScanRange range = whole_of(sequence);
   while (range.first <= range.last && window.start && number(range.first) < *window.start) {
     ++range.first;
   }
@@ -208,9 +208,6 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   nlohmann::ordered_json request = {{"poses_and_times", pose_fingerprint(sequence, range)},
                                     {"points_in_world", sequence.frame() == PointFrame::kWorld},
                                     {"deskew", sequence.is_deskewed()}};
-  for (const char* const flag : kPointFlags) {
-    if (settings.recording_flags.contains(flag)) request[flag] = settings.recording_flags[flag];
-  }
   SessionRequest session = session_request(settings, sequence, range, configuration);
   if (!session.city.empty()) {
     request["update"] = session.city.string();

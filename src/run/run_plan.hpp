@@ -1,7 +1,6 @@
 // Everything about a run that is known before anything is written.
 #pragma once
 
-#include <array>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -30,10 +29,6 @@ struct RunPlan {
 /// whole_path(). Throws ConfigError unless the name ends in .ply, .pcd or .las and no other result
 /// goes there.
 std::filesystem::path map_path(const std::string& name, const std::filesystem::path& out);
-
-/// Flags of a recording that tell how its points are stored. A request holds those that were given.
-inline constexpr std::array kPointFlags = {"--point-units", "--point-time-unit", "--bin-columns",
-                                           "--self-box"};
 
 /// Fingerprint of the names, poses and times of the scans; their points are not read.
 std::string pose_fingerprint(const Recording& recording, const ScanRange& range);

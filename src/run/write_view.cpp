@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -24,16 +25,6 @@ namespace fs = std::filesystem;
 using namespace viewer;
 
 constexpr double kSmallestCell = 0.05;  // m
-
-/// Index of the scan of this name. Throws IoError.
-std::size_t scan_named(const Recording& recording, const std::string& name,
-                       const fs::path& report) {
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    if (recording.name(i) == name) return i;
-  }
-  throw IoError(report.string() + ": the run has scan " + name + ", which " +
-                recording.folder().string() + " does not have; is it the recording of the run?");
-}
 
 /// Reads scan by scan. The page gets at most `max_points` points: the first static point of each
 /// voxel, up to two thirds, and moving points.
@@ -165,20 +156,23 @@ ResultFolder open_finished_run(const fs::path& folder) {
   return out;
 }
 
-void write_page(const fs::path& page, const fs::path& folder, const nlohmann::ordered_json& report,
-                const Recording& recording, std::size_t max_points) {
-  const fs::path file_of_report = folder / run_output_kind().marker;
-  const auto scan = [&](const char* field) {
-    const auto name = required_json_field<std::string>(file_of_report, report, field);
-    return scan_named(recording, name, file_of_report);
-  };
-  const ScanRange range{scan("/first_scan"), scan("/last_scan")};
-  if (range.last < range.first) {
-    throw IoError(file_of_report.string() + ": /last_scan: expected a scan after /first_scan");
+std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& recording) {
+  std::vector<std::size_t> scans;
+  std::set<std::string> missing = out.listing().scans;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (missing.erase(listed_name(recording.name(i))) > 0) scans.push_back(i);
   }
-  const auto voxel =
-      required_json_field<double>(file_of_report, report, "/configuration/map_voxel");
-  const ViewData data = Collector(recording, range, folder, voxel, max_points).collect();
+  if (missing.empty()) return scans;
+  throw IoError(recording.folder().string() + ": has no pose or no scan for " +
+                std::to_string(missing.size()) + " of " +
+                std::to_string(out.listing().scans.size()) + " scans of the run, " +
+                *missing.begin() +
+                " first; expected the recording of the run, and a pose for each of its scans");
+}
+
+void write_page(const fs::path& page, const fs::path& folder, const Recording& recording,
+                const ScanRange& range, double map_voxel, std::size_t max_points) {
+  const ViewData data = Collector(recording, range, folder, map_voxel, max_points).collect();
   AtomicFile file(page);
   viewer::write_page(file.stream(), data);
   file.commit();
@@ -186,10 +180,12 @@ void write_page(const fs::path& page, const fs::path& folder, const nlohmann::or
 
 fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
   ResultFolder out = open_finished_run(folder);
-  AddedFile page(out, kViewPage);
-  write_page(page.path(), out.path(), out.marker(), open(out.marker_path(), out.marker()),
-             max_points);
-  page.put_in_place(out.marker());
+  OutputFile page(out, kViewPage);
+  const Recording recording = open(out);
+  const std::vector<std::size_t> scans = scans_of_run(out, recording);
+  write_page(page.path(), out.path(), recording, {scans.front(), scans.back()},
+             out.field<double>("/configuration/map_voxel"), max_points);
+  page.put_in_place([&] { out.mark_with(out.marker(), kViewPage); });
   return out.path() / kViewPage;
 }
 

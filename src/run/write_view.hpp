@@ -4,10 +4,11 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <nlohmann/json.hpp>
+#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "output_folder.hpp"
+#include "scan_range.hpp"
 
 namespace dynains::program {
 
@@ -22,15 +23,17 @@ void check_run_is_finished(const std::filesystem::path& folder);
 /// folder.
 ResultFolder open_finished_run(const std::filesystem::path& folder);
 
-/// Writes the file `page` about results in `folder`, with this report, of a run over `recording`.
-/// Throws IoError.
+/// The scans of a run. Throws IoError if its recording lacks one.
+std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& recording);
+
+/// Writes the file `page` about the results in `folder` of a run over `range` of a recording.
+/// `map_voxel`: m. Throws IoError.
 void write_page(const std::filesystem::path& page, const std::filesystem::path& folder,
-                const nlohmann::ordered_json& report, const Recording& recording,
+                const Recording& recording, const ScanRange& range, double map_voxel,
                 std::size_t max_points);
 
-/// Opens the recording of a run by its report, which is in `report_file`.
-using OpenRecording = std::function<Recording(const std::filesystem::path& report_file,
-                                              const nlohmann::ordered_json& report)>;
+/// Opens the recording of a run by its report.
+using OpenRecording = std::function<Recording(const ResultFolder& out)>;
 
 /// Adds view.html to complete results of a run in `folder`. Returns its path. Throws IoError, and
 /// UsageError if another command uses the folder.

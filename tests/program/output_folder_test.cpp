@@ -78,7 +78,7 @@ TEST_CASE(
     const auto out = place.begin();
     write_text(out->path() / "labels/000001.label", "new");
   }
-  CHECK(fs::is_empty(place.root.path()));
+  CHECK(fs::is_empty(place.out.parent_path()));
   {
     const auto out = place.begin();
     write_text(out->path() / "labels/000001.label", "new");
@@ -362,17 +362,17 @@ TEST_CASE("A file is added to results, and replaced if it was added before") {
   write_results(place.out);
   ResultFolder results(Folder(place.out), kKind);
   for (const char* text : {"first", "second"}) {
-    AddedFile page(results, "view.html");
+    OutputFile page(results, "view.html");
     write_text(page.path(), text);
     CHECK_FALSE(read_text(place.out / "report.json").empty());
-    page.put_in_place(results.marker());
+    page.put_in_place([&] { results.mark_with(results.marker(), "view.html"); });
     CHECK(read_text(place.out / "view.html") == text);
   }
   CHECK(results.listing().contains("", "view.html"));
   CHECK(results.is_complete());
   results.check(InputFiles());
   write_text(place.out / "other.html", "mine");
-  CHECK_THAT(message_of<IoError>([&] { AddedFile(results, "other.html"); }),
+  CHECK_THAT(message_of<IoError>([&] { OutputFile(results, "other.html"); }),
              ContainsSubstring("other.html: is in the way"));
 }
 

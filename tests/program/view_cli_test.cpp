@@ -78,7 +78,7 @@ TEST_CASE("view finds the recording by the report, with its flags, or by its new
   CHECK(contains(start({"view", fixture.out}).err, "name the place of the run's recording"));
   CHECK(start({"view", fixture.out, fixture.seq + "2"}).code == 0);
   fs::remove(fixture.seq + "2/velodyne/000000.bin");
-  CHECK(contains(start({"view", fixture.out, fixture.seq + "2"}).err, "scan 000000"));
+  CHECK(contains(start({"view", fixture.out, fixture.seq + "2"}).err, "000000 first"));
 }
 
 TEST_CASE("beliefs are written on demand, one byte per point") {
