@@ -1,7 +1,6 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -16,21 +15,16 @@
 namespace dynains::python {
 namespace {
 
-using program::RecordingCheck;
-
-// A RecordingCheck, with the options that its diagnosis proposes.
+// What the properties hold, and the text.
 struct CheckedRecording {
-  RecordingCheck check;
-  std::string path;
+  bool passed;
   py::dict options;
+  std::string advice;
+  std::string verdict;
+  std::optional<double> translation_error, rotation_error;
+  py::dict measured;
+  std::string text;
 };
-
-const char* name_of(PoseVerdict verdict) {
-  constexpr std::array<const char*, 6> kNames{"agree",     "inexact",  "no motion",
-                                              "otherwise", "disagree", "unknown"};
-  static_assert(static_cast<std::size_t>(PoseVerdict::kUnknown) + 1 == kNames.size());
-  return kNames.at(static_cast<std::size_t>(verdict));
-}
 
 /// Adds the keyword arguments of a proposal such as `--invert-poses --pose-units mm`.
 void add_options(py::dict& options, const std::string& proposal) {
@@ -46,35 +40,20 @@ void add_options(py::dict& options, const std::string& proposal) {
   }
 }
 
-CheckedRecording check_by_name(const py::object& recording, const py::kwargs& options) {
-  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
-  CheckedRecording result;
-  result.check = shared->read(program::check_recording);
-  result.path = shared->get().folder().string();
-  result.options = shared->options().attr("copy")();
-  add_options(result.options, result.check.flags);
-  return result;
-}
-
-std::string represent(const CheckedRecording& checked) {
-  std::string text = checked.check.findings + checked.check.advice;
-  if (!checked.check.flags.empty()) {
-    text += "    dynains.Recording(" + py::repr(py::str(checked.path)).cast<std::string>();
-    for (const auto& [name, value] : checked.options) {
-      const py::object shown = py::hasattr(value, "__fspath__")
-                                   ? py::module_::import("os").attr("fspath")(value)
-                                   : py::reinterpret_borrow<py::object>(value);
-      text += ", " + py::str(name).cast<std::string>() + '=' + py::repr(shown).cast<std::string>();
-    }
-    text += ")\n";
+/// The call of Recording with these options.
+std::string call_text(const std::string& path, const py::dict& options) {
+  std::string text = "dynains.Recording(" + py::repr(py::str(path)).cast<std::string>();
+  for (const auto& [name, value] : options) {
+    const py::object shown = py::hasattr(value, "__fspath__")
+                                 ? py::module_::import("os").attr("fspath")(value)
+                                 : py::reinterpret_borrow<py::object>(value);
+    text += ", " + py::str(name).cast<std::string>() + '=' + py::repr(shown).cast<std::string>();
   }
-  text += checked.check.remark;
-  return text.substr(0, text.find_last_not_of('\n') + 1);
+  return text + ')';
 }
 
-std::optional<double> if_registered(const CheckedRecording& checked, double value) {
-  if (checked.check.diagnosis.registered_pairs == 0) return std::nullopt;
-  return value;
+std::string without_last_newlines(const std::string& text) {
+  return text.substr(0, text.find_last_not_of('\n') + 1);
 }
 
 py::dict measured(const Diagnosis& d) {
@@ -97,49 +76,56 @@ py::dict measured(const Diagnosis& d) {
   return values;
 }
 
+CheckedRecording check_by_name(const py::object& recording, const py::kwargs& options) {
+  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
+  const program::RecordingCheck check = shared->read(program::check_recording);
+  const Diagnosis& d = check.diagnosis;
+  CheckedRecording result{check.passed,
+                          shared->options().attr("copy")(),
+                          without_last_newlines(check.advice + check.remark),
+                          plain_value(d.verdict),
+                          {},
+                          {},
+                          measured(d),
+                          check.findings + check.advice};
+  add_options(result.options, check.flags);
+  if (d.registered_pairs > 0) {
+    result.translation_error = d.translation_error;
+    result.rotation_error = 180.0 / M_PI * d.rotation_error;
+  }
+  if (!check.flags.empty()) {
+    result.text += "    " + call_text(shared->get().folder().string(), result.options) + '\n';
+  }
+  result.text = without_last_newlines(result.text + check.remark);
+  return result;
+}
+
 }  // namespace
 
 void bind_check(py::module_& module) {
   py::class_<CheckedRecording>(
       module, "Diagnosis", "What check() found. Its text is that of the program `dynains check`.")
-      .def_property_readonly(
-          "passed", [](const CheckedRecording& self) { return self.check.passed; },
-          "Whether the recording will work with the options that it was opened with.")
-      .def_property_readonly(
-          "options",
-          [](const CheckedRecording& self) { return py::dict(self.options.attr("copy")()); },
+      .def_readonly("passed", &CheckedRecording::passed,
+                    "Whether the recording will work with the options that it was opened with.")
+      .def_readonly(
+          "options", &CheckedRecording::options,
           "The options that a Recording should be opened with: those given and those proposed.")
-      .def_property_readonly(
-          "advice",
-          [](const CheckedRecording& self) {
-            const std::string text = self.check.advice + self.check.remark;
-            return text.substr(0, text.find_last_not_of('\n') + 1);
-          },
-          "The verdict in words, and what to do.")
-      .def_property_readonly(
-          "verdict",
-          [](const CheckedRecording& self) { return name_of(self.check.diagnosis.verdict); },
+      .def_readonly("advice", &CheckedRecording::advice, "The verdict in words, and what to do.")
+      .def_readonly(
+          "verdict", &CheckedRecording::verdict,
           "'agree', 'inexact', 'no motion', 'otherwise' (under other options), 'disagree' or "
           "'unknown'.")
-      .def_property_readonly(
-          "translation_error",
-          [](const CheckedRecording& self) {
-            return if_registered(self, self.check.diagnosis.translation_error);
-          },
+      .def_readonly(
+          "translation_error", &CheckedRecording::translation_error,
           "m, error of the poses from one scan to the next by registration; None if unknown.")
-      .def_property_readonly(
-          "rotation_error",
-          [](const CheckedRecording& self) {
-            return if_registered(self, 180.0 / M_PI * self.check.diagnosis.rotation_error);
-          },
-          "deg, likewise.")
-      .def_property_readonly(
-          "measured", [](const CheckedRecording& self) { return measured(self.check.diagnosis); },
+      .def_readonly("rotation_error", &CheckedRecording::rotation_error, "deg, likewise.")
+      .def_readonly(
+          "measured", &CheckedRecording::measured,
           "By name: scan_files, pose_rows, scans (with a pose); period (s), step, longest_step (m) "
           "from scan to scan; points (per scan); invalid_share, ego_share (nearer than 2 m), "
           "agreement (of two scans under the poses), 0 to 1; farthest (m, 99 % of ranges are "
           "shorter); height (m, over the ground), tilt (deg), unless no ground was found.")
-      .def("__repr__", [](const CheckedRecording& checked) { return represent(checked); });
+      .def("__repr__", [](const CheckedRecording& checked) { return checked.text; });
 
   const std::string doc =
       "Tells in seconds whether a recording will work, and which options it needs.\n\n"

@@ -33,54 +33,46 @@ RecordingPointer open(const std::filesystem::path& path, const py::dict& values)
 }
 
 /// One scan, whose labels are read when they are asked for.
-class ScanOfRecording {
- public:
-  ScanOfRecording(RecordingPointer recording, std::size_t index)
-      : recording_(std::move(recording)), index_(index) {
-    RecordedScan scan =
-        recording_->read([&](const Recording& open) { return open.read_scan(index); });
-    points_ = to_array(std::move(scan.xyzi), 4);
-    if (!scan.ring.empty()) rings_ = to_array(std::move(scan.ring));
-    if (!scan.time.empty()) times_ = to_array(std::move(scan.time));
+struct ScanOfRecording {
+  ScanOfRecording(RecordingPointer opened, std::size_t i)
+      : recording(std::move(opened)),
+        index(i),
+        name(recording->get().name(i)),
+        time(recording->get().time(i)),
+        T_world_sensor(to_array(recording->get().T_world_sensor(i))) {
+    RecordedScan scan = recording->read([i](const Recording& open) { return open.read_scan(i); });
+    points = to_array(std::move(scan.xyzi), 4);
+    if (!scan.ring.empty()) rings = to_array(std::move(scan.ring));
+    if (!scan.time.empty()) times = to_array(std::move(scan.time));
   }
-
-  const std::string& name() const { return recording_->get().name(index_); }
-  double time() const { return recording_->get().time(index_); }
-  py::array_t<double> T_world_sensor() const {
-    return to_array(recording_->get().T_world_sensor(index_));
-  }
-  const py::array_t<float>& points() const { return points_; }
-  const py::object& rings() const { return rings_; }
-  const py::object& times() const { return times_; }
 
   py::object intensity() const {
-    if (!recording_->get().columns().intensity) return py::none();
-    constexpr py::ssize_t kColumn = 3;
-    return points_[py::make_tuple(py::slice(py::none(), py::none(), py::none()), kColumn)];
+    if (!recording->get().columns().intensity) return py::none();
+    return points[py::make_tuple(py::ellipsis(), 3)];
   }
 
-  py::object labels() {
-    if (labels_.is_none() && recording_->get().has_labels()) {
-      labels_ = to_array(
-          recording_->read([&](const Recording& open) { return open.read_labels(index_); }));
+  py::object read_labels() {
+    if (labels.is_none() && recording->get().has_labels()) {
+      labels =
+          to_array(recording->read([&](const Recording& open) { return open.read_labels(index); }));
     }
-    return labels_;
+    return labels;
   }
 
   std::string represent() const {
     std::ostringstream text;
-    text << "<dynains.RecordedScan: " << name() << " at " << time() << " s, " << points_.shape(0)
+    text << "<dynains.RecordedScan: " << name << " at " << time << " s, " << points.shape(0)
          << " points>";
     return text.str();
   }
 
- private:
-  RecordingPointer recording_;
-  std::size_t index_;
-  py::array_t<float> points_;
-  py::object rings_ = py::none();
-  py::object times_ = py::none();
-  py::object labels_ = py::none();
+  RecordingPointer recording;
+  std::size_t index;
+  std::string name;
+  double time;
+  py::array_t<double> T_world_sensor;
+  py::array_t<float> points;
+  py::object rings = py::none(), times = py::none(), labels = py::none();
 };
 
 ScanOfRecording scan_of(const RecordingPointer& recording, py::ssize_t index) {
@@ -130,10 +122,11 @@ RecordingPointer to_recording(const py::object& recording, const py::dict& optio
   return recording.cast<RecordingPointer>();
 }
 
+void warn(const std::string& text) {
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 void show_warnings(const Recording& recording) {
-  const auto warn = [](const std::string& text) {
-    if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) throw py::error_already_set();
-  };
   for (const std::string& text : recording.warnings()) {
     warn(recording.folder().string() + ": " + text);
   }
@@ -141,19 +134,19 @@ void show_warnings(const Recording& recording) {
 
 void bind_recording(py::module_& module) {
   py::class_<ScanOfRecording>(module, "RecordedScan", "One scan of a recording.")
-      .def_property_readonly("name", &ScanOfRecording::name, "File name without extension.")
-      .def_property_readonly("time", &ScanOfRecording::time, "s")
-      .def_property_readonly("T_world_sensor", &ScanOfRecording::T_world_sensor, "(4, 4) float64.")
-      .def_property_readonly("points", &ScanOfRecording::points,
-                             "(N, 4) float32: x y z (m, sensor frame), intensity (0 without one).")
+      .def_readonly("name", &ScanOfRecording::name, "File name without extension.")
+      .def_readonly("time", &ScanOfRecording::time, "s")
+      .def_readonly("T_world_sensor", &ScanOfRecording::T_world_sensor, "(4, 4) float64.")
+      .def_readonly("points", &ScanOfRecording::points,
+                    "(N, 4) float32: x y z (m, sensor frame), intensity (0 without one).")
       .def_property_readonly("intensity", &ScanOfRecording::intensity,
                              "(N,) float32, a view of the points; None if scans have none.")
-      .def_property_readonly("rings", &ScanOfRecording::rings,
-                             "(N,) uint16, number of the beam; None if scans have none.")
-      .def_property_readonly("times", &ScanOfRecording::times,
-                             "(N,) float64, time of each point in the unit of the file; None if "
-                             "scans have none.")
-      .def_property_readonly("labels", &ScanOfRecording::labels,
+      .def_readonly("rings", &ScanOfRecording::rings,
+                    "(N,) uint16, number of the beam; None if scans have none.")
+      .def_readonly("times", &ScanOfRecording::times,
+                    "(N,) float64, time of each point in the unit of the file; None if "
+                    "scans have none.")
+      .def_property_readonly("labels", &ScanOfRecording::read_labels,
                              "(N,) uint32, class and instance of SemanticKITTI, read at the first "
                              "use; None if the recording has none. Raises IoError.")
       .def("__repr__", &ScanOfRecording::represent);
@@ -165,6 +158,9 @@ void bind_recording(py::module_& module) {
       "metadata.yaml).\n"
       "What the files mean, by name (dynains.check finds out):\n" +
       describe_settings<program::RecordingSettings>();
+  const auto of = [](auto member) {
+    return [member](const SharedRecording& recording) { return (recording.get().*member)(); };
+  };
   py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
       .def(
           py::init([](const std::filesystem::path& path, const py::kwargs& options) {
@@ -175,12 +171,10 @@ void bind_recording(py::module_& module) {
           py::arg("path"),
           "Raises IoError for files that cannot be read, ConfigError for unknown options. Warns if "
           "scans are left out.")
-      .def("__len__", [](const SharedRecording& recording) { return recording.get().size(); })
+      .def("__len__", of(&Recording::size))
       .def("__getitem__", &scan_of, py::arg("index"),
            "Scan `index` as RecordedScan. Raises IoError.")
-      .def_property_readonly(
-          "path", [](const SharedRecording& recording) { return recording.get().folder(); },
-          "Folder or log.")
+      .def_property_readonly("path", of(&Recording::folder), "Folder or log.")
       .def_property_readonly(
           "options",
           [](const SharedRecording& recording) {
@@ -189,9 +183,7 @@ void bind_recording(py::module_& module) {
           "The options that it was opened with.")
       .def_property_readonly(
           "frame",
-          [](const SharedRecording& recording) {
-            return recording.get().frame() == PointFrame::kWorld ? "world" : "sensor";
-          },
+          [](const SharedRecording& recording) { return plain_value(recording.get().frame()); },
           "Frame of the points in the files, 'sensor' or 'world'.")
       .def_property_readonly(
           "names",
@@ -212,15 +204,12 @@ void bind_recording(py::module_& module) {
           "has_labels",
           [](const SharedRecording& recording) { return recording.get().has_labels(); },
           "Whether scans have labels.")
+      .def_property_readonly("missing_poses", of(&Recording::missing_pose_count),
+                             "Number of scans that are left out because they have no pose.")
+      .def_property_readonly("early_end", of(&Recording::early_end),
+                             "Path, position and reason if a log is cut off, else None.")
       .def_property_readonly(
-          "missing_poses",
-          [](const SharedRecording& recording) { return recording.get().missing_pose_count(); },
-          "Number of scans that are left out because they have no pose.")
-      .def_property_readonly(
-          "early_end", [](const SharedRecording& recording) { return recording.get().early_end(); },
-          "Path, position and reason if a log is cut off, else None.")
-      .def_property_readonly(
-          "notes", [](const SharedRecording& recording) { return recording.get().notes(); },
+          "notes", of(&Recording::notes),
           "What was chosen or left out when the recording was opened, a sentence each.")
       .def("__repr__", [](const SharedRecording& recording) { return represent(recording); });
 }

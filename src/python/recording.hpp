@@ -4,6 +4,7 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "dynains/io/recording.hpp"
@@ -41,7 +42,9 @@ class SharedRecording {
 std::shared_ptr<SharedRecording> to_recording(const pybind11::object& recording,
                                               const pybind11::dict& options);
 
-/// Recording::warnings() as RuntimeWarnings.
+/// A RuntimeWarning; throws if the caller has made an error of it.
+void warn(const std::string& text);
+/// Recording::warnings() as such.
 void show_warnings(const Recording& recording);
 
 }  // namespace dynains::python

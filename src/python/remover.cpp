@@ -24,10 +24,22 @@ struct Frame {
   py::object finished;
   py::dict times;
   std::optional<PoseResidual> pose_residual;
-  TimeDoubt time_doubt = TimeDoubt::kNone;
-  std::optional<EpochReason> began_epoch;
-  Plausibility plausibility;
+  std::optional<std::string> time_doubt, began_epoch;
+  py::dict plausibility;
 };
+
+py::dict to_dict(const Plausibility& window) {
+  py::dict shares;
+  shares["not_judged"] = window.not_judged;
+  shares["ground_free"] = window.ground_free;
+  shares["instance_free"] = window.instance_free;
+  shares["misfits"] = window.misfits;
+  shares["residual"] = window.residual;
+  shares["suspicion"] = py::none();
+  if (window.suspicion != Suspicion::kNone) shares["suspicion"] = plain_value(window.suspicion);
+  shares["since"] = window.since;
+  return shares;
+}
 
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
 class Remover {
@@ -50,9 +62,10 @@ class Remover {
       StageTimes::visit(result.times,
                         [&](const char* stage, double ms) { frame.times[stage] = ms; });
       frame.pose_residual = result.pose_residual;
-      frame.time_doubt = result.time_doubt;
-      frame.began_epoch = result.began_epoch;
-      frame.plausibility = result.plausibility;
+      if (result.time_doubt == TimeDoubt::kTooSlow) frame.time_doubt = "too slow";
+      if (result.time_doubt == TimeDoubt::kTooFast) frame.time_doubt = "too fast";
+      if (result.began_epoch) frame.began_epoch = plain_value(*result.began_epoch);
+      frame.plausibility = to_dict(result.plausibility);
     });
     return frame;
   }
@@ -120,23 +133,6 @@ std::string represent(const PoseResidual& residual) {
   text << std::setprecision(3) << "<dynains.PoseResidual: " << residual.translation << " m, "
        << residual.rotation << " deg>";
   return text.str();
-}
-
-std::optional<std::string> suspicion_of(const Plausibility& window) {
-  if (window.suspicion == Suspicion::kNone) return std::nullopt;
-  return plain_value(window.suspicion);
-}
-
-py::dict to_dict(const Plausibility& window) {
-  py::dict shares;
-  shares["not_judged"] = window.not_judged;
-  shares["ground_free"] = window.ground_free;
-  shares["instance_free"] = window.instance_free;
-  shares["misfits"] = window.misfits;
-  shares["residual"] = window.residual;
-  shares["suspicion"] = suspicion_of(window);
-  shares["since"] = window.since;
-  return shares;
 }
 
 std::string represent(const Frame& frame) {
@@ -238,32 +234,25 @@ void bind_remover(py::module_& module) {
       .def_readonly("pose_residual", &Frame::pose_residual,
                     "PoseResidual: error of the pushed pose relative to earlier scans; None if it "
                     "is unknown.")
-      .def_property_readonly(
-          "began_epoch",
-          [](const Frame& frame) -> std::optional<std::string> {
-            if (!frame.began_epoch) return std::nullopt;
-            return plain_value(*frame.began_epoch);
-          },
+      .def_readonly(
+          "began_epoch", &Frame::began_epoch,
           "Why the scan is not compared with earlier ones: \"start\", \"sensor\", \"pause\", "
           "\"jump\" or \"misfit\". Else None.")
       .def_property_readonly(
-          "suspicion", [](const Frame& frame) { return suspicion_of(frame.plausibility); },
+          "suspicion",
+          [](const Frame& frame) { return py::object(frame.plausibility["suspicion"]); },
           "What the last scans contradict: \"units\", \"poses\" or \"rays\" (origin of rays, "
           "times of points). Else None.")
-      .def_property_readonly(
-          "plausibility", [](const Frame& frame) { return to_dict(frame.plausibility); },
+      .def_readonly(
+          "plausibility", &Frame::plausibility,
           "Shares over the last ten scans, 0 to 1: not_judged (points invalid, too near or too "
           "far), ground_free (beams through the ground, of those that reach or pass it), "
           "instance_free (samples above the ground seen free, of those seen free or hit), misfits "
           "(scans that begin an epoch because poses or surfaces do not fit); residual (m, mean "
           "translation of PoseResidual, each at most 0.15); suspicion; since (number of the scan "
           "at which the suspicious window began).")
-      .def_property_readonly(
-          "time_doubt",
-          [](const Frame& frame) -> std::optional<std::string> {
-            if (frame.time_doubt == TimeDoubt::kNone) return std::nullopt;
-            return frame.time_doubt == TimeDoubt::kTooSlow ? "too slow" : "too fast";
-          },
+      .def_readonly(
+          "time_doubt", &Frame::time_doubt,
           "\"too slow\": the last four scans are more than max_gap apart, so no scan is compared; "
           "\"too fast\": less than 1 ms. The unit of time may be wrong. Else None.")
       .def("__repr__", [](const Frame& frame) { return represent(frame); });

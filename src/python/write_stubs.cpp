@@ -1,5 +1,5 @@
 // Writes the type stubs of the Python module to standard output: the template, with a line for each
-// parameter in place of a line @NAME@.
+// parameter in place of a line @NAME@, and a method in place of a line "@property NAME: TYPE".
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -82,6 +82,11 @@ std::string expand(const std::string& indent, const std::string& line) {
   }
   if (line == "@SIMULATION_ARGUMENTS@") {
     return lines_of<dynains::simulation::Config>(indent, as_argument);
+  }
+  if (line.rfind("@property ", 0) == 0) {  // NAME: TYPE
+    const std::size_t name = line.find(' ') + 1, colon = line.find(':');
+    return indent + "@property\n" + indent + "def " + line.substr(name, colon - name) +
+           "(self) ->" + line.substr(colon + 1) + ": ...\n";
   }
   return indent + line + '\n';
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 
 #include "dynains/io/recording.hpp"
@@ -25,6 +26,9 @@ enum class PoseVerdict {
   kDisagree,   ///< scans agree under nothing that was tried
   kUnknown     ///< too few points or scans
 };
+constexpr std::array<const char*, 6> value_names(PoseVerdict) {
+  return {"agree", "inexact", "no motion", "otherwise", "disagree", "unknown"};
+}
 
 /// Traits of wrong poses that no option heals.
 struct PoseFlaws {
