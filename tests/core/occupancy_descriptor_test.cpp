@@ -258,13 +258,6 @@ TEST_CASE("a point on the outer border belongs to the last cell") {
   check_heights(descriptor.heights(0), {0.0, 2.0});
 }
 
-TEST_CASE("a cluster of one place has one cell") {
-  const Cluster cluster =
-      Cluster().point(10.0, 0.0, 1.0).end_of_scan().point(10.0, 0.0, 1.0).end_of_scan();
-  const OccupancyDescriptor descriptor = described(make(0.25, 1.5), cluster);
-  CHECK(descriptor.cell_count() == 1);
-}
-
 TEST_CASE("observations without any height are equal to each other and unlike all others") {
   SECTION("both flat: static") {
     const Cluster flat =

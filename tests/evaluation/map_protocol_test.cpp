@@ -38,23 +38,6 @@ MapProtocol::Settings map_settings(double voxel, double radius) {
 
 }  // namespace
 
-TEST_CASE("A map point takes the class of the nearest measured point") {
-  OwnedScan scan;
-  scan.add(0.5F, 0.5F, 0.5F, kRoad);
-  scan.add(2.5F, 0.5F, 0.5F, kMovingCar);
-  scan.add(4.5F, 0.5F, 0.5F, kRoad);
-  // The first map point is the road's, the second the car's; the third lies between road and car
-  // but nearer to the road (0.9 against 1.1).
-  const std::vector<Eigen::Vector3d> map = {{0.55, 0.5, 0.5}, {2.45, 0.5, 0.5}, {3.6, 0.5, 0.5}};
-  const Result result = run({scan}, map, map_settings(1.0, 0.05));
-  CHECK(result.voxels.static_total == 2);
-  CHECK(result.voxels.dynamic_total == 1);
-  // The third map point is 0.9 > 0.866 from the second road voxel.
-  CHECK(result.voxels.static_preserved == 1);
-  CHECK(result.voxels.dynamic_preserved == 1);
-  CHECK(result.foreign == 0);
-}
-
 TEST_CASE("Map points far from all measured points are left out and counted") {
   OwnedScan scan;
   scan.add(0.5F, 0.5F, 0.5F, kRoad);
@@ -81,24 +64,6 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   CHECK(score.static_accuracy() == Approx(50.0));
   CHECK(score.associated_accuracy() == Approx(50.0));
   CHECK(score.harmonic_accuracy() == Approx(50.0));
-}
-
-TEST_CASE("A map point is found in every direction and at every place of a cell") {
-  Random random(4);
-  for (int i = 0; i < 500; ++i) {
-    const Eigen::Vector3d p(random.uniform(5, 6), random.uniform(-1, 1), random.uniform(-1, 1));
-    const Eigen::Vector3d direction =
-        Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1))
-            .normalized();
-    for (const double distance : {0.0499, 0.0501}) {
-      const Eigen::Vector3f measured = (p + distance * direction).cast<float>();
-      OwnedScan scan;
-      scan.add(measured.x(), measured.y(), measured.z(), kRoad);
-      // Cells count from the first point.
-      const std::vector<Eigen::Vector3d> map = {{20, 20, 0}, p};
-      REQUIRE(run({scan}, map, map_settings(0.2, 0.05)).points.static_kept == (distance < 0.05));
-    }
-  }
 }
 
 TEST_CASE("Map files get the score of the simple reference implementation", "[reference]") {

@@ -54,26 +54,6 @@ TEST_CASE("PR and RR count voxel points of the raw map") {
   CHECK(score.f1() == Approx(0.6));  // 2 * 75 * 50 / 125
 }
 
-TEST_CASE("A voxel without estimate is preserved by a near point beyond its boundary") {
-  // 0.9 and 1.1 lie in two voxels, 0.2 apart; the estimate holds the second only.
-  OwnedScan near;
-  near.add(0.9F, 0.5F, 0.5F, kRoad, 0);
-  near.add(1.1F, 0.5F, 0.5F, kRoad, 1);
-  CHECK(estimate_score({near}).static_preserved == 2);
-
-  // 0.1 and 1.1: 1.0 apart, which is more than sqrt(3) / 2.
-  OwnedScan far;
-  far.add(0.1F, 0.5F, 0.5F, kRoad, 0);
-  far.add(1.1F, 0.5F, 0.5F, kRoad, 1);
-  CHECK(estimate_score({far}).static_preserved == 1);
-
-  // Around zero: truncation instead of floor would put both into one voxel, and count one.
-  OwnedScan around_zero;
-  around_zero.add(-0.1F, 0.5F, 0.5F, kRoad, 1);
-  around_zero.add(0.1F, 0.5F, 0.5F, kRoad, 1);
-  CHECK(estimate_score({around_zero}).static_total == 2);
-}
-
 TEST_CASE("The radius is sqrt(3) / 2 of an edge, exclusive") {
   // sqrt(3) / 2 = 0.8660; voxels [0, 1) and [1, 2).
   const auto preserved = [](float kept) {
@@ -84,47 +64,6 @@ TEST_CASE("The radius is sqrt(3) / 2 of an edge, exclusive") {
   };
   CHECK(preserved(1.115F) == 2);  // 0.865 apart
   CHECK(preserved(1.117F) == 1);  // 0.867 apart
-}
-
-TEST_CASE("A voxel is lost within itself if the estimate keeps its far corner only") {
-  // Raw centroid (9 * 0.05 + 0.95) / 10 = 0.14 in every axis, estimate 0.95: 1.40 apart.
-  OwnedScan scan;
-  for (int i = 0; i < 9; ++i) scan.add(0.05F, 0.05F, 0.05F, kRoad, 0);
-  scan.add(0.95F, 0.95F, 0.95F, kRoad, 1);
-  const VoxelScore score = estimate_score({scan});
-  CHECK(score.static_total == 1);
-  CHECK(score.static_preserved == 0);
-}
-
-TEST_CASE("A voxel takes the class of the point nearest to its centroid, not of most points") {
-  // Centroid 0.45: the dynamic point at 0.5 is nearest although most points are static.
-  OwnedScan scan;
-  scan.add(0.1F, 0.5F, 0.5F, kRoad, 1);
-  scan.add(0.15F, 0.5F, 0.5F, kRoad, 1);
-  scan.add(0.5F, 0.5F, 0.5F, kMovingCar, 1);
-  scan.add(0.95F, 0.5F, 0.5F, kRoad, 1);
-  scan.add(0.55F, 0.5F, 0.5F, kMovingCar, 1);
-  const auto raw = map_of(run({scan}, settings(1.0), 1), VoxelProtocol::kIdentity);
-  REQUIRE(raw.size() == 1);
-  CHECK(raw[0].p_world.x() == Approx(0.45));
-  CHECK(raw[0].truth == Truth::kDynamic);
-}
-
-TEST_CASE("Each scan counts once in a voxel, however many points it has there") {
-  // Scan 0: ten static points at 0.1. Scan 1: one dynamic at 0.5. Scan 2: one dynamic at 0.6.
-  // Centroid of the scans' points (0.1 + 0.5 + 0.6) / 3 = 0.4: dynamic. Over all twelve points it
-  // would be 0.175: static.
-  std::vector<OwnedScan> scans(3);
-  for (int i = 0; i < 10; ++i) scans[0].add(0.1F, 0.5F, 0.5F, kRoad, 1);
-  scans[1].add(0.5F, 0.5F, 0.5F, kMovingCar, 1);
-  scans[2].add(0.6F, 0.5F, 0.5F, kMovingCar, 1);
-  const VoxelProtocol protocol = run(scans, settings(1.0), 1);
-  const auto raw = map_of(protocol, VoxelProtocol::kIdentity);
-  REQUIRE(raw.size() == 1);
-  CHECK(raw[0].p_world.x() == Approx(0.4));
-  CHECK(raw[0].truth == Truth::kDynamic);
-  // The oracle keeps the static point 0.3 from the raw one, which is of the other class.
-  CHECK(protocol.score(VoxelProtocol::kOracle).dynamic_preserved == 0);
 }
 
 TEST_CASE("Ranges are planar and inclusive, and are measured in the sensor frame") {

@@ -34,16 +34,6 @@ def test_parameters_are_set_by_name():
     assert dynains.DynaInsRemover(window=6).config.window == 6
 
 
-def test_paper_has_the_published_parameters():
-    paper = dynains.Config.paper()
-    assert (paper.window, paper.tau_s, paper.p_inc, paper.p_dec) == (4, 0.6, 0.7, 0.4)
-    assert dynains.Config.paper(window=5).window == 5
-
-
-def test_offline_waits_for_more_later_scans():
-    assert dynains.Config.offline().lookahead_scans > dynains.Config().lookahead_scans
-
-
 def test_the_configuration_of_a_remover_is_a_copy():
     remover = dynains.DynaInsRemover()
     remover.config.window = 9

@@ -44,33 +44,6 @@ def test_truth_is_flags_or_labels():
     assert score(kept, labels, dynamic_classes="252-258")["PR"] == pytest.approx(100 / 3)
 
 
-def test_unlabeled_points():
-    labels = np.array([0, 40, 252, 252], np.uint32)
-    kept = [False, True, False, False]
-    assert score(kept, labels)["PR"] == 100
-    assert score(kept, labels, unlabeled="static")["PR"] == 50
-
-
-def test_range_setting():
-    near = score([False, True, False, True], max_range=10.5)
-    assert near["PR"] == 50
-    assert near["RR"] != near["RR"]  # the dynamic points are too far: a share of zero points
-
-
-def test_poses_place_the_points():
-    """The second scan, 2 m further, sees the same four places: a kept copy preserves a voxel."""
-    forward = np.eye(4)
-    forward[0, 3] = 2.0
-    rows = dynains.evaluate(
-        [POINTS, POINTS - np.float32([2, 0, 0])],
-        [np.eye(4), forward],
-        [MOVES, MOVES],
-        [np.array([True, False, False, False]), np.array([False, True, False, False])],
-    )
-    assert rows["estimate"]["PR"] == 100
-    assert rows["estimate"]["SA"] == 50
-
-
 def test_nothing_removed_is_the_identity_on_a_street(street):
     points = [scan.points for scan in street]
     poses = [scan.T_world_sensor for scan in street]
