@@ -52,9 +52,8 @@ struct CleanFixture {
            "\nproperty double x\nproperty double y\nproperty double z\nproperty int number\n"
            "property uchar day\nend_header\n";
   }
-  Outcome clean(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"clean", map, out});
-    return start(more);
+  Outcome clean(const Arguments& more = {}) const {
+    return start(Arguments{"clean", map, out} + more);
   }
 
   TemporaryFolder folder;
@@ -70,9 +69,7 @@ struct CleanFixture {
 
 TEST_CASE("clean removes the trail of a mover from a map that another program has made") {
   const CleanFixture f;
-  const Outcome outcome = f.clean();
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  const Outcome outcome = succeed(f.clean());
   // A floor and a box do not tell where the map lies.
   CHECK_THAT(outcome.err, ContainsSubstring("the distance of the map and the scans is not known"));
   const std::size_t kept = count_lines(f.standing);
@@ -82,10 +79,7 @@ TEST_CASE("clean removes the trail of a mover from a map that another program ha
   CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
 
   SECTION("an earlier result is replaced by --force alone") {
-    const Outcome again = f.clean();
-    CHECK(again.code == 1);
-    CHECK_THAT(again.err,
-               ContainsSubstring("exists; choose another name, or replace it by --force"));
+    check_refused(f.clean(), 1, "exists; choose another name, or replace it by --force");
     CHECK(f.clean({"--force"}).code == 0);
   }
 }
@@ -93,8 +87,8 @@ TEST_CASE("clean removes the trail of a mover from a map that another program ha
 TEST_CASE("clean finds where the scans lie in a map that was made with other poses") {
   const TemporaryFolder folder;
   const std::string seq = folder / "seq", out = folder / "out", map = folder / "map.ply";
-  REQUIRE(start({"simulate", seq, "--scans", "20", "--sensor", "vlp16", "-q"}).code == 0);
-  REQUIRE(start({"run", seq, "--out", out, "-q"}).code == 0);
+  succeed(start({"simulate", seq, "--scans", "20", "--sensor", "vlp16", "-q"}));
+  succeed(start({"run", seq, "--out", out, "-q"}));
   const Recording recording(seq);
   // The points that stay, of a map of all points that is displaced.
   const auto kept = [&](const Eigen::Vector3d& displacement, std::string& said) {
@@ -110,8 +104,7 @@ TEST_CASE("clean finds where the scans lie in a map that was made with other pos
       }
     }
     write_text(map, CleanFixture::header(points) + lines.str());
-    const Outcome outcome = start({"clean", map, out, "--force"});
-    REQUIRE(outcome.code == 0);
+    const Outcome outcome = succeed(start({"clean", map, out, "--force"}));
     said = outcome.err;
     return count_lines(read_text(folder / "map_static.ply"));
   };
@@ -129,17 +122,14 @@ TEST_CASE("clean refuses a map or a recording that does not belong to the run") 
   const CleanFixture f;
   SECTION("an edge that is no number") {
     for (const char* edge : {"nan", "0", "inf"}) {
-      const Outcome outcome = f.clean({"--voxel", edge});
-      CHECK(outcome.code == 2);
-      CHECK_THAT(outcome.err, ContainsSubstring("--voxel = " + std::string(edge)));
+      check_refused(f.clean({"--voxel", edge}), 2, "--voxel = " + std::string(edge));
     }
   }
   SECTION("a map in another frame") {
     write_text(f.map, CleanFixture::header(1) + "0 0 0 0 0\n");
-    const Outcome outcome = f.clean();
-    CHECK(outcome.code == 1);
-    CHECK_THAT(outcome.err, ContainsSubstring("merged.ply: no point lies near a point of the "
-                                              "scans; expected a map in the frame of the poses"));
+    check_refused(f.clean(), 1,
+                  "merged.ply: no point lies near a point of the "
+                  "scans; expected a map in the frame of the poses");
   }
   SECTION("a map of which most lies elsewhere is cleaned with a warning") {
     const std::string first = f.standing.substr(0, f.standing.find('\n') + 1);

@@ -199,9 +199,7 @@ TEST_CASE("check estimates the offset of the clocks") {
   std::string sparse = rows.substr(0, rows.find('\n') + 1);
   sparse += rows.substr(rows.rfind('\n', rows.size() - 2) + 1);
   write_text(street.path() / "poses.txt", sparse);
-  const Outcome outcome = start({"check", street.path()});
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.err, ContainsSubstring("Poses are 4.6 s apart: --pose-gap takes them"));
+  check_refused(start({"check", street.path()}), 1, "Poses are 4.6 s apart: --pose-gap takes them");
 }
 
 TEST_CASE("check gives the error of inexact poses in centimetres and degrees") {
@@ -223,9 +221,8 @@ TEST_CASE("check gives the error of inexact poses in centimetres and degrees") {
 
 TEST_CASE("On a motorway, plants and posts tell the way that walls and rails leave open") {
   const simulation::Config config =
-      drive_of(simulation::Scene::kHighway, simulation::Sensor::kHdl32, 24, GENERATE(31U, 32U));
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kHdl32, 24, 31);
   const Street road(config);
-  INFO("seed " << config.seed);
   check_way_is_told(road);
   Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
   T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -244,10 +241,9 @@ TEST_CASE("A narrow view along a motorway tells the way, too") {
 }
 
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {
-  const simulation::Config config = drive_of(
-      simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, GENERATE(61U, 62U, 63U));
+  const simulation::Config config =
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 61);
   const Street road(config);
-  INFO("seed " << config.seed);
   const Diagnosis sound = road.diagnose([](const Eigen::Isometry3d& T) { return T; });
   CHECK(sound.sound());
 
@@ -407,10 +403,8 @@ TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") 
     std::string text = read_text(name);
     write_text(name, text.replace(text.find("intensity"), 9, "reflectivity"));
   }
-  const Outcome outcome = start(
-      {"run", folder / "seq", "-o", folder / "out", "-q", "--write-clean", "--frame", "world"});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  succeed(start(
+      {"run", folder / "seq", "-o", folder / "out", "-q", "--write-clean", "--frame", "world"}));
   CHECK(count_entries(folder / "out/labels") == 12);
 
   RecordingOptions options;

@@ -63,10 +63,8 @@ TEST_CASE("run on a log gives the labels of run on the folder; check and eval re
   write_tiny_sequence(folder / "seq", kLogScans, kPosition);
   write_text(folder / "drive.mcap", tiny_log());
   const std::string log = folder / "drive.mcap";
-  REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
-  const Outcome outcome = start({"run", log, "--out", folder / "of_log", "--write-clean"});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  succeed(start({"run", folder / "seq", "--out", folder / "of_folder"}));
+  const Outcome outcome = succeed(start({"run", log, "--out", folder / "of_log", "--write-clean"}));
   CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
   CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
   const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
@@ -118,9 +116,8 @@ TEST_CASE("No result replaces the log that is read") {
   write_text(folder / "out2" / "report.json",
              R"({"program": "dynains", "command": "run", "complete": true,
                  "outputs": {"files": ["timing.csv"], "folders": {}, "scans": []}})");
-  const Outcome outcome = start({"run", log, "--out", folder / "out2", "--force"});
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.err, ContainsSubstring("is read by this command"));
+  check_refused(start({"run", log, "--out", folder / "out2", "--force"}), 1,
+                "is read by this command");
   CHECK(read_text(log) == before);
 }
 
@@ -133,21 +130,14 @@ TEST_CASE(
       start({"simulate", folder / "kitti", "--scans", "2", "--rolling-shutter", "true"});
   CHECK(refused.code != 0);
   CHECK_THAT(refused.err, ContainsSubstring("--rolling-shutter needs --format mcap"));
-  REQUIRE(start({"simulate", folder / "drive", "--format", "mcap", "--scene", "urban", "--sensor",
-                 "vlp16", "--scans", "30", "--rolling-shutter", "true"})
-              .code == 0);
-  const auto static_accuracy = [&](const std::vector<std::string>& flags) {
+  succeed(start({"simulate", folder / "drive", "--format", "mcap", "--scene", "urban", "--sensor",
+                 "vlp16", "--scans", "30", "--rolling-shutter", "true"}));
+  const auto static_accuracy = [&](const Arguments& flags) {
     const std::string out = folder / ("out" + std::to_string(flags.size()));
     // Corrected poses alone make good for a part of the distortion.
-    std::vector<std::string> run = {"run", log, "--out", out, "--write-clean", "--pose-tolerance",
-                                    "0"};
-    std::vector<std::string> eval = {"eval", log, out};
-    run.insert(run.end(), flags.begin(), flags.end());
-    eval.insert(eval.end(), flags.begin(), flags.end());
-    REQUIRE(start(run).code == 0);
-    const Outcome scores = start(eval);
-    CAPTURE(scores.err);
-    REQUIRE(scores.code == 0);
+    succeed(start(Arguments{"run", log, "--out", out, "--write-clean", "--pose-tolerance", "0"} +
+                  flags));
+    const Outcome scores = succeed(start(Arguments{"eval", log, out} + flags));
     std::istringstream row(scores.out.substr(scores.out.find("\nrun ")));
     std::string name;
     double preservation = 0, rejection = 0, f1 = 0, accuracy = 0;
@@ -199,27 +189,24 @@ TEST_CASE("Memory for reading does not grow with the log") {
 
 TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {
   const TemporaryFolder folder;
-  const std::vector<std::string> flags = {"--sensor", "vlp16", "--scans", std::to_string(kLogScans),
-                                          "--seed",   "5"};
-  const auto simulate = [&](const std::string& out, std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"simulate", out};
-    arguments.insert(arguments.end(), flags.begin(), flags.end());
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return start(arguments);
+  const Arguments flags = {"--sensor", "vlp16", "--scans", std::to_string(kLogScans),
+                           "--seed",   "5"};
+  const auto simulate = [&](const std::string& out, const Arguments& more) {
+    return start(Arguments{"simulate", out} + flags + more);
   };
-  REQUIRE(simulate(folder / "seq", {}).code == 0);
-  REQUIRE(start({"run", folder / "seq", "--out", folder / "of_folder"}).code == 0);
+  succeed(simulate(folder / "seq", {}));
+  succeed(start({"run", folder / "seq", "--out", folder / "of_folder"}));
   const std::string log_folder = folder / "mcap";
   const std::string log = folder / "mcap" / "drive.mcap";
   CHECK(simulate(log_folder, {"--format", "mcap"}).out == "12 scans: " + log + "\n");
   CHECK(count_entries(log_folder) == 2);
   const std::string out = folder / "of_log";
-  REQUIRE(start({"run", log, "--out", out}).code == 0);
+  succeed(start({"run", log, "--out", out}));
   CHECK(all_labels(out) == all_labels(folder / "of_folder"));
   CHECK(start({"eval", log, out}).out == start({"eval", folder / "seq", folder / "of_folder"}).out);
   const std::string first = read_text(log);
-  REQUIRE(simulate(log_folder, {"--format", "mcap", "--force"}).code == 0);
+  succeed(simulate(log_folder, {"--format", "mcap", "--force"}));
   CHECK(read_text(log) == first);
-  REQUIRE(simulate(log_folder, {"--force"}).code == 0);
+  succeed(simulate(log_folder, {"--force"}));
   CHECK_FALSE(fs::exists(log));
 }

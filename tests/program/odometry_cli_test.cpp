@@ -26,9 +26,8 @@ class Unposed {
     const fs::path velodyne = sequence() / "velodyne";
     if (lost_from < scans) {
       const fs::path street = folder_ / "street";
-      REQUIRE(start({"simulate", street, "--scene", "urban", "--sensor", "vlp16", "--scans",
-                     std::to_string(scans), "-q"})
-                  .code == 0);
+      succeed(start({"simulate", street, "--scene", "urban", "--sensor", "vlp16", "--scans",
+                     std::to_string(scans), "-q"}));
       for (int i = lost_from; i < scans; ++i) {
         const std::string name = (i < 10 ? "00000" : "0000") + std::to_string(i) + ".bin";
         fs::copy_file(street / "velodyne" / name, velodyne / name,
@@ -46,9 +45,8 @@ class Unposed {
 
  private:
   void simulate(const char* scene, int scans) {
-    REQUIRE(start({"simulate", sequence(), "--scene", scene, "--sensor", "vlp16", "--seed", "8",
-                   "--scans", std::to_string(scans), "-q"})
-                .code == 0);
+    succeed(start({"simulate", sequence(), "--scene", scene, "--sensor", "vlp16", "--seed", "8",
+                   "--scans", std::to_string(scans), "-q"}));
   }
 
   TemporaryFolder folder_;
@@ -66,13 +64,11 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
     std::vector<std::string> arguments = {command, recording.sequence()};
     if (std::string(command) == "run")
       arguments.insert(arguments.end(), {"--out", recording / "x"});
-    const Outcome outcome = start(arguments);
-    CHECK(outcome.code == 1);
-    CHECK_THAT(outcome.err, ContainsSubstring("run --odometry estimates them"));
+    check_refused(start(arguments), 1, "run --odometry estimates them");
   }
 
   const fs::path poses = recording / "poses.txt";
-  REQUIRE(start({"odometry", recording.sequence(), "--out", poses, "-q"}).code == 0);
+  succeed(start({"odometry", recording.sequence(), "--out", poses, "-q"}));
   const Trajectory found = read_trajectory(poses);
   REQUIRE(found.poses.size() == 12);
   const Pose T_first_world = recording.exact().T_world_sensor(0).inverse();
@@ -88,7 +84,7 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
   CHECK(read_trajectory(poses).poses.back().matrix() == found.poses.back().matrix());
 
   const fs::path out = recording / "out";
-  REQUIRE(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}).code == 0);
+  succeed(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}));
   CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
   CHECK(count_files(out / "labels") == 12);
   CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--force", "-q"}).code ==
@@ -156,11 +152,9 @@ TEST_CASE("A loss of track at the second scan leaves nothing, with the exit code
 
 TEST_CASE("The odometry refuses what it cannot use") {
   const Unposed recording(3);
-  const auto error = [&](std::vector<std::string> more) {
-    std::vector<std::string> arguments = {"odometry", recording.sequence(), "--out",
-                                          recording / "new.txt"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const Outcome outcome = start(arguments);
+  const auto error = [&](const Arguments& more) {
+    const Outcome outcome =
+        start(Arguments{"odometry", recording.sequence(), "--out", recording / "new.txt"} + more);
     CHECK_FALSE(fs::exists(recording / "new.txt"));
     return std::to_string(outcome.code) + outcome.err;
   };
@@ -171,8 +165,7 @@ TEST_CASE("The odometry refuses what it cannot use") {
   CHECK_THAT(error({"--frame", "world"}), ContainsSubstring("frame of the world"));
   const Outcome outcome =
       start({"run", recording.sequence(), "--no-deskew", "--out", recording / "out"});
-  CHECK(outcome.code == 2);
-  CHECK_THAT(outcome.err, ContainsSubstring("needs --odometry"));
+  check_refused(outcome, 2, "needs --odometry");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string>
@@ -49,17 +50,18 @@ void write_other_poses(const std::string& file, std::size_t count, unsigned seed
 
 /// A finished run over a small sequence, and a file of corrected poses.
 struct RemapFixture {
-  explicit RemapFixture(std::vector<std::string> more = {}) {
+  explicit RemapFixture(const Arguments& more = {}) {
     write_tiny_sequence(seq, kRunScans);
     write_other_poses(corrected, kRunScans, 7);
     std::vector<std::string> arguments = {"run", seq, "--out", out};
     arguments.insert(arguments.end(), more.begin(), more.end());
     if (start(arguments).code != 0) throw std::runtime_error("run failed");
   }
-  Outcome remap(std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"remap", seq, out};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return start(arguments);
+  RemapFixture(const RemapFixture& other) {
+    fs::copy(other.folder.path(), folder.path(), fs::copy_options::recursive);
+  }
+  Outcome remap(const Arguments& more = {}) const {
+    return start(Arguments{"remap", seq, out} + more);
   }
 
   TemporaryFolder folder;
@@ -67,6 +69,7 @@ struct RemapFixture {
   std::string out = folder / "an out";
   std::string corrected = folder / "corrected.txt";
   std::string map = out + "/static_map_remapped.ply";
+  std::string report = out + "/report.json";
 };
 
 /// Bytes of the map of the labels in `out` under the poses of `corrected`.
@@ -108,9 +111,7 @@ std::string expected_map(const RemapFixture& f) {
 TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses") {
   const RemapFixture f;
   const std::string own_map = read_text(f.out + "/static_map.ply");
-  const Outcome outcome = f.remap({"--poses", f.corrected});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  const Outcome outcome = succeed(f.remap({"--poses", f.corrected}));
   CHECK(read_text(f.map) == expected_map(f));
   CHECK_THAT(outcome.out, ContainsSubstring("12 scans, static map: "));
   CHECK(read_text(f.out + "/static_map.ply") == own_map);
@@ -120,18 +121,18 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
 
   SECTION("a further correction replaces the map") {
     write_other_poses(f.corrected, kRunScans, 8);
-    REQUIRE(f.remap({"--poses", f.corrected, "-q"}).code == 0);
+    succeed(f.remap({"--poses", f.corrected, "-q"}));
     CHECK(read_text(f.map) == expected_map(f));
   }
   SECTION("the run is complete as before, and --force removes the map with it") {
     CHECK_THAT(start({"run", f.seq, "--out", f.out}).err, ContainsSubstring("earlier results"));
-    REQUIRE(start({"run", f.seq, "--out", f.out, "--force"}).code == 0);
+    succeed(start({"run", f.seq, "--out", f.out, "--force"}));
     CHECK_FALSE(fs::exists(f.map));
   }
   SECTION("a map elsewhere leaves the folder of the run as it is") {
     const std::string before = read_text(f.out + "/report.json");
     const std::string elsewhere = f.folder / "corrected.ply";
-    REQUIRE(f.remap({"--poses", f.corrected, "--map", elsewhere}).code == 0);
+    succeed(f.remap({"--poses", f.corrected, "--map", elsewhere}));
     CHECK(read_text(elsewhere) == expected_map(f));
     CHECK(read_text(f.out + "/report.json") == before);
     CHECK_THAT(f.remap({"--map", elsewhere}).err, ContainsSubstring("exists"));
@@ -159,18 +160,16 @@ TEST_CASE("remap of scans of thousands of points gives the same bytes") {
     write_labels(f.out + "/labels/" + name + ".label", labels);
     fs::remove(f.out + "/causes/" + name + ".cause");
   }
-  const Outcome outcome = f.remap({"--poses", f.corrected});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  succeed(f.remap({"--poses", f.corrected}));
   CHECK(read_text(f.map) == expected_map(f));
 }
 
 TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
   const RemapFixture f({"--level", "false"});
-  REQUIRE(f.remap().code == 0);
+  succeed(f.remap());
   CHECK(read_points(f.map).positions.size() ==
         read_points(f.out + "/static_map.ply").positions.size());
-  REQUIRE(f.remap({"--map-voxel", "0"}).code == 0);
+  succeed(f.remap({"--map-voxel", "0"}));
   const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
   CHECK(read_points(f.map).positions.size() == report["labels"]["static"].get<std::size_t>() +
                                                    report["labels"]["ground"].get<std::size_t>());
@@ -178,8 +177,7 @@ TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
 
 TEST_CASE("remap takes a run over some of the scans") {
   const RemapFixture f({"--start", "3", "--end", "8"});
-  const Outcome outcome = f.remap({"--poses", f.corrected});
-  REQUIRE(outcome.code == 0);
+  const Outcome outcome = succeed(f.remap({"--poses", f.corrected}));
   CHECK_THAT(outcome.out, ContainsSubstring("6 scans"));
 }
 
@@ -201,8 +199,8 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
     writer.commit();
   }
   const std::string out = f.folder / "world out";
-  REQUIRE(start({"run", seq, "--out", out, "--frame", "world", "--accept-poses"}).code == 0);
-  REQUIRE(start({"remap", seq, out, "--poses", f.corrected}).code == 0);
+  succeed(start({"run", seq, "--out", out, "--frame", "world", "--accept-poses"}));
+  succeed(start({"remap", seq, out, "--poses", f.corrected}));
   RecordingOptions world;
   world.frame = PointFrame::kWorld;
   RecordingOptions corrected;
@@ -215,99 +213,87 @@ TEST_CASE("remap of points in the frame of the world leads through the poses of 
   const std::string other = f.folder / "other.txt";
   write_other_poses(other, kRunScans, 4);
   const std::string other_out = f.folder / "other out";
-  REQUIRE(start({"run", seq, "--out", other_out, "--frame", "world", "--poses", other,
-                 "--accept-poses"})
-              .code == 0);
-  const Outcome outcome = start({"remap", seq, other_out, "--poses", f.corrected});
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.err, ContainsSubstring("are not those of the run"));
+  succeed(start(
+      {"run", seq, "--out", other_out, "--frame", "world", "--poses", other, "--accept-poses"}));
+  check_refused(start({"remap", seq, other_out, "--poses", f.corrected}), 1,
+                "are not those of the run");
 }
 
 TEST_CASE("remap refuses what does not belong together, and writes nothing then") {
-  const RemapFixture f;
-  const std::string report_file = f.out + "/report.json";
-  std::vector<std::string> arguments = {"--poses", f.corrected};
-  std::string expected;
-  int code = 1;
-  SECTION("fewer poses than scans") {
-    write_other_poses(f.corrected, kRunScans - 1, 7);
-    expected = "expected";
+  const RemapFixture made;
+  const std::string name = scan_name(4);
+  const auto write_points = [&](const RemapFixture& f, const std::vector<float>& xyzi) {
+    write_scan(f.seq + "/velodyne/" + name + ".bin", xyzi);
+  };
+  const auto write_classes = [&](const RemapFixture& f, const std::vector<std::uint32_t>& labels) {
+    write_labels(f.out + "/labels/" + name + ".label", labels);
+  };
+  struct Case {
+    std::function<void(const RemapFixture&)> spoil;
+    std::string expected;
+  };
+  const std::vector<Case> cases = {
+      {[](const auto& f) { write_other_poses(f.corrected, kRunScans - 1, 7); }, "expected"},
+      {[](const auto& f) {
+         std::string rows, times;
+         for (std::size_t i = 0; i < kRunScans; ++i) {
+           const std::string time = std::to_string(0.1 * static_cast<double>(i));
+           if (i < 8) rows += time + " 0 0 0 0 0 0 1\n";
+           times += time + '\n';
+         }
+         write_text(f.corrected, rows);
+         write_text(f.seq + "/times.txt", times);
+       },
+       "has no pose or no scan for 4 of 12 scans of the run, 000008 first"},
+      {[](const auto& f) {
+         auto report = nlohmann::json::parse(read_text(f.report));
+         report["complete"] = false;
+         write_text(f.report, report.dump());
+       },
+       "/complete: expected true"},
+      {[](const auto& f) {
+         fs::remove_all(f.out);
+         fs::create_directory(f.out);
+       },
+       "report.json: not found"},
+      {[](const auto& f) { fs::remove_all(f.out); }, "cannot be opened: No such file"},
+      {[&](const auto& f) { write_points(f, std::vector<float>(40, 1.0F)); }, name + ".label: has"},
+      {[&](const auto& f) {
+         write_classes(f, std::vector<std::uint32_t>(tiny_scan(4).size() / 4, 40));
+       },
+       "point 0 has class 40"},
+      {[&](const auto& f) {
+         write_points(f, std::vector<float>(std::size_t{4} * 9001, 5.0F));
+         std::vector<std::uint32_t> labels(9001, 9);
+         labels.back() = 40;
+         write_classes(f, labels);
+       },
+       "point 9000 has class 40"},
+      {[&](const auto& f) {
+         write_points(f, std::vector<float>(tiny_scan(4).size(), std::nanf("")));
+       },
+       "not finite"},
+      {[](const auto& f) { write_text(f.map, "mine"); }, "is in the way"},
+  };
+  const auto check_unchanged = [](const RemapFixture& f, const std::vector<std::string>& flags,
+                                  int code, const std::string& expected) {
+    CAPTURE(expected);
+    const auto text_of = [](const std::string& file) {
+      return fs::exists(file) ? read_text(file) : "";
+    };
+    const std::string report = text_of(f.report), map = text_of(f.map);
+    check_refused(f.remap(Arguments{"--poses", f.corrected} + flags), code, expected);
+    CHECK(text_of(f.report) == report);
+    CHECK(text_of(f.map) == map);
+  };
+  for (const Case& wrong : cases) {
+    const RemapFixture f(made);
+    wrong.spoil(f);
+    check_unchanged(f, {}, 1, wrong.expected);
   }
-  SECTION("poses in time for some scans only") {
-    std::string rows;
-    for (int i = 0; i < 8; ++i) rows += std::to_string(0.1 * i) + " 0 0 0 0 0 0 1\n";
-    write_text(f.corrected, rows);
-    std::string times;
-    for (std::size_t i = 0; i < kRunScans; ++i) times += std::to_string(0.1 * double(i)) + "\n";
-    write_text(f.seq + "/times.txt", times);
-    expected = "has no pose or no scan for 4 of 12 scans of the run, 000008 first";
-  }
-  SECTION("an interrupted run") {
-    auto report = nlohmann::json::parse(read_text(report_file));
-    report["complete"] = false;
-    write_text(report_file, report.dump());
-    expected = "/complete: expected true";
-  }
-  SECTION("a folder without a run") {
-    fs::remove_all(f.out);
-    fs::create_directory(f.out);
-    expected = "report.json: not found";
-  }
-  SECTION("no folder") {
-    fs::remove_all(f.out);
-    expected = "cannot be opened: No such file";
-  }
-  SECTION("labels of other scans") {
-    const std::vector<float> scan(40, 1.0F);
-    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
-    expected = scan_name(4) + ".label: has";
-  }
-  SECTION("labels of another program") {
-    std::vector<std::uint32_t> labels(tiny_scan(4).size() / 4, 40);
-    write_labels(f.out + "/labels/" + scan_name(4) + ".label", labels);
-    expected = "point 0 has class 40";
-  }
-  SECTION("a label of another program at the last of many points") {
-    std::vector<float> scan(std::size_t{4} * 9001, 5.0F);
-    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
-    std::vector<std::uint32_t> labels(9001, 9);
-    labels.back() = 40;
-    write_labels(f.out + "/labels/" + scan_name(4) + ".label", labels);
-    expected = "point 9000 has class 40";
-  }
-  SECTION("static points that are none") {
-    std::vector<float> scan = tiny_scan(4);
-    std::fill(scan.begin(), scan.end(), std::nanf(""));
-    write_scan(f.seq + "/velodyne/" + scan_name(4) + ".bin", scan);
-    expected = "not finite";
-  }
-  SECTION("a file of another owner in the place of the map") {
-    write_text(f.map, "mine");
-    expected = "is in the way";
-  }
-  SECTION("a map under a name of the run") {
-    arguments.insert(arguments.end(), {"--map", f.out + "/static_map.ply"});
-    expected = "in the folder of the run, the map is static_map_remapped.ply";
-    code = 2;
-  }
-  SECTION("a voxel size that no map has") {
-    arguments.insert(arguments.end(), {"--map-voxel", "0.001"});
-    expected = "map_voxel = 0.001";
-    code = 2;
-  }
-  SECTION("a folder in use") {
-    const FolderLock lock(f.out);
-    const Outcome outcome = f.remap(arguments);
-    CHECK(outcome.code == 2);
-    CHECK_FALSE(fs::exists(f.map));
-    return;
-  }
-  const std::string before = fs::exists(report_file) ? read_text(report_file) : "";
-  const std::string in_the_way = fs::exists(f.map) ? read_text(f.map) : "";
-  const Outcome outcome = f.remap(arguments);
-  CAPTURE(outcome.err);
-  CHECK(outcome.code == code);
-  CHECK_THAT(outcome.err, ContainsSubstring(expected));
-  CHECK((fs::exists(report_file) ? read_text(report_file) : "") == before);
-  CHECK((fs::exists(f.map) ? read_text(f.map) : "") == in_the_way);
+  check_unchanged(made, {"--map", made.out + "/static_map.ply"}, 2,
+                  "in the folder of the run, the map is static_map_remapped.ply");
+  check_unchanged(made, {"--map-voxel", "0.001"}, 2, "map_voxel = 0.001");
+  const FolderLock lock(made.out);
+  check_unchanged(made, {}, 2, "is in use");
 }

@@ -27,9 +27,8 @@ struct CarPark {
                                    "--scans", "180", "--rate", "5", "--seed", "7"});
     if (outcome.code != 0) throw std::runtime_error(outcome.err);
   }
-  Outcome run(const std::string& out, std::vector<std::string> more) const {
-    more.insert(more.begin(), {"run", seq, "--out", folder / out});
-    return start(more);
+  Outcome run(const std::string& out, const Arguments& more) const {
+    return start(Arguments{"run", seq, "--out", folder / out} + more);
   }
   fs::path path(const std::string& name) const { return folder / name; }
   std::vector<std::uint32_t> labels(const std::string& out, const std::string& scan) const {
@@ -59,9 +58,9 @@ std::vector<std::string> differing(const fs::path& a, const fs::path& b) {
 
 TEST_CASE("the second pass removes and restores points, and its results agree") {
   const CarPark recording;
-  REQUIRE(recording.run("one", {"--passes", "1"}).code == 0);
-  REQUIRE(recording.run("two", {"--passes", "2"}).code == 0);
-  REQUIRE(recording.run("alone", {"--passes", "2", "--one-thread"}).code == 0);
+  succeed(recording.run("one", {"--passes", "1"}));
+  succeed(recording.run("two", {"--passes", "2"}));
+  succeed(recording.run("alone", {"--passes", "2", "--one-thread"}));
   CHECK(differing(recording.path("two"), recording.path("alone")).empty());
   CHECK(differing(recording.path("alone"), recording.path("two")).empty());
 
@@ -89,14 +88,14 @@ TEST_CASE("the second pass removes and restores points, and its results agree") 
   CHECK(report["complete"] == true);
 
   // remap builds the map of the static labels.
-  REQUIRE(start({"remap", recording.seq, recording.path("two").string()}).code == 0);
+  succeed(start({"remap", recording.seq, recording.path("two").string()}));
   CHECK(read_text(recording.path("two") / "static_map.ply") ==
         read_text(recording.path("two") / "static_map_remapped.ply"));
 }
 
 TEST_CASE("a run of two passes that was killed is repeated with the same bytes") {
   const CarPark recording;
-  REQUIRE(recording.run("whole", {"--passes", "2"}).code == 0);
+  succeed(recording.run("whole", {"--passes", "2"}));
   Process process({"run", recording.seq, "--out", recording.folder / "out", "--passes", "2"});
   const fs::path late = recording.path("out.partial") / "labels" / "000060.label";
   while (!fs::exists(late)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -113,7 +112,7 @@ TEST_CASE("table1 has the scores of a run with one pass, and of one with two") {
   const auto rows_of = [&](std::vector<std::string> arguments) {
     const std::string json = recording.folder / "scores.json";
     arguments.insert(arguments.end(), {"--unlabeled", "static", "--json", json});
-    REQUIRE(start(arguments).code == 0);
+    succeed(start(arguments));
     return nlohmann::json::parse(read_text(json));
   };
   const auto table = rows_of({"experiment", "table1", recording.seq})[0]["evaluation"]["rows"];
@@ -122,7 +121,7 @@ TEST_CASE("table1 has the scores of a run with one pass, and of one with two") {
   for (const std::size_t passes : {1U, 2U}) {
     CAPTURE(passes);
     const std::string out = std::to_string(passes);
-    REQUIRE(recording.run(out, {"--passes", out}).code == 0);
+    succeed(recording.run(out, {"--passes", out}));
     const auto run = rows_of({"eval", recording.seq, recording.path(out).string()})["rows"][2];
     CHECK(table[3 + passes]["voxels"] == run["voxels"]);
     CHECK(table[3 + passes]["points"] == run["points"]);
@@ -135,14 +134,12 @@ TEST_CASE("passes are one or two, and the policy of what stands needs two") {
   for (const char* const passes : {"0", "3"}) {
     CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);
   }
-  const std::vector<std::vector<std::string>> streams = {
-      {"--passes", "1"}, {"--preset", "default"}};
+  const std::vector<std::vector<std::string>> streams = {{"--passes", "1"},
+                                                         {"--preset", "default"}};
   for (const std::vector<std::string>& stream : streams) {
     CAPTURE(stream.front());
-    std::vector<std::string> flags = {"run",          folder / "seq", "--out",
-                                      folder / "out", "--static",     "last"};
-    flags.insert(flags.end(), stream.begin(), stream.end());
-    const Outcome last = start(flags);
+    const Outcome last = start(
+        Arguments{"run", folder / "seq", "--out", folder / "out", "--static", "last"} + stream);
     CHECK(last.code == 2);
     CHECK(last.err.find("--static last needs --passes 2") != std::string::npos);
   }

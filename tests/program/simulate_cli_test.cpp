@@ -11,10 +11,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Outcome simulate(const std::string& out, std::vector<std::string> more = {}) {
-  std::vector<std::string> arguments = {"simulate", out, "--sensor", "vlp16"};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return start(arguments);
+Outcome simulate(const std::string& out, const Arguments& more = {}) {
+  return start(Arguments{"simulate", out, "--sensor", "vlp16"} + more);
 }
 
 }  // namespace
@@ -23,7 +21,7 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
   TemporaryFolder folder;
   const std::string a = folder / "a";
   const std::string b = folder / "b";
-  REQUIRE(simulate(a, {"--scans", "6", "--seed", "3"}).code == 0);
+  succeed(simulate(a, {"--scans", "6", "--seed", "3"}));
   REQUIRE(simulate(b, {"--scans", "6", "--seed", "3", "--quiet"}).out.empty());
   const Recording recording(a);
   CHECK(recording.size() == 6);
@@ -36,7 +34,7 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
 
   const std::string out = folder / "out";
   for (const char* preset : {"paper", "default"}) {
-    REQUIRE(start({"run", a, "--out", out, "--preset", preset, "--force"}).code == 0);
+    succeed(start({"run", a, "--out", out, "--preset", preset, "--force"}));
     const Outcome judged = start({"eval", a, out, "--errors", "--json", folder / "eval.json"});
     CAPTURE(judged.err);
     CHECK(judged.code == 0);
@@ -68,9 +66,7 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
   for (const std::string& input : {a + "/labels/000001.label", a + "/velodyne/000001.bin",
                                    a + "/poses.txt", out + "/causes/000001.cause"}) {
     const std::string before = read_text(input);
-    const Outcome refused = start({"eval", a, out, "--json", input});
-    CHECK(refused.code == 1);
-    CHECK_THAT(refused.err, ContainsSubstring(input + ": is read by this command"));
+    check_refused(start({"eval", a, out, "--json", input}), 1, input + ": is read by this command");
     CHECK(read_text(input) == before);
   }
 
@@ -85,25 +81,22 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
 TEST_CASE("simulate replaces only its own results, and only by --force") {
   TemporaryFolder folder;
   const std::string out = folder / "sim";
-  REQUIRE(simulate(out, {"--scans", "3"}).code == 0);
+  succeed(simulate(out, {"--scans", "3"}));
   CHECK(simulate(out, {"--scans", "2"}).code == 1);
   CHECK(Recording(out).size() == 3);
-  REQUIRE(simulate(out, {"--scans", "2", "--force"}).code == 0);
+  succeed(simulate(out, {"--scans", "2", "--force"}));
   CHECK(Recording(out).size() == 2);
 
   // A marker that lists no files, or the marker of a run, does not permit it either.
-  REQUIRE(start({"run", out, "--out", folder / "run"}).code == 0);
+  succeed(start({"run", out, "--out", folder / "run"}));
   for (const std::string& marker : {std::string("{}"), read_text(folder / "run/report.json")}) {
     write_text(out + "/simulation.json", marker);
-    const Outcome refused = simulate(out, {"--scans", "1", "--force"});
-    CHECK(refused.code == 1);
-    CHECK_THAT(refused.err, ContainsSubstring("simulation.json: was not written by dynains sim"));
+    check_refused(simulate(out, {"--scans", "1", "--force"}), 1,
+                  "simulation.json: was not written by dynains sim");
     CHECK(Recording(out).size() == 2);
   }
   fs::remove(out + "/simulation.json");
-  const Outcome refused = simulate(out, {"--scans", "1", "--force"});
-  CHECK(refused.code == 1);
-  CHECK_THAT(refused.err, ContainsSubstring("no simulation.json"));
+  check_refused(simulate(out, {"--scans", "1", "--force"}), 1, "no simulation.json");
   CHECK(Recording(out).size() == 2);
 }
 

@@ -13,8 +13,16 @@
 #include <vector>
 
 #include "io/files.hpp"
+#include "support/catch.hpp"
 
 namespace dynains::test {
+
+using Arguments = std::vector<std::string>;
+
+inline Arguments operator+(Arguments left, const Arguments& right) {
+  left.insert(left.end(), right.begin(), right.end());
+  return left;
+}
 
 struct Outcome {
   int code;         ///< exit code; 128 + signal if a signal killed it
@@ -27,7 +35,7 @@ struct Outcome {
 class Process {
  public:
   explicit Process(
-      std::vector<std::string> arguments, const std::function<void()>& prepare = [] {}) {
+      Arguments arguments, const std::function<void()>& prepare = [] {}) {
     std::vector<char*> argv;
     arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
     for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -78,12 +86,25 @@ class Process {
 };
 
 inline Outcome start(
-    const std::vector<std::string>& arguments, const std::function<void()>& prepare = [] {}) {
+    const Arguments& arguments, const std::function<void()>& prepare = [] {}) {
   return Process(arguments, prepare).wait();
 }
 
+/// Requires exit code 0.
+inline Outcome succeed(Outcome outcome) {
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+  return outcome;
+}
+
+/// Checks the exit code of a command that failed, and that its message has these words.
+inline void check_refused(const Outcome& outcome, int code, const std::string& words) {
+  CHECK(outcome.code == code);
+  CHECK_THAT(outcome.err, ContainsSubstring(words));
+}
+
 /// Output of `dynains ARGUMENTS` on a pseudo-terminal. Throws unless the exit code is 0.
-inline std::string show_on_terminal(std::vector<std::string> arguments) {
+inline std::string show_on_terminal(Arguments arguments) {
   const int screen = ::posix_openpt(O_RDWR | O_NOCTTY);
   if (screen < 0 || ::grantpt(screen) != 0 || ::unlockpt(screen) != 0) {
     throw std::runtime_error("no pseudo terminal");

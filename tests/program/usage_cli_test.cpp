@@ -92,18 +92,6 @@ TEST_CASE("Help that cannot be written is an error") {
   CHECK(start({"run", "--help"}, to_full).code == 1);
 }
 
-TEST_CASE("File names cannot control the terminal") {
-  const TemporaryFolder folder;
-  const std::string name =
-      "evil\x1b]0;title\x07\x1b[2J\nline\xc2\x9b"
-      "2J\xc3\xa4";
-  const Outcome outcome = start({"run", folder / name, "--out", folder / "out"});
-  CHECK(outcome.code == 1);
-  CHECK(outcome.err.find("evil\\x1B]0;title\\x07\\x1B[2J\\nline\\xC2\\x9B"
-                         "2J\xc3\xa4") != std::string::npos);
-  CHECK(outcome.err.find('\x1b') == std::string::npos);
-}
-
 TEST_CASE("A NUL byte in a config file is named with its line") {
   const TemporaryFolder folder;
   write_text(folder / "config", std::string("tau-s = 0.6\nmargin = 0.2\0 5\n", 28));

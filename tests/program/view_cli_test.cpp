@@ -31,9 +31,7 @@ bool contains(const std::string& text, const std::string& part) {
 
 TEST_CASE("the page of a run has its description and is listed among the results") {
   const PageFixture fixture;
-  const Outcome run = start({"run", fixture.seq, "--out", fixture.out, "--view"});
-  CAPTURE(run.err);
-  REQUIRE(run.code == 0);
+  const Outcome run = succeed(start({"run", fixture.seq, "--out", fixture.out, "--view"}));
   CHECK(contains(run.out, "page: " + fixture.page + "\n"));
   const std::string page = read_text(fixture.page);
   CHECK(contains(page, "\"has_beliefs\":true"));
@@ -44,12 +42,12 @@ TEST_CASE("the page of a run has its description and is listed among the results
   CHECK(contains(read_text(fixture.out + "/report.json"), "\"view.html\""));
 
   // The page belongs to the results: it goes with them.
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--force"}).code == 0);
+  succeed(start({"run", fixture.seq, "--out", fixture.out, "--force"}));
   CHECK(!fs::exists(fixture.page));
   CHECK(!fs::exists(fixture.out + "/beliefs"));
-  REQUIRE(start({"view", fixture.out}).code == 0);
+  succeed(start({"view", fixture.out}));
   CHECK(contains(read_text(fixture.page), "\"has_beliefs\":false"));
-  REQUIRE(start({"view", fixture.out}).code == 0);
+  succeed(start({"view", fixture.out}));
   CHECK(contains(read_text(fixture.out + "/report.json"), "\"complete\": true"));
 }
 
@@ -59,7 +57,7 @@ TEST_CASE("view refuses what is no finished run, and files of others") {
                  fixture.out + ": cannot be opened: No such file or directory"));
   fs::create_directory(fixture.out);
   CHECK(contains(start({"view", fixture.out}).err, "report.json: not found"));
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out}).code == 0);
+  succeed(start({"run", fixture.seq, "--out", fixture.out}));
   write_text(fixture.page, "mine");
   const Outcome refused = start({"view", fixture.out});
   CHECK(refused.code == 1);
@@ -71,8 +69,8 @@ TEST_CASE("view finds the recording by the report, with its flags, or by its new
   const PageFixture fixture;
   const std::string poses = fixture.folder / "my poses.txt";
   fs::rename(fixture.seq + "/poses.txt", poses);
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--poses", poses}).code == 0);
-  REQUIRE(start({"view", fixture.out}).code == 0);
+  succeed(start({"run", fixture.seq, "--out", fixture.out, "--poses", poses}));
+  succeed(start({"view", fixture.out}));
 
   fs::rename(fixture.seq, fixture.seq + "2");
   CHECK(contains(start({"view", fixture.out}).err, "name the place of the run's recording"));
@@ -83,7 +81,7 @@ TEST_CASE("view finds the recording by the report, with its flags, or by its new
 
 TEST_CASE("beliefs are written on demand, one byte per point") {
   const PageFixture fixture;
-  REQUIRE(start({"run", fixture.seq, "--out", fixture.out, "--write-beliefs"}).code == 0);
+  succeed(start({"run", fixture.seq, "--out", fixture.out, "--write-beliefs"}));
   CHECK(fs::file_size(fixture.out + "/beliefs/000003.belief") ==
         fs::file_size(fixture.out + "/causes/000003.cause"));
   fs::resize_file(fixture.out + "/beliefs/000003.belief", 7);

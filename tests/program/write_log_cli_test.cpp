@@ -106,10 +106,8 @@ std::vector<Message> cleaned(const fs::path& log, const fs::path& out, std::size
 struct Fixture {
   Fixture() { write_text(log, tiny_log()); }
 
-  Outcome run(const std::vector<std::string>& flags) const {
-    std::vector<std::string> arguments = {"run", log, "--out", out, "--quiet"};
-    arguments.insert(arguments.end(), flags.begin(), flags.end());
-    return start(arguments);
+  Outcome run(const Arguments& flags) const {
+    return start(Arguments{"run", log, "--out", out, "--quiet"} + flags);
   }
 
   TemporaryFolder folder;
@@ -124,9 +122,7 @@ TEST_CASE(
     "run --write-log writes the log again: clouds without moving points, all else as it was") {
   Fixture fixture;
   fs::create_directory(fixture.folder / "clean");
-  const Outcome outcome = fixture.run({"--write-log", fixture.target});
-  CAPTURE(outcome.err);
-  REQUIRE(outcome.code == 0);
+  const Outcome outcome = succeed(fixture.run({"--write-log", fixture.target}));
   CHECK(outcome.err.empty());
   const std::vector<Message> expected = cleaned(fixture.log, fixture.out, 0);
   CHECK(expected != messages_of(fixture.log));
@@ -138,17 +134,15 @@ TEST_CASE(
   const std::string bytes = read_text(fixture.target);
   CHECK(fixture.run({"--write-log", fixture.target, "--force"}).code == 0);
   CHECK(read_text(fixture.target) == bytes);
-  const Outcome refused = start({"run", fixture.log, "--out", fixture.folder / "other", "--force",
-                                 "--write-log", fixture.target});
-  CHECK(refused.code == 1);
-  CHECK_THAT(refused.err, ContainsSubstring("drive.mcap: exists"));
+  check_refused(start({"run", fixture.log, "--out", fixture.folder / "other", "--force",
+                       "--write-log", fixture.target}),
+                1, "drive.mcap: exists");
 }
 
 TEST_CASE("Clouds without a verdict stay in the log as they are, and their number is told") {
   Fixture fixture;
   const std::string target = fixture.folder / "window.mcap";
-  const Outcome outcome = fixture.run({"--write-log", target, "--start", "3"});
-  REQUIRE(outcome.code == 0);
+  const Outcome outcome = succeed(fixture.run({"--write-log", target, "--start", "3"}));
   CHECK_THAT(outcome.err, ContainsSubstring("window.mcap: 3 clouds have no verdict"));
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 3));
 }
@@ -156,7 +150,7 @@ TEST_CASE("Clouds without a verdict stay in the log as they are, and their numbe
 TEST_CASE("run --mark adds the labels of the run to all clouds") {
   Fixture fixture;
   const std::string target = fixture.folder / "marked.mcap";
-  REQUIRE(fixture.run({"--write-log", target, "--mark", "--start", "3"}).code == 0);
+  succeed(fixture.run({"--write-log", target, "--mark", "--start", "3"}));
   const std::vector<Message> before = messages_of(fixture.log);
   const std::vector<Message> after = messages_of(target);
   REQUIRE(after.size() == before.size());
@@ -185,10 +179,9 @@ TEST_CASE("run --mark adds the labels of the run to all clouds") {
   }
   // The marked log is a recording with labels.
   CHECK(start({"eval", target, fixture.out}).code == 0);
-  const Outcome again = start({"run", target, "--out", fixture.folder / "again", "--write-log",
-                               fixture.folder / "twice.mcap", "--mark"});
-  CHECK(again.code == 2);
-  CHECK_THAT(again.err, ContainsSubstring("have labels already"));
+  check_refused(start({"run", target, "--out", fixture.folder / "again", "--write-log",
+                       fixture.folder / "twice.mcap", "--mark"}),
+                2, "have labels already");
 }
 
 TEST_CASE("A log that is a folder is written as one file, not into that folder") {
@@ -201,7 +194,7 @@ TEST_CASE("A log that is a folder is written as one file, not into that folder")
   CHECK_THAT(fixture.run({"--write-log", parts / "clean.mcap"}).err,
              ContainsSubstring("is read by this command"));
   const fs::path target = fixture.folder / "clean.mcap";
-  REQUIRE(fixture.run({"--write-log", target}).code == 0);
+  succeed(fixture.run({"--write-log", target}));
   CHECK(messages_of(target) == cleaned(parts, fixture.out, 0));
 }
 
@@ -231,9 +224,8 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
     CHECK_FALSE(fs::exists(fixture.out));
   }
   fixture.log = fixture.folder / "seq";
-  const Outcome outcome = fixture.run({"--write-log", fixture.folder / "a.mcap"});
-  CHECK(outcome.code == 2);
-  CHECK_THAT(outcome.err, ContainsSubstring("the recording is no log"));
+  check_refused(fixture.run({"--write-log", fixture.folder / "a.mcap"}), 2,
+                "the recording is no log");
   CHECK(read_text(there) == "mine");
   CHECK(read_text(fixture.folder / "drive.mcap") == before);
 }
@@ -242,7 +234,7 @@ TEST_CASE("A log that does not fit on the disk leaves nothing, for the results a
   Fixture fixture;
   const std::string target = fixture.folder / "big.mcap";
   // No other result is as large as the log.
-  REQUIRE(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}).code == 0);
+  succeed(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}));
   const rlimit limit{fs::file_size(target) - 1, fs::file_size(target) - 1};
   fs::remove(target);
   fs::remove_all(fixture.out);
@@ -250,11 +242,10 @@ TEST_CASE("A log that does not fit on the disk leaves nothing, for the results a
     std::signal(SIGXFSZ, SIG_IGN);
     ::setrlimit(RLIMIT_FSIZE, &limit);
   };
-  const Outcome outcome = start({"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log",
-                                 target, "--passes", "1", "--map-voxel", "2"},
-                                limit_files);
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.err, ContainsSubstring("big.mcap"));
+  check_refused(start({"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log", target,
+                       "--passes", "1", "--map-voxel", "2"},
+                      limit_files),
+                1, "big.mcap");
   CHECK(count_entries(fixture.folder.path()) == 1);
   CHECK(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}).code == 0);
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 0));

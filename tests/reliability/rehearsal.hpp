@@ -23,13 +23,6 @@ inline std::size_t number_in(const char* variable, std::size_t otherwise) {
   return value == nullptr ? otherwise : static_cast<std::size_t>(std::stoul(value));
 }
 
-using Arguments = std::vector<std::string>;
-
-inline Arguments operator+(Arguments left, const Arguments& right) {
-  left.insert(left.end(), right.begin(), right.end());
-  return left;
-}
-
 /// Arguments that begin with / are below the root: /seq is the input, /disk/out the folder of the
 /// results, /maps another disk.
 struct Scenario {
