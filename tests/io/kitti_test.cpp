@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
@@ -140,59 +143,39 @@ TEST_CASE("Empty scans and blank lines at the end are accepted") {
 }
 
 TEST_CASE("Broken sequences are refused with path, line and expectation") {
-  TemporaryFolder folder;
-  make_sequence(folder);
   const std::string id = kIdentity;
-  std::vector<std::string> parts;
-  SECTION("no folder") {
-    fs::remove_all(folder / "velodyne");
-    parts = {": has no scans; expected a KITTI folder"};
+  struct Case {
+    const char* file;                 // of the sequence
+    std::optional<std::string> text;  // none: the file or folder is removed
+    std::vector<std::string> parts;   // of the message
+  };
+  const std::vector<Case> cases = {
+      {"velodyne", {}, {": has no scans; expected a KITTI folder"}},
+      {"velodyne/cloud.bin", bytes(16), {"cloud.bin: expected a number"}},
+      {"velodyne/1.bin", bytes(16), {"two scans with one number", "000001.bin", "1.bin"}},
+      {"poses.txt", {}, {"poses.txt: not found", "12 numbers"}},
+      {"poses.txt", id + id, {"txt:3: expected a row for each scan, at least 3, found 2"}},
+      {"poses.txt",
+       id + id + "1 0 0 0 0 1 0 0 0 0 1 O\n",
+       {"poses.txt:3: expected a finite number in column 12, found \"O\""}},
+      {"times.txt", "0\n0.1\n", {"txt:3: expected a row for each scan, at least 3, found 2"}},
+      {"times.txt", "0\n0.1\n0.1\n", {"times.txt:3: expected a time after"}},
+      {"calib.txt", "P0: 7 0 6 0 0 7 1 0 0 0 1 0\n", {"calib.txt: expected a line \"Tr: \""}},
+      {"calib.txt",
+       "P0: 1\nTr: 7 0 6 0 0 7 1 0 0 0 1 0\n",
+       {"calib.txt:2: expected a rigid transform"}}};
+  for (const Case& broken : cases) {
+    TemporaryFolder folder;
+    make_sequence(folder);
+    if (broken.text) {
+      write_text(folder / broken.file, *broken.text);
+    } else {
+      fs::remove_all(folder / broken.file);
+    }
+    const std::string text = open_error(folder);
+    CHECK_THAT(text, StartsWith(folder.path().string()));
+    for (const std::string& part : broken.parts) CHECK_THAT(text, ContainsSubstring(part));
   }
-  SECTION("no scans") {
-    fs::remove_all(folder / "velodyne");
-    fs::create_directory(folder / "velodyne");
-    parts = {"velodyne: has no scans; expected a KITTI folder"};
-  }
-  SECTION("a scan that is no number") {
-    write_text(folder / "velodyne/cloud.bin", bytes(16));
-    parts = {"cloud.bin: expected a number"};
-  }
-  SECTION("two scans with one number") {
-    write_text(folder / "velodyne/1.bin", bytes(16));
-    parts = {"two scans with one number", "000001.bin", "1.bin"};
-  }
-  SECTION("no poses") {
-    fs::remove(folder / "poses.txt");
-    parts = {"poses.txt: not found", "12 numbers"};
-  }
-  SECTION("too few poses") {
-    write_text(folder / "poses.txt", id + id);
-    parts = {"poses.txt:3: expected a row for each scan, at least 3, found 2"};
-  }
-  SECTION("a word") {
-    write_text(folder / "poses.txt", id + id + "1 0 0 0 0 1 0 0 0 0 1 O\n");
-    parts = {"poses.txt:3: expected a finite number in column 12, found \"O\""};
-  }
-  SECTION("too few times") {
-    write_text(folder / "times.txt", "0\n0.1\n");
-    parts = {"times.txt:3: expected a row for each scan, at least 3, found 2"};
-  }
-  SECTION("time stands still") {
-    write_text(folder / "times.txt", "0\n0.1\n0.1\n");
-    parts = {"times.txt:3: expected a time after"};
-  }
-  SECTION("calibration without Tr") {
-    write_text(folder / "calib.txt", "P0: 7 0 6 0 0 7 1 0 0 0 1 0\n");
-    parts = {"calib.txt: expected a line \"Tr: \""};
-  }
-  SECTION("calibration that is not rigid") {
-    write_text(folder / "calib.txt", "P0: 1\nTr: 7 0 6 0 0 7 1 0 0 0 1 0\n");
-    parts = {"calib.txt:2: expected a rigid transform"};
-  }
-  REQUIRE(!parts.empty());
-  const std::string text = open_error(folder);
-  CHECK_THAT(text, StartsWith(folder.path().string()));
-  for (const std::string& part : parts) CHECK_THAT(text, ContainsSubstring(part));
 }
 
 TEST_CASE("Broken scans and labels are refused with path and size") {
