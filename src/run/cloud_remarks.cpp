@@ -143,7 +143,7 @@ std::optional<std::string> remark_on_copies(const Recording& recording, const Sc
 
 std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range) {
   std::vector<std::string> remarks;
-  for (auto& remark : {remark_on_stripes(recording), remark_on_copies(recording, range)}) {
+  for (const auto& remark : {remark_on_stripes(recording), remark_on_copies(recording, range)}) {
     if (remark) remarks.push_back(*remark);
   }
   return remarks;

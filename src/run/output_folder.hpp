@@ -173,7 +173,7 @@ class OutputFile {
   std::optional<FolderLock> lock_;
   Folder::Rename how_ = Folder::Rename::kReplace;
   std::optional<PartialFolder> partial_;
-  const Folder* folder_;  // of the target
+  const Folder* folder_ = nullptr;  // of the target
 };
 
 }  // namespace dynains::program

@@ -72,11 +72,7 @@ void complete_log(RunOutputs& outputs) {
 
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
-  const int passes = settings.passes;
-  if (passes < 1 || passes > 2) {
-    throw ConfigError("--passes " + std::to_string(passes) + ": expected 1 or 2");
-  }
-  if (passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
+  if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
     throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
   }
 }

@@ -47,6 +47,14 @@ nlohmann::ordered_json pose_residual_to_json(const RunTiming& timing) {
   return {{"metres", to_json(std::move(metres))}, {"degrees", to_json(std::move(degrees))}};
 }
 
+/// Highest resident memory of this process so far.
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  constexpr std::uint64_t kUnit = 1024;  // Linux counts kilobytes
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * kUnit;
+}
+
 }  // namespace
 
 Statistics statistics(std::vector<double> values) {
@@ -57,13 +65,6 @@ Statistics statistics(std::vector<double> values) {
     return values[std::max<std::size_t>(static_cast<std::size_t>(rank), 1) - 1];
   };
   return {quantile(0.5), quantile(0.95), quantile(0.99), values.back()};
-}
-
-std::uint64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  constexpr std::uint64_t kUnit = 1024;  // Linux counts kilobytes
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * kUnit;
 }
 
 WallTime wall_time(double ms, const RunTiming& timing) {

@@ -1,7 +1,6 @@
 // report.json and timing.csv.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -22,9 +21,6 @@ struct Statistics {
   double max = 0.0;
 };
 Statistics statistics(std::vector<double> values);
-
-/// Highest resident memory of this process so far.
-std::uint64_t peak_memory_bytes();
 
 /// Time of a whole run.
 struct WallTime {

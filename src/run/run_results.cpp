@@ -48,8 +48,7 @@ LasOptions las_options(const Recording& recording, const ScanRange& range, const
   return options;
 }
 
-}  // namespace
-
+/// Columns of the file of moving points.
 PointColumns moving_columns(const Recording& recording, const ScanRange& range) {
   PointColumns columns = recording.columns();
   columns.double_xyz = is_far(recording, range);
@@ -58,6 +57,7 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range) 
   return columns;
 }
 
+/// Positions of the sensor, m, world frame.
 std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
   std::vector<Eigen::Vector3d> path;
   for (std::size_t i = range.first; i <= range.last; ++i) {
@@ -65,6 +65,8 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
   }
   return path;
 }
+
+}  // namespace
 
 bool RunOutputs::has_outside_map() const {
   return !map.empty() && map.parent_path() != whole_path(folder);

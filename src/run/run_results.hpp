@@ -71,15 +71,9 @@ struct RunOutputs {
   OutputListing listing(const Recording& recording, const ScanRange& range) const;
 };
 
-/// Positions of the sensor, m, world frame.
-std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range);
-
 /// Opens a file for the map of these scans, or for its moving points. Throws IoError.
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
-
-/// Columns of the file of moving points.
-PointColumns moving_columns(const Recording& recording, const ScanRange& range);
 
 /// A scan and a copy of its final verdict.
 struct JudgedScan {

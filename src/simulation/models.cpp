@@ -156,13 +156,12 @@ Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, doubl
   const bool bag = random.chance(0.25);
   const double swing = 0.5 * stride * std::sin(phase);
   const double hip = 0.5 * h, shoulder = 0.8 * h;
-  Model model;
-  model.push_back(limb(legs, 0, 0.09, hip, hip, 0.085, swing));
-  model.push_back(limb(legs, 0, -0.09, hip, hip, 0.085, -swing));
-  model.push_back(ball(top, 0, 0, 0.66 * h, 0.13, w * 0.72, 0.2 * h));
-  model.push_back(limb(top, 0, w * 0.85, shoulder, 0.36 * h, 0.055, -0.8 * swing));
-  model.push_back(limb(top, 0, -w * 0.85, shoulder, 0.36 * h, 0.055, 0.8 * swing));
-  model.push_back(ball(materials::kSkin, 0.02, 0, 0.93 * h, 0.1, 0.085, 0.075 * h));
+  Model model{limb(legs, 0, 0.09, hip, hip, 0.085, swing),
+              limb(legs, 0, -0.09, hip, hip, 0.085, -swing),
+              ball(top, 0, 0, 0.66 * h, 0.13, w * 0.72, 0.2 * h),
+              limb(top, 0, w * 0.85, shoulder, 0.36 * h, 0.055, -0.8 * swing),
+              limb(top, 0, -w * 0.85, shoulder, 0.36 * h, 0.055, 0.8 * swing),
+              ball(materials::kSkin, 0.02, 0, 0.93 * h, 0.1, 0.085, 0.075 * h)};
   if (bag)
     model.push_back(block(materials::kDarkCloth, -0.3, -0.12, -0.15, 0.15, 0.55 * h, 0.8 * h));
   if (pushes_pram) {
@@ -257,8 +256,7 @@ Model fence_model(double length, double height, bool wire) {
 }
 
 Model guard_rail_model(double length) {
-  Model model;
-  model.push_back(block(materials::kGuardRail, -length / 2, length / 2, -0.05, 0.05, 0.45, 0.78));
+  Model model{block(materials::kGuardRail, -length / 2, length / 2, -0.05, 0.05, 0.45, 0.78)};
   for (double x = -length / 2; x < length / 2; x += 2) {
     model.push_back(block(materials::kGuardRail, x - 0.06, x + 0.06, -0.06, 0.06, -0.3, 0.6));
   }

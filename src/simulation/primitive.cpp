@@ -7,30 +7,26 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-constexpr Interval kEmpty{kInfinity, -kInfinity};
-
-/// Cuts the interval of t to a + t * b <= 0.
+/// Cuts the interval of t to a + t * b <= 0. An empty one stays empty.
 void clip(float a, float b, Interval& interval) {
   if (b > 0) {
     interval.leave = std::min(interval.leave, -a / b);
   } else if (b < 0) {
     interval.enter = std::max(interval.enter, -a / b);
   } else if (a > 0) {
-    interval = kEmpty;
+    interval = {};
   }
 }
 
 /// Cuts the interval of t to c + 2 b t + a t^2 <= 0, for a >= 0.
 void clip_quadratic(float a, float b, float c, Interval& interval) {
   if (a < 1e-12F) {
-    if (c > 0) interval = kEmpty;
+    if (c > 0) interval = {};
     return;
   }
   const float discriminant = b * b - a * c;
   if (discriminant < 0) {
-    interval = kEmpty;
+    interval = {};
     return;
   }
   const float root = std::sqrt(discriminant);
@@ -71,6 +67,7 @@ Primitive transformed(const Rigid& T_target_source, const Primitive& source) {
 Interval intersect(const Primitive& primitive, Vec3 origin, Vec3 direction) {
   const Vec3 o = primitive.to_unit * (origin - primitive.centre);
   const Vec3 d = primitive.to_unit * direction;
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Interval interval{-kInfinity, kInfinity};
   switch (primitive.shape) {
     case Shape::kBox: {
