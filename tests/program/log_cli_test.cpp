@@ -97,30 +97,6 @@ TEST_CASE("A truncated log is read up to its end, and the program reports it in 
   CHECK(report["log_ends_early"] == true);
 }
 
-TEST_CASE("No result replaces the log that is read") {
-  const TemporaryFolder folder;
-  write_text(folder / "drive.mcap", tiny_log());
-  const std::string log = folder / "drive.mcap";
-  fs::create_hard_link(log, folder / "other.ply");
-  const std::string before = read_text(log);
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"run", log, "--out", log, "--force"},
-        {"run", log, "--out", folder / "out", "--map", folder / "other.ply", "--force"}}) {
-    const Outcome outcome = start(arguments);
-    CAPTURE(outcome.err);
-    CHECK(outcome.code == 1);
-    CHECK(read_text(log) == before);
-  }
-  fs::create_directory(folder / "out2");
-  fs::create_hard_link(log, folder / "out2" / "timing.csv");
-  write_text(folder / "out2" / "report.json",
-             R"({"program": "dynains", "command": "run", "complete": true,
-                 "outputs": {"files": ["timing.csv"], "folders": {}, "scans": []}})");
-  check_refused(start({"run", log, "--out", folder / "out2", "--force"}), 1,
-                "is read by this command");
-  CHECK(read_text(log) == before);
-}
-
 TEST_CASE(
     "De-skewing by --deskew restores the scores that a rolling shutter costs, and keeps times of "
     "points") {

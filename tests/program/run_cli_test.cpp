@@ -277,11 +277,6 @@ TEST_CASE("Only --force replaces earlier results, and it replaces all of them") 
   CHECK_FALSE(fs::exists(fixture.out + "/online"));
   CHECK_FALSE(fs::exists(map));
   CHECK(fs::exists(fixture.out + "/static_map.ply"));
-
-  write_text(fixture.out + "/notes.txt", "mine");
-  check_refused(fixture.run({"--force"}), 1, fixture.out + "/notes.txt: is no file of the results");
-  CHECK(read_text(fixture.out + "/notes.txt") == "mine");
-  CHECK(fixture.labels() == 5);
 }
 
 TEST_CASE("A map in another folder is replaced with the results that name it, and no other map") {
