@@ -113,26 +113,40 @@ std::optional<Enum> value_of_name(const std::string& name) {
   return std::nullopt;
 }
 
+namespace detail {
+
+/// Throws a ConfigError about the value of a parameter.
+[[noreturn]] inline void refuse_value(const std::string& name, const std::string& value,
+                                      const std::string& expected, const char* help) {
+  throw ConfigError(name + " = " + value + " must be " + expected + ": " + help);
+}
+
+/// Throws ConfigError unless `value` is within `bounds`.
+inline void require_in(const Bounds& bounds, double value, const char* owner, const char* name,
+                       const char* unit, const char* help) {
+  if (bounds.contain(value)) return;
+  std::ostringstream number, expected;
+  number << value;
+  expected << "in " << bounds.to_string() << (*unit == '\0' ? "" : " ") << unit;
+  refuse_value(std::string(owner) + '.' + name, number.str(), expected.str(), help);
+}
+
+}  // namespace detail
+
 /// Throws ConfigError unless every field of `config` is within its bounds. The message starts with
 /// `owner`, for example "BeliefUpdater".
 template <class Config>
 void validate_parameters(const char* owner, const Config& config) {
-  Config::visit(config, [owner](const auto& parameter) {
-    using Value = std::remove_const_t<std::remove_reference_t<decltype(parameter.value)>>;
-    std::ostringstream text;
-    text << owner << '.' << parameter.name << " = ";
+  Config::visit(config, [owner](const auto& p) {
+    using Value = std::remove_const_t<std::remove_reference_t<decltype(p.value)>>;
     if constexpr (std::is_enum_v<Value>) {
-      const auto number = static_cast<std::size_t>(parameter.value);
-      if (number < value_names(parameter.value).size()) return;
-      text << number << " must be " << all_value_names<Value>();
+      const auto number = static_cast<std::size_t>(p.value);
+      if (number < value_names(p.value).size()) return;
+      detail::refuse_value(std::string(owner) + '.' + p.name, std::to_string(number),
+                           all_value_names<Value>(), p.help);
     } else if constexpr (kIsBounded<Value>) {
-      if (parameter.bounds.contain(static_cast<double>(parameter.value))) return;
-      text << +parameter.value << " must be in " << parameter.bounds.to_string();
-      if (*parameter.unit != '\0') text << ' ' << parameter.unit;
-    } else {
-      return;
+      detail::require_in(p.bounds, static_cast<double>(p.value), owner, p.name, p.unit, p.help);
     }
-    throw ConfigError(text.str() + ": " + parameter.help);
   });
 }
 
