@@ -27,6 +27,10 @@ inline constexpr double kMaxTranslation = 2.1e7;
 
 namespace detail {
 
+inline constexpr double kRadians = M_PI / 180.0;  ///< in a degree
+/// Distance (m) of the points at which a rotation is as long as a translation.
+inline constexpr double kLever = 10.0;
+
 /// Without the alignment that depends on flags, as Pose.
 using Quaternion = Eigen::Quaternion<double, Eigen::DontAlign>;
 

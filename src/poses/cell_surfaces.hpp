@@ -24,6 +24,8 @@ inline constexpr std::array<double, kCellLevels> kCellEdges = {4.0, 2.0, 1.0};
 /// Deviation (m) of the distance of a point to its surface. Distances of neighbouring points are
 /// correlated, so it is a large value.
 inline constexpr double kPointDeviation = 0.2;
+/// Nearer points (m) belong to the own vehicle.
+inline constexpr double kNearestPoint = 2.0;
 
 /// Whether `key` was new to `table`, which has it now.
 inline bool adds(VoxelHashTable<>& table, VoxelKey key) {

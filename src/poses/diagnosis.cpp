@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "cell_surfaces.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
 #include "given_motion.hpp"
@@ -23,9 +24,9 @@ namespace {
 
 constexpr double kLeastAgreement = 0.5;       // share; wrong poses of a moving sensor stay below it
 constexpr std::size_t kFewestCompared = 200;  // compared points of a sample
-constexpr std::size_t kFewestLandmarks = 60;  // of a scan that is compared
 constexpr std::size_t kFewestMotions = 6;     // registered, for a decision
 constexpr std::size_t kFewestPairs = 3;       // of neighbours, for a statement about their error
+constexpr std::size_t kPairs = 8;             // of a sample
 constexpr double kExact = 0.03;  // m at points 10 m away; registrations are worse rarely
 constexpr double kRough = 0.4;   // m at points 10 m away; more is not inexact but wrong
 constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
@@ -139,7 +140,7 @@ class ScanSample {
       for (std::size_t k = 0; k < points.size(); ++k) {
         const float x = points.x[k], y = points.y[k], z = points.z[k];
         const double range = std::sqrt(x * x + (y * y + z * z));
-        if (range < 2.0) ++near;
+        if (range < kNearestPoint) ++near;
         if (k % 37 == 0) ranges.push_back(range);
       }
     }
@@ -197,7 +198,6 @@ struct SampledPairs {
 /// agree: scans farther apart show more of the motion of a slow sensor.
 SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double step,
                           double turn) {
-  constexpr std::size_t kPairs = 8;
   constexpr std::size_t kStride = 5;       // scans
   constexpr double kFast = 2.0;            // m from scan to scan
   constexpr double kTurning = 0.1;         // rad from scan to scan
@@ -260,7 +260,7 @@ double coarse_step(const std::vector<Pose>& poses) {
 
 /// PoseFlaws::period, by scans in the middle of the recording.
 std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
-  constexpr std::size_t kMost = 80, kPairs = 8;
+  constexpr std::size_t kMost = 80;
   const std::size_t last_period = std::min(kMost, recording.size() / 2);
   const std::size_t first = (recording.size() - 2 * last_period) / 2;
   Agreement neighbours;

@@ -20,8 +20,7 @@ inline double angle_of(const Eigen::Matrix3d& R) {
   return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
 }
 
-/// Distance (m) of the points at which a rotation is as long as a translation.
-inline constexpr double kLever = 10.0;
+using detail::kLever;
 
 /// Size of a motion, m, for points kLever away.
 inline double extent_of(const Pose& T) {

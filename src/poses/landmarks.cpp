@@ -15,7 +15,6 @@ namespace {
 constexpr double kFarthestGap = 1.0;  // m
 
 std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting, double farthest) {
-  constexpr double kNearest = 2.0;     // m; nearer points belong to the own vehicle
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
   constexpr double kVoxel = 0.25;      // m
   VoxelHashTable<> occupied;
@@ -23,7 +22,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
-    if (!(range > kNearest && range < farthest)) continue;
+    if (!(range > kNearestPoint && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
     const VoxelKey key = voxel_at(p, kVoxel);
     if (adds(occupied, key)) kept.emplace_back(key, p);

@@ -31,13 +31,14 @@ class ChainScan {
   Landmarks landmarks_;
 };
 
+constexpr double kFarthestStep = 6.0;  // m, from one scan to the next
+
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
 /// and the motion at another place.
 std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& elsewhere) {
-  constexpr double kFarthest = 6.0;  // m
   std::vector<Pose> guesses = {Pose::Identity()};
   const double way = given.translation().norm();
-  if (way < kFarthest) {
+  if (way < kFarthestStep) {
     guesses.push_back(given);
     for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
                                              Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
@@ -249,7 +250,6 @@ class Chain {
 
   /// Registers the next scan. `elsewhere`: a motion from one scan to the next at another place.
   void begin(const std::optional<Pose>& elsewhere) {
-    constexpr double kFarthestStep = 6.0;  // m
     a_ = read(first_);
     add(1, first_guesses(motion_between(*recording_, first_, first_ + 1), elsewhere),
         kFarthestStep);

@@ -93,13 +93,12 @@ std::optional<Registration> finished(const SurfaceGrid& a, const Points& b, Pose
 
 RegistrationScan::RegistrationScan(PointsView points, double farthest) {
   constexpr double kThinned = 0.4;  // m
-  constexpr double kNearest = 2.0;  // m
   VoxelHashTable<> thinned;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                             static_cast<double>(points.z[i]));
     const double range = p.norm();
-    if (!(range > kNearest && range < farthest)) continue;
+    if (!(range > kNearestPoint && range < farthest)) continue;
     surfaces_.insert(p);
     if (adds(thinned, voxel_at(p, kThinned))) points_.push_back(p);
   }

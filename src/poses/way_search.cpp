@@ -11,7 +11,6 @@ using Points = std::vector<Eigen::Vector3d>;
 
 constexpr double kCoarse = 0.5;     // m
 constexpr double kFineShift = 0.1;  // m
-constexpr std::size_t kFewestPoints = 60;
 
 Points thinned(const Points& points) {
   constexpr std::size_t kMost = 800;
@@ -44,7 +43,7 @@ Points decisive_of(const Points& points, const Landmarks& a, const Pose& standin
   }
   const double least_count = kLeastShare * static_cast<double>(points.size());
   const bool are_few =
-      static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestPoints;
+      static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestLandmarks;
   return are_few ? points : decisive;
 }
 
@@ -74,7 +73,7 @@ std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pos
   constexpr double kMostGap = 0.4;  // m; traffic of another speed must not pull at the minimum
   const Points of_a = thinned(a.points());
   const Points of_b = thinned(b.points());
-  if (of_a.size() < kFewestPoints || of_b.size() < kFewestPoints) return std::nullopt;
+  if (of_a.size() < kFewestLandmarks || of_b.size() < kFewestLandmarks) return std::nullopt;
   const double way = direction.dot(T_a_b.translation());
   const Pose standing = moved(T_a_b, -way * direction);
   const Points decisive_a = decisive_of(of_a, b, standing.inverse());
