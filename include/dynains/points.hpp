@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/simd/pack.hpp"
+
 namespace dynains {
 
 /// Verdict on one input point.
@@ -75,6 +77,14 @@ struct PointsView {
 
 namespace detail {
 
+/// Largest integer that is not above `value`, which must be within the range of Int. std::floor()
+/// is a call without SSE4.1; of this, compilers make vectors.
+template <class Int, class Real>
+Int floor_to(Real value) {
+  const auto truncated = static_cast<Int>(value);
+  return truncated - (static_cast<Real>(truncated) - value > Real(0) ? 1 : 0);
+}
+
 /// Ensures capacity for `size` values, with a margin of 1/8, because scans differ in size by a few
 /// percent.
 template <class T>
@@ -122,6 +132,27 @@ struct PointBuffer {
     z.push_back(pz);
   }
   operator PointsView() const { return {x, y, z}; }
+};
+
+/// One scan, reordered: ground points first, then all other points. Later stages use views of it
+/// and copy no points.
+struct GroundSplit {
+  PointBuffer points;  ///< m, sensor frame; padded for packs beyond `count`
+  /// Index of each point in the input of the remover; empty after the push of the scan.
+  std::vector<std::uint32_t> input;
+  std::size_t ground_count = 0;  ///< number of ground points
+  std::size_t count = 0;         ///< number of all points; those behind them are not judged
+
+  PointsView ground() const { return PointsView(points).subview(0, ground_count); }
+  PointsView non_ground() const {
+    return PointsView(points).subview(ground_count, count - ground_count);
+  }
+  void resize(std::size_t size) {
+    count = size;
+    const std::size_t padded = size + detail::kPackWidth;
+    points.grow(padded);
+    detail::grow(input, padded);
+  }
 };
 
 }  // namespace dynains

@@ -7,7 +7,6 @@
 #include "bench/street.hpp"
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/clusters/curved_voxel_clusterer.hpp"
-#include "dynains/clusters/polar_points.hpp"
 #include "dynains/descriptors/occupancy_descriptor.hpp"
 #include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/map/static_map_accumulator.hpp"

@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "dynains/evidence/ground_footprint.hpp"
+#include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/instance_judge.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
@@ -114,10 +114,10 @@ TEST_CASE("groups of random supervoxels are those of a search over all pairs") {
 std::vector<std::size_t> find_under(const GroundFootprint& footprint, const PointBuffer& ground,
                                     const Clearance& clearance) {
   std::vector<std::size_t> found;
-  for (std::size_t begin = 0; begin < ground.size(); begin += GroundFootprint::kBlock) {
+  for (std::size_t begin = 0; begin < ground.size(); begin += kWordBits) {
     const std::uint64_t under =
         footprint.find_under(GroundFootprint::block_of(ground, begin), clearance);
-    for (std::size_t i = 0; i < GroundFootprint::kBlock; ++i) {
+    for (std::size_t i = 0; i < kWordBits; ++i) {
       if ((under >> i & 1U) != 0) found.push_back(begin + i);
     }
   }

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/ground/ground_plane.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/pipeline/ingest.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/registration/motion_prediction.hpp"
+#include "dynains/registration/pose_correction.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/random.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dynains/evidence/ground_samples.hpp"
-#include "dynains/evidence/surrounding_ground.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/visibility.hpp"

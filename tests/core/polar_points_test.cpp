@@ -1,8 +1,7 @@
-#include "dynains/clusters/polar_points.hpp"
-
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "dynains/clusters/cluster_set.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

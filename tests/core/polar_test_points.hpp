@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
-#include "dynains/clusters/polar_points.hpp"
 
 namespace dynains::test {
 

@@ -9,8 +9,8 @@
 #include <queue>
 #include <vector>
 
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/clusters/curved_voxel_clusterer.hpp"
-#include "dynains/clusters/polar_points.hpp"
 #include "polar_test_points.hpp"
 
 namespace dynains::test {

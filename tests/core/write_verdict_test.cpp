@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dynains/pipeline/decisions.hpp"
-#include "dynains/pipeline/instance_ids.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "support/catch.hpp"

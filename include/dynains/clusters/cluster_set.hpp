@@ -2,18 +2,80 @@
 // stamp of Eq. 4. The order consists of index ranges; no point is copied.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "dynains/clusters/comparison.hpp"
-#include "dynains/clusters/polar_points.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
+
+/// Points as three arrays of equal length.
+struct PolarView {
+  Span<const float> range;    ///< m, horizontal distance r(p) (Eq. 8)
+  Span<const float> azimuth;  ///< rad, theta(p) in [-pi, pi] (Eq. 8)
+  Span<const float> z;        ///< m, height in the sensor frame
+
+  std::size_t size() const { return range.size(); }
+  bool empty() const { return range.empty(); }
+  PolarView subview(std::size_t offset, std::size_t count) const {
+    return {range.subspan(offset, count), azimuth.subspan(offset, count), z.subspan(offset, count)};
+  }
+};
+
+/// Polar points in three arrays, which are padded for packs beyond size(). A buffer is reused from
+/// scan to scan.
+class PolarBuffer {
+ public:
+  std::size_t size() const { return size_; }
+  void clear() { size_ = 0; }
+  void resize(std::size_t size) {
+    size_ = size;
+    const std::size_t padded = size + detail::kPackWidth;
+    detail::grow(range, padded);
+    detail::grow(azimuth, padded);
+    detail::grow(z, padded);
+  }
+  PolarView view() const {
+    return {{range.data(), size_}, {azimuth.data(), size_}, {z.data(), size_}};
+  }
+
+  /// Appends `points` (m, source frame), transformed to the target frame in single precision.
+  void append(PointsView points, const Pose& T_target_source) {
+    const std::size_t begin = size_;
+    resize(begin + points.size());
+    const detail::PackTransform transform(T_target_source);
+    float* const ranges = range.data() + begin;
+    float* const azimuths = azimuth.data() + begin;
+    float* const heights = z.data() + begin;
+    detail::for_packs(points.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float x = at.load(points.x.data());
+      const Float y = at.load(points.y.data());
+      const Float z_source = at.load(points.z.data());
+      const Float x_target = transform(0, x, y, z_source);
+      const Float y_target = transform(1, x, y, z_source);
+      const Float range_target = sqrt(x_target * x_target + y_target * y_target);
+      range_target.store(ranges + at.begin);
+      detail::azimuth_of(y_target, x_target, range_target).store(azimuths + at.begin);
+      transform(2, x, y, z_source).store(heights + at.begin);
+    });
+  }
+
+  std::vector<float> range;
+  std::vector<float> azimuth;
+  std::vector<float> z;
+
+ private:
+  std::size_t size_ = 0;
+};
 
 /// Points [begin, end) of a window: consecutive points of one scan and one cluster.
 struct PointRange {
@@ -106,17 +168,16 @@ class ClusterSet {
   // Cuts one scan into runs, 64 points at a time.
   template <class Packs>
   void cut(Span<const std::uint32_t> cluster_of) {
-    constexpr std::size_t kWord = 64;
     std::size_t begin = 0;
     const auto end_at = [&](std::size_t end) {
       point_runs_[run_count_++] = {static_cast<std::uint32_t>(begin),
                                    static_cast<std::uint32_t>(end), cluster_of[begin]};
       begin = end;
     };
-    for (std::size_t i = 1; i < cluster_of.size(); i += kWord) {
-      detail::grow(point_runs_, run_count_ + kWord + 1);
+    for (std::size_t i = 1; i < cluster_of.size(); i += detail::kWordBits) {
+      detail::grow(point_runs_, run_count_ + detail::kWordBits + 1);
       const std::uint64_t changes = detail::find_changes<Packs>(
-          std::min(kWord, cluster_of.size() - i), cluster_of.data() + i);
+          std::min(detail::kWordBits, cluster_of.size() - i), cluster_of.data() + i);
       detail::for_each_bit(changes, [&](std::size_t at) { end_at(i + at); });
     }
     detail::grow(point_runs_, run_count_ + 1);

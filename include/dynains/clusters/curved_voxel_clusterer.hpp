@@ -11,9 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "dynains/clusters/polar_points.hpp"
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
@@ -140,8 +141,7 @@ class CurvedVoxelClusterer {
   std::size_t cluster_count() const { return cluster_count_; }
 
  private:
-  static constexpr int kBlockShift = 6;
-  static constexpr std::size_t kBlock = 1U << kBlockShift;  // cells per word of bits
+  static constexpr int kBlockShift = 6;  // a block of cells is a word of bits
 
   // Computes the cell of each point: ((elevation * columns() + range) << row_shift_) + azimuth.
   // Points beyond cluster_range are in an additional column behind the last range. The length of a
@@ -150,10 +150,9 @@ class CurvedVoxelClusterer {
     using detail::PackConstant;
     const std::size_t count = points.size();
     detail::grow(cell_or_cluster_, count + detail::kPackWidth);
-    constexpr double kRadians = M_PI / 180.0;
     const PackConstant azimuth_scale(static_cast<float>(azimuths_ / (2.0 * M_PI)));
     const PackConstant elevation_scale(
-        static_cast<float>(1.0 / (resolved_.voxel_elevation * kRadians)));
+        static_cast<float>(1.0 / (resolved_.voxel_elevation * detail::kRadians)));
     const PackConstant range_scale(static_cast<float>(1.0 / config_.voxel_range));
     const PackConstant far(static_cast<float>(config_.cluster_range));
     const PackConstant pi(detail::kPi);
@@ -208,7 +207,7 @@ class CurvedVoxelClusterer {
     }
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t cell = cell_or_cluster_[i] - first_cell_;
-      occupied_[cell / kBlock] |= std::uint64_t{1} << cell % kBlock;
+      occupied_[cell / detail::kWordBits] |= std::uint64_t{1} << cell % detail::kWordBits;
     }
   }
 
@@ -261,8 +260,9 @@ class CurvedVoxelClusterer {
   bool is_out_of_range(std::size_t column) const { return column + 1 == columns(); }
   // Marks the runs that start in the block as kNoCluster.
   void exclude_runs(std::size_t block) {
-    detail::for_each_bit(
-        starts_[block], [&](std::size_t at) { parent_[run_of(block * kBlock + at)] = kNoCluster; });
+    detail::for_each_bit(starts_[block], [&](std::size_t at) {
+      parent_[run_of(block * detail::kWordBits + at)] = kNoCluster;
+    });
   }
 
   // Joins the runs of a block with the runs of another row that overlap them or touch them at a
@@ -281,53 +281,56 @@ class CurvedVoxelClusterer {
           (starts_here & (there | there << 1U)) | (starts_there & (here | here << 1U));
       // If the cell is empty, the last run up to it is the run of the cell before.
       detail::for_each_bit(begins, [&](std::size_t at) {
-        const std::uint64_t up_to_cell = ~std::uint64_t{0} >> (kBlock - 1 - at);
+        const std::uint64_t up_to_cell = ~std::uint64_t{0} >> (detail::kWordBits - 1 - at);
         join(before_here + detail::count_ones(starts_here & up_to_cell),
              before_there + detail::count_ones(starts_there & up_to_cell));
       });
     }
     // Runs that touch at a corner across the border of a block.
-    const std::size_t first = block * kBlock;
-    const std::size_t first_there = other * kBlock;
+    const std::size_t first = block * detail::kWordBits;
+    const std::size_t first_there = other * detail::kWordBits;
     if ((here & 1U) != 0 && place_in_row(other) != 0 && is_occupied(first_there - 1)) {
       join(run_of(first), run_of(first_there - 1));
     }
-    if (here >> (kBlock - 1) != 0 && place_in_row(other + 1) != 0 &&
-        is_occupied(first_there + kBlock)) {
-      join(run_of(first + kBlock - 1), run_of(first_there + kBlock));
+    if (here >> (detail::kWordBits - 1) != 0 && place_in_row(other + 1) != 0 &&
+        is_occupied(first_there + detail::kWordBits)) {
+      join(run_of(first + detail::kWordBits - 1), run_of(first_there + detail::kWordBits));
     }
   }
 
   // Joins the runs of a block with the runs of `row` that touch them across the azimuth seam.
   void join_seam(std::size_t block, std::size_t row) {
-    const std::size_t first = row * row_blocks() * kBlock;
+    const std::size_t first = row * row_blocks() * detail::kWordBits;
     const std::size_t last = first + static_cast<std::size_t>(azimuths_) - 1;
     const std::size_t in_row = place_in_row(block);
-    const std::size_t last_here = static_cast<std::size_t>(azimuths_) - 1 - in_row * kBlock;
-    if (in_row == 0 && is_occupied(block * kBlock) && is_occupied(last)) {
-      join(run_of(block * kBlock), run_of(last));
+    const std::size_t last_here =
+        static_cast<std::size_t>(azimuths_) - 1 - in_row * detail::kWordBits;
+    if (in_row == 0 && is_occupied(block * detail::kWordBits) && is_occupied(last)) {
+      join(run_of(block * detail::kWordBits), run_of(last));
     }
-    if (last_here < kBlock && is_occupied(block * kBlock + last_here) && is_occupied(first)) {
-      join(run_of(block * kBlock + last_here), run_of(first));
+    if (last_here < detail::kWordBits && is_occupied(block * detail::kWordBits + last_here) &&
+        is_occupied(first)) {
+      join(run_of(block * detail::kWordBits + last_here), run_of(first));
     }
   }
 
   // Index of the block within its row. The number of blocks per row is a power of two.
   std::size_t place_in_row(std::size_t block) const { return block & (row_blocks() - 1); }
   bool is_occupied(std::size_t cell) const {
-    return (occupied_[cell / kBlock] >> cell % kBlock & 1U) != 0;
+    return (occupied_[cell / detail::kWordBits] >> cell % detail::kWordBits & 1U) != 0;
   }
   // Bits of the cells whose preceding cell in the row is occupied.
   std::uint64_t occupied_before(std::size_t block) const {
     const std::uint64_t carried =
-        place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (kBlock - 1);
+        place_in_row(block) == 0 ? 0 : occupied_[block - 1] >> (detail::kWordBits - 1);
     return occupied_[block] << 1U | carried;
   }
 
   // Run of an occupied cell: the last run that starts at or before the cell.
   std::uint32_t run_of(std::size_t cell) const {
-    const std::uint64_t up_to_cell = starts_[cell / kBlock] << (~cell % kBlock);
-    return run_before_[cell / kBlock] + detail::count_ones(up_to_cell);
+    const std::uint64_t up_to_cell = starts_[cell / detail::kWordBits]
+                                     << (~cell % detail::kWordBits);
+    return run_before_[cell / detail::kWordBits] + detail::count_ones(up_to_cell);
   }
 
   std::uint32_t root(std::uint32_t run) {

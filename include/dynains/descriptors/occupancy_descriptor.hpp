@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
-#include "dynains/clusters/polar_points.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/pack_geometry.hpp"

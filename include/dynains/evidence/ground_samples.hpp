@@ -1,18 +1,129 @@
 // Samples of the ground of one scan, with their visibility from reference scans.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
-#include "dynains/evidence/ground_footprint.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
+
+/// Largest height above the ground of the lowest return of an object that stands on it: the greater
+/// of `least` and `slope` * horizontal range. The gap between two beams defines `slope`.
+struct Clearance {
+  float least;  ///< m
+  float slope;  ///< m per m
+};
+
+/// Horizontal grid around the sensor with the height of the lowest removed point in the 3x3 cells
+/// of each cell. All points are in the sensor frame (m).
+class GroundFootprint {
+ public:
+  /// The block of `points` from index `begin` on; the last block may be shorter.
+  static PointsView block_of(PointsView points, std::size_t begin) {
+    return points.subview(begin, std::min(kWordBits, points.size() - begin));
+  }
+  static std::size_t block_count(std::size_t points) {
+    return (points + kWordBits - 1) / kWordBits;
+  }
+
+  /// `cell` (m): edge of the cells. A removed point affects its cell and the eight cells around it.
+  /// `max_range` (m): points beyond are ignored.
+  GroundFootprint(double cell, double max_range)
+      : per_metre_(static_cast<float>(1.0 / cell)),
+        width_(2 * (static_cast<std::int32_t>(std::ceil(max_range / cell)) + 2)),
+        lowest_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(width_), kNothing) {
+    touched_.reserve(lowest_.size());  // uses address space only
+  }
+
+  /// Adds the points of a block whose bits are set in `which`.
+  void add(PointsView block, std::uint64_t which) {
+    const Located located = locate(block);
+    for_each_bit(which & located.inside, [&](std::size_t i) {
+      for (std::int32_t row = -1; row <= 1; ++row) {
+        for (std::int32_t column = -1; column <= 1; ++column) {
+          const std::int32_t number = located.cell[i] + row * width_ + column;
+          const auto cell = static_cast<std::size_t>(number);
+          if (lowest_[cell] == kNothing) touched_.push_back(cell);
+          lowest_[cell] = std::min(lowest_[cell], block.z[i]);
+        }
+      }
+    });
+  }
+
+  /// The bits of the points of a block that lie less than `clearance` below the lowest removed
+  /// point of the 3x3 cells around them.
+  std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
+    const Located located = locate(block);
+    float top[kWordBits];
+    const PackConstant least(clearance.least), slope(clearance.slope);
+    for_packs(block.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      const Float x = at.load(block.x.data());
+      const Float y = at.load(block.y.data());
+      const Float gap = sqrt(x * x + y * y) * slope;
+      (at.load(block.z.data()) + max(gap, Float(least))).store(&top[at.begin]);
+    });
+    std::uint64_t under = 0;
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      under |= std::uint64_t{lowest_[static_cast<std::size_t>(located.cell[i])] < top[i]} << i;
+    }
+    return under & located.inside;
+  }
+
+  bool empty() const { return touched_.empty(); }
+
+  /// Removes all points.
+  void clear() {
+    for (const std::size_t cell : touched_) lowest_[cell] = kNothing;
+    touched_.clear();
+  }
+
+ private:
+  static constexpr float kNothing = std::numeric_limits<float>::infinity();
+
+  // By point of a block: its cell; bits of the points inside the grid, whose border has none.
+  struct Located {
+    std::array<std::int32_t, kWordBits> cell;
+    std::uint64_t inside;
+  };
+  Located locate(PointsView block) const {
+    Located located;
+    located.inside = 0;
+    const std::int32_t half = width_ / 2;
+    const PackConstant per_metre(per_metre_), centre(static_cast<float>(half)),
+        border(static_cast<float>(width_ - 1));
+    for_packs(block.size(), [&](auto at) {
+      using Float = typename decltype(at)::Float;
+      using Int = typename decltype(at)::Int;
+      const Int zero(0), last(width_ - 1);
+      const auto line = [&](const Float& coordinate) {
+        return truncate(min(max(coordinate * per_metre + centre, Float(0.0F)), Float(border)));
+      };
+      const Int column = line(at.load(block.x.data()));
+      const Int row = line(at.load(block.y.data()));
+      (multiply(row, width_) + column).store(&located.cell[at.begin]);
+      const auto inside = (zero < column) & (column < last) & (zero < row) & (row < last);
+      located.inside |= std::uint64_t{inside.bits()} << at.begin;
+    });
+    return located;
+  }
+
+  float per_metre_;
+  std::int32_t width_;                // of the grid, in cells
+  std::vector<float> lowest_;         // m, row-major: lowest removed point in the 3x3 cells
+  std::vector<std::size_t> touched_;  // cells with a lowest point
+};
 
 /// The ground of one scan. Consecutive ground points in one voxel are a run, and the first point of
 /// a run represents it. Each voxel has one sample among the first points of its runs.
@@ -37,16 +148,15 @@ class GroundSampler {
   /// Replaces `out` by the samples of one scan, without visibility; no samples if the ground is not
   /// tested. `ground`: m, sensor frame.
   void sample(PointsView ground, GroundSamples& out) {
-    constexpr std::size_t kBlock = GroundFootprint::kBlock;
     const std::size_t blocks = GroundFootprint::block_count(ground.size());
     ensure_capacity(out.run_begins, blocks);
     out.run_begins.assign(blocks, 0);
     if (!is_active_) return;
     std::size_t runs = 0;
     for (std::size_t i = 0; i < blocks; ++i) {
-      const PointsView block = GroundFootprint::block_of(ground, i * kBlock);
+      const PointsView block = GroundFootprint::block_of(ground, i * kWordBits);
       out.run_begins[i] = sampler_.find_changes(block);
-      firsts_.grow(runs + kBlock);
+      firsts_.grow(runs + kWordBits);
       for_each_bit(out.run_begins[i], [&](std::size_t k) {
         firsts_.x[runs] = block.x[k];
         firsts_.y[runs] = block.y[k];

@@ -10,6 +10,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -78,7 +79,7 @@ class InstanceSampler {
   std::uint64_t find_changes(PointsView points) const {
     using namespace detail;
     const PackConstant per_metre(supervoxels_per_metre_);
-    std::array<std::array<std::int32_t, kBlock + kPackWidth>, 3> voxel;
+    std::array<std::array<std::int32_t, kWordBits + kPackWidth>, 3> voxel;
     std::uint64_t changes = 0;
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
@@ -101,8 +102,8 @@ class InstanceSampler {
               InstanceSamples& out) {
     begin_scan();
     resize_with_margin(out.number_of_point, points.size());
-    for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-      const PointsView block = points.subview(begin, std::min(kBlock, points.size() - begin));
+    for (std::size_t begin = 0; begin < points.size(); begin += kWordBits) {
+      const PointsView block = points.subview(begin, std::min(kWordBits, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);
       meet_supervoxels(block.size(), out.number_of_point.data() + begin);
       rank_points(begin, block.size(), out.number_of_point.data() + begin);
@@ -126,8 +127,7 @@ class InstanceSampler {
     }
   };
   using SupervoxelTable = VoxelHashTable<Supervoxel>;
-  static constexpr int kHalf = 16;           // bits
-  static constexpr std::size_t kBlock = 64;  // points that are processed together
+  static constexpr int kHalf = 16;  // bits
   // Ranks are hashes of rounded coordinates. The rounding removes the last bits, which depend on
   // the rotation of the sensor frame.
   static constexpr float kPlacesPerMetre = 64.0F;
@@ -171,8 +171,8 @@ class InstanceSampler {
   // Numbers the supervoxels of a block in the order of the points. For most points, the first slot
   // of the hash holds their supervoxel.
   void meet_supervoxels(std::size_t count, std::uint32_t* number_of_point) {
-    grow(supervoxels_, table_.size() + kBlock);
-    table_.reserve(table_.size() + kBlock);
+    grow(supervoxels_, table_.size() + kWordBits);
+    table_.reserve(table_.size() + kWordBits);
     for (std::size_t i = 0; i < count; ++i) {
       const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
       const SupervoxelTable::Slot& slot = table_.first_slot(static_cast<std::uint32_t>(hash_[i]));
@@ -255,7 +255,7 @@ class InstanceSampler {
   float max_range_;
   SupervoxelTable table_{4096};  // numbers of supervoxels
   // By point of a block.
-  std::array<std::int32_t, kBlock> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
+  std::array<std::int32_t, kWordBits> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
   std::size_t most_;                 // samples of a supervoxel
   std::vector<std::uint64_t> keys_;  // by number in the table: most_ ranks and indices of points
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end

@@ -32,7 +32,8 @@ class RangeImage {
     /// the outermost beam.
     std::int16_t around;
   };
-  static constexpr std::int16_t kMoving = 1;  ///< bit that is set in ranges of moving points
+  static constexpr float kCentimetres = 100.0F;  ///< unit of ranges, per metre
+  static constexpr std::int16_t kMoving = 1;     ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
   static constexpr std::int16_t kBeyond = -4;  ///< unknown, and not protected by near objects
@@ -85,7 +86,6 @@ class RangeImage {
   }
 
  private:
-  static constexpr float kCentimetres = 100.0F;
   static constexpr float kFarthest = 320.0F;  // m
 
   // Returns of objects at ranges below limit[k] (cm) protect k + 1 cells on each side.

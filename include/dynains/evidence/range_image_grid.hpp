@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <iterator>
 
+#include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -36,17 +37,17 @@ struct RangeImageGrid {
   /// Grid for a sensor. The cells are slightly wider than its azimuth step and lower than the gap
   /// between its beams: few cells between returns are empty, and few returns share a cell.
   static RangeImageGrid for_sensor(const SensorModel& sensor) {
-    constexpr double kRadians = M_PI / 180.0;
     constexpr double kBorder = 2.0;  // deg beyond the outer beams
     const double width = std::clamp(1.2 * sensor.azimuth_step, 0.2, 0.6);
     const double height = std::clamp(0.6 * sensor.elevation_gap, 0.2, 0.4);
     const auto level_at = [](double elevation) {
-      return level(static_cast<float>(std::sin(std::clamp(elevation, -90.0, 90.0) * kRadians)));
+      return level(
+          static_cast<float>(std::sin(std::clamp(elevation, -90.0, 90.0) * detail::kRadians)));
     };
     const float highest = level_at(sensor.elevation_max + kBorder);
     RangeImageGrid grid;
     grid.lowest = level_at(sensor.elevation_min - kBorder);
-    grid.rows_per_level = static_cast<float>(1.0 / (height * kRadians));
+    grid.rows_per_level = static_cast<float>(1.0 / (height * detail::kRadians));
     grid.rows = static_cast<std::int32_t>((highest - grid.lowest) * grid.rows_per_level) + 1;
     const float inner = level_at(sensor.elevation_max - 0.5 * sensor.elevation_gap);
     grid.last_inner_row =

@@ -12,7 +12,6 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
-#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"

@@ -122,10 +122,10 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
 inline void test_visibility(const RangeImage& image, const Pose& T_reference_sample,
                             const PointBuffer& samples, std::size_t count, float margin,
                             float slope, Visibility& visibility) {
-  constexpr float kCentimetres = 100.0F;
   const PackTransform to_reference(T_reference_sample);
-  const PackConstant to_centimetres(kCentimetres);
-  const PackConstant base(margin * kCentimetres), growth(slope * kCentimetres);
+  const PackConstant to_centimetres(RangeImage::kCentimetres);
+  const PackConstant base(margin * RangeImage::kCentimetres),
+      growth(slope * RangeImage::kCentimetres);
   const ImageLocator locator(image.grid());
   visibility.resize(count);
   with_packs([&](auto packs) {

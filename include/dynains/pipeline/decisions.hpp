@@ -8,18 +8,18 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
-#include "dynains/evidence/surface_counts.hpp"
-#include "dynains/pipeline/instance_ids.hpp"
+#include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/scan_window.hpp"
 #include "dynains/pipeline/stage_checks.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/pipeline/window_votes.hpp"
+#include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -27,6 +27,129 @@
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
+
+/// Propagates the instance ids of the previous scan to the clusters of the current window.
+class InstanceIds {
+ public:
+  using PointRuns = Span<const ClusterSet::PointRun>;
+
+  /// Restarts the numbering of ids.
+  void clear() { last_id_ = kNoInstance; }
+
+  /// Fills `ids` with the instance id of each cluster of this window. `old_runs` and `point_runs`:
+  /// point runs of the previous scan, with its old clusters (indices into `old_ids`) and with the
+  /// clusters of this window. A cluster inherits the id of more than half of its points in the
+  /// previous scan; without a majority, it inherits the id of some of them. If two clusters have
+  /// one predecessor, the cluster with the lower index inherits the id and the other gets a new
+  /// one.
+  void assign(PointRuns old_runs, Span<const std::uint32_t> old_ids, PointRuns point_runs,
+              std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
+    candidate_.assign(cluster_count, kNoCluster);
+    lead_.assign(cluster_count, 0);
+    const ClusterSet::PointRun* old = old_runs.begin();
+    for (const ClusterSet::PointRun& point_run : point_runs) {
+      std::uint32_t begin = point_run.begin;
+      while (begin < point_run.end) {
+        const std::uint32_t end = std::min(old->end, point_run.end);
+        vote(point_run.cluster, old->cluster, end - begin);
+        begin = end;
+        if (old->end == end) ++old;
+      }
+    }
+    propagate(candidate_, old_ids, ids);
+  }
+
+  /// Fills `ids` by cluster. `predecessors`: by cluster, its old cluster (index into `old_ids`) or
+  /// kNoCluster, which gives a new id.
+  void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
+                 std::vector<std::uint32_t>& ids) {
+    is_inherited_.assign(old_ids.size(), 0);
+    ids.resize(predecessors.size());
+    for (std::size_t c = 0; c < predecessors.size(); ++c) {
+      const std::uint32_t old = predecessors[c];
+      if (old != kNoCluster && is_inherited_[old] == 0) {
+        is_inherited_[old] = 1;
+        ids[c] = old_ids[old];
+      } else {
+        if (++last_id_ == kNoInstance) ++last_id_;  // skipped after an overflow
+        ids[c] = last_id_;
+      }
+    }
+  }
+
+ private:
+  // Majority vote of Boyer and Moore, with one candidate and one counter per cluster.
+  void vote(std::uint32_t cluster, std::uint32_t old_cluster, std::uint32_t points) {
+    if (cluster == kNoCluster || old_cluster == kNoCluster) return;
+    std::uint32_t& lead = lead_[cluster];
+    if (candidate_[cluster] == old_cluster) {
+      lead += points;
+    } else if (points <= lead) {
+      lead -= points;
+    } else {
+      candidate_[cluster] = old_cluster;
+      lead = points - lead;
+    }
+  }
+
+  std::uint32_t last_id_ = kNoInstance;
+  std::vector<std::uint32_t> candidate_;
+  std::vector<std::uint32_t> lead_;
+  std::vector<std::uint8_t> is_inherited_;
+};
+
+/// Non-ground points of consecutive scans in m, level frame of the newest scan, oldest scan first.
+class ScanWindow {
+ public:
+  /// Collects the last `length` scans, or fewer if the epoch of the newest scan has fewer.
+  void gather(ScanRing& scans, std::size_t length) {
+    const ScanSlot& newest = scans.newest();
+    first_scan_ = scans.pushed() - std::min<std::uint64_t>(scans.pushed(), length);
+    while (scans[first_scan_].epoch != newest.epoch) ++first_scan_;
+    points_.clear();
+    scan_begin_.assign(1, 0);
+    const Pose T_newest_world = inverted(newest.T_world_level);
+    for (std::uint64_t scan = first_scan_; scan < scans.pushed(); ++scan) {
+      points_.append(scans[scan].split.non_ground(),
+                     composed(T_newest_world, scans[scan].T_world_level));
+      scan_begin_.push_back(static_cast<std::uint32_t>(points_.size()));
+    }
+  }
+
+  /// Clusters the points of the window. Throws UsageError unless the clusterer returns one number
+  /// per point.
+  template <class Clusterer>
+  void cluster(Clusterer& clusterer) {
+    cluster_of_ = clusterer.cluster(points_.view());
+    cluster_count_ = clusterer.cluster_count();
+    if (cluster_of_.size() == points_.size()) return;
+    throw UsageError("Stages::Clusterer gave " + std::to_string(cluster_of_.size()) +
+                     " cluster numbers for " + std::to_string(points_.size()) + " points");
+  }
+
+  /// Number of the oldest scan.
+  std::uint64_t first_scan() const { return first_scan_; }
+  std::size_t scan_count() const { return scan_begin_.size() - 1; }
+  PolarView points() const { return points_.view(); }
+  /// Index of the first point of each scan, and the number of points as last element.
+  Span<const std::uint32_t> scan_begin() const { return scan_begin_; }
+
+  std::size_t cluster_count() const { return cluster_count_; }
+  /// Cluster number of each point, or kNoCluster. Valid until the clusterer is called again.
+  Span<const std::uint32_t> cluster_of() const { return cluster_of_; }
+  /// Cluster number of each point of the newest scan, or kNoCluster.
+  Span<const std::uint32_t> newest_cluster_of() const {
+    const std::size_t begin = scan_begin_[scan_count() - 1];
+    return cluster_of_.subspan(begin, cluster_of_.size() - begin);
+  }
+
+ private:
+  std::uint64_t first_scan_ = 0;
+  PolarBuffer points_;
+  std::vector<std::uint32_t> scan_begin_;
+  Span<const std::uint32_t> cluster_of_;
+  std::size_t cluster_count_ = 0;
+};
 
 /// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
 /// observe() and judge() for each scan, and judge() again for the same scan after latency() later

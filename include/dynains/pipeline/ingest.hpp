@@ -144,7 +144,7 @@ class Ingest {
                                   (abs(x) + abs(y) + abs(z) > zero))
                                      .bits();
         const unsigned bad = ~good & ((1U << at.size()) - 1U);
-        static_assert(UnjudgedPoints::kWord % Packs::kCount == 0);
+        static_assert(kWordBits % Packs::kCount == 0);
         unjudged.mark(first, bad, bad & returns);
         for (std::size_t k = 0; k < at.size(); ++k) {
           xs[valid_count] = xs[at.begin + k];

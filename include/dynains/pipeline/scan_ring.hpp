@@ -13,7 +13,6 @@
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/ground/ground_split.hpp"
 #include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"

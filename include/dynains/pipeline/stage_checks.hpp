@@ -9,9 +9,7 @@
 #include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
-#include "dynains/clusters/polar_points.hpp"
 #include "dynains/config.hpp"
-#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"

@@ -13,8 +13,6 @@ namespace dynains::detail {
 /// The marked points of a cloud are not judged. Two bits per point.
 class UnjudgedPoints {
  public:
-  static constexpr std::size_t kWord = 64;  ///< points
-
   /// Number of points of the cloud.
   std::size_t size() const { return size_; }
 
@@ -22,17 +20,17 @@ class UnjudgedPoints {
   void reset(std::size_t size) {
     size_ = size;
     for (std::vector<std::uint64_t>* const words : {&unjudged_, &returns_}) {
-      ensure_capacity(*words, size / kWord + 1);
-      words->assign(size / kWord + 1, 0);
+      ensure_capacity(*words, size / kWordBits + 1);
+      words->assign(size / kWordBits + 1, 0);
     }
   }
 
   /// Marks the points `first` + k whose bit k is set in `unjudged`. `returns`: bits of those among
   /// them that are kOutOfRange; the others are kInvalid. No bit reaches beyond the next multiple of
-  /// kWord.
+  /// kWordBits.
   void mark(std::size_t first, std::uint64_t unjudged, std::uint64_t returns) {
-    unjudged_[first / kWord] |= unjudged << first % kWord;
-    returns_[first / kWord] |= returns << first % kWord;
+    unjudged_[first / kWordBits] |= unjudged << first % kWordBits;
+    returns_[first / kWordBits] |= returns << first % kWordBits;
   }
 
   /// Calls `visit(i, label)` for each marked point in order.
@@ -41,7 +39,7 @@ class UnjudgedPoints {
     for (std::size_t word = 0; word < unjudged_.size(); ++word) {
       for_each_bit(unjudged_[word], [&](std::size_t bit) {
         const bool is_return = (returns_[word] >> bit & 1U) != 0;
-        visit(word * kWord + bit, is_return ? PointLabel::kOutOfRange : PointLabel::kInvalid);
+        visit(word * kWordBits + bit, is_return ? PointLabel::kOutOfRange : PointLabel::kInvalid);
       });
     }
   }

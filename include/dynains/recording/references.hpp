@@ -10,7 +10,6 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
-#include "dynains/ground/ground_split.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"

@@ -9,12 +9,10 @@
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
-#include "dynains/ground/ground_split.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
 #include "dynains/recording/compared_poses.hpp"
-#include "dynains/registration/alignment_points.hpp"
 #include "dynains/registration/plane_aligner.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 

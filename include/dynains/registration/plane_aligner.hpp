@@ -11,12 +11,210 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/registration/alignment_points.hpp"
-#include "dynains/registration/normal_equations.hpp"
-#include "dynains/registration/sensor_errors.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 
 namespace dynains::detail {
+
+/// Instances of the non-ground points of a scan. Without: no point is on an instance.
+struct ScanInstances {
+  Span<const std::uint32_t> of_point;  ///< below `count`, or kNoCluster
+  std::size_t count = 0;
+};
+
+/// Calls `visit(index, x, y, z)` for about `wanted` points of a scan, 3 to 50 m from the sensor.
+/// They are spread evenly over its order, at pseudo-random distances, since beams repeat at regular
+/// ones.
+template <class Visit>
+void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
+  constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
+  const std::size_t step = split.count / wanted + 1;
+  std::uint32_t random = 1;
+  for (std::size_t begin = 0; begin < split.count; begin += step) {
+    random = random * 1664525U + 1013904223U;
+    const std::size_t i = step == 1 ? begin : begin + (random >> 8) % step;  // division is slow
+    if (i >= split.count) return;
+    const double x = static_cast<double>(split.points.x[i]);
+    const double y = static_cast<double>(split.points.y[i]);
+    const double squared = x * x + y * y;
+    if (squared < kNearest * kNearest || squared > kFarthest * kFarthest) continue;
+    visit(i, x, y, static_cast<double>(split.points.z[i]));
+  }
+}
+
+/// About 3,000 points of a scan (m, sensor frame). Tells which of them are on objects that are
+/// small enough to be vehicles or persons.
+class AlignmentPoints {
+ public:
+  static constexpr std::size_t kMost = 3072;
+
+  /// Points on instances of at most this horizontal diagonal and height (m) are on objects.
+  AlignmentPoints(double longest_object, double highest_object)
+      : longest_object_(longest_object), highest_object_(highest_object) {}
+
+  /// Allocates memory for all points.
+  void reserve() {
+    points_.grow(kMost);
+    instance_of_.reserve(kMost);
+  }
+
+  void select(const GroundSplit& split, const ScanInstances& instances) {
+    constexpr std::size_t kWanted = 3000;
+    points_.clear();
+    instance_of_.clear();
+    boxes_.assign(instances.count, Box());
+    visit_some(split, kWanted, [&](std::size_t i, double x, double y, double z) {
+      points_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
+      const bool has_instance = i >= split.ground_count && !instances.of_point.empty();
+      const std::uint32_t instance =
+          has_instance ? instances.of_point[i - split.ground_count] : kNoCluster;
+      instance_of_.push_back(instance);
+      if (instance != kNoCluster) boxes_[instance].add(x, y, z);
+    });
+  }
+
+  PointsView points() const { return points_; }
+
+  bool is_on_object(std::size_t point) const {
+    const std::uint32_t instance = instance_of_[point];
+    if (instance == kNoCluster) return false;
+    const Box& box = boxes_[instance];
+    return box.length() <= longest_object_ && box.height() <= highest_object_;
+  }
+
+ private:
+  /// Around points, m.
+  struct Box {
+    double least[3] = {kFar, kFar, kFar};
+    double most[3] = {-kFar, -kFar, -kFar};
+
+    void add(double x, double y, double z) {
+      const double point[3] = {x, y, z};
+      for (int k = 0; k < 3; ++k) {
+        least[k] = std::min(least[k], point[k]);
+        most[k] = std::max(most[k], point[k]);
+      }
+    }
+    double length() const { return std::hypot(most[0] - least[0], most[1] - least[1]); }
+    double height() const { return most[2] - least[2]; }
+
+    static constexpr double kFar = 1e9;
+  };
+
+  double longest_object_, highest_object_;
+  PointBuffer points_;
+  std::vector<std::uint32_t> instance_of_;  // by point
+  std::vector<Box> boxes_;                  // by instance, of its selected points
+};
+
+/// A vector and a square matrix. Plain loops, because Eigen's results depend on the instruction
+/// set.
+template <std::size_t kSize>
+using VectorOf = std::array<double, kSize>;
+template <std::size_t kSize>
+using MatrixOf = std::array<VectorOf<kSize>, kSize>;
+
+/// Solution x of m x = right for a positive definite matrix, by Cholesky decomposition (L D L^T).
+/// Only the lower triangle of `m` is read.
+template <std::size_t kSize>
+VectorOf<kSize> solve_symmetric(MatrixOf<kSize> m, VectorOf<kSize> right) {
+  for (std::size_t j = 0; j < kSize; ++j) {
+    for (std::size_t i = j + 1; i < kSize; ++i) {
+      const double factor = m[i][j] / m[j][j];
+      for (std::size_t k = j + 1; k <= i; ++k) m[i][k] -= factor * m[k][j];
+      right[i] -= factor * right[j];
+    }
+  }
+  for (std::size_t i = kSize; i-- > 0;) {
+    for (std::size_t k = i + 1; k < kSize; ++k) right[i] -= m[k][i] * right[k];
+    right[i] /= m[i][i];
+  }
+  return right;
+}
+
+/// Weighted squares of distances (m) that are linear in the unknowns.
+template <std::size_t kSize>
+class NormalEquations {
+ public:
+  using Vector = VectorOf<kSize>;
+  using Matrix = MatrixOf<kSize>;
+
+  /// Adds one distance (m) with its derivatives and its weight.
+  void add(const Vector& derivatives, double distance, double weight) {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      const double weighted = weight * derivatives[i];
+      for (std::size_t j = 0; j <= i; ++j) matrix_[i][j] += weighted * derivatives[j];
+      right_[i] -= weighted * distance;
+    }
+    squares_ += weight * distance * distance;
+    weights_ += weight;
+  }
+
+  /// Adds the squared deviation of unknown number `i` from a value. It does not count in change()
+  /// and variance().
+  void attract(std::size_t i, double value, double weight) {
+    attraction_[i] = weight;
+    right_[i] += weight * value;
+  }
+
+  NormalEquations& operator-=(const NormalEquations& other) {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      for (std::size_t j = 0; j <= i; ++j) matrix_[i][j] -= other.matrix_[i][j];
+      right_[i] -= other.right_[i];
+    }
+    squares_ -= other.squares_;
+    weights_ -= other.weights_;
+    return *this;
+  }
+
+  /// Sums of the products of derivatives (lower triangle), and the right side.
+  const Matrix& matrix() const { return matrix_; }
+  const Vector& right() const { return right_; }
+
+  /// Whether no distance with a positive weight was added.
+  bool empty() const { return weights_ <= 0.0; }
+  /// Mean square of the distances, m^2.
+  double variance() const { return squares_ / std::max(weights_, kLeastWeight); }
+
+  /// Root mean square of the change of the distances by a step of the first unknowns, m.
+  template <std::size_t kSteps>
+  double change(const VectorOf<kSteps>& step) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      for (std::size_t j = 0; j < i; ++j) sum += 2.0 * matrix_[i][j] * step[i] * step[j];
+      sum += matrix_[i][i] * step[i] * step[i];
+    }
+    return std::sqrt(std::max(sum, 0.0) / std::max(weights_, kLeastWeight));
+  }
+
+  /// Solution. Each unknown must have an attraction.
+  Vector solve() const { return solve_symmetric<kSize>(with_attractions(), right_); }
+
+  /// Inverse of the matrix of the equations, with attractions.
+  Matrix inverse() const {
+    const Matrix all = with_attractions();
+    Matrix inverse = {};
+    for (std::size_t i = 0; i < kSize; ++i) {
+      inverse[i][i] = 1.0;
+      inverse[i] = solve_symmetric<kSize>(all, inverse[i]);
+    }
+    return inverse;
+  }
+
+ private:
+  static constexpr double kLeastWeight = 1e-12;  // against division by zero
+
+  Matrix with_attractions() const {
+    Matrix all = matrix_;
+    for (std::size_t i = 0; i < kSize; ++i) all[i][i] += attraction_[i];
+    return all;
+  }
+
+  Matrix matrix_ = {};  // lower triangle
+  Vector right_ = {};
+  Vector attraction_ = {};
+  double squares_ = 0.0;
+  double weights_ = 0.0;
+};
 
 /// Translation (m) and rotation (rad) about the sensor, along the axes of the map.
 using PoseStep = VectorOf<6>;
@@ -42,8 +240,7 @@ inline Pose moved(const Pose& T, const PoseStep& step) {
   return result;
 }
 
-/// Movement (m) of a point 10 m away by a step.
-inline constexpr double kLever = 10.0;  // m
+/// Movement (m) of a point kLever away by a step.
 inline double movement(const PoseStep& step) {
   return std::hypot(std::hypot(step[0], step[1], step[2]),
                     kLever * std::hypot(step[3], step[4], step[5]));

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/floor.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
@@ -56,8 +56,7 @@ struct Mounting {
 /// Normal of the ground in the frame of a sensor with a pitch (deg about y, nose down) and a roll
 /// (deg about x, left side up): R_level_sensor = R_y(pitch) R_x(roll).
 inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
-  constexpr double kRadians = M_PI / 180.0;
-  const double p = pitch * kRadians, r = roll * kRadians;
+  const double p = pitch * detail::kRadians, r = roll * detail::kRadians;
   return {-std::sin(p), std::cos(p) * std::sin(r), std::cos(p) * std::cos(r)};
 }
 

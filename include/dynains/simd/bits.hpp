@@ -7,6 +7,9 @@
 
 namespace dynains::detail {
 
+/// Bits of a word. Loops take so many numbers at a time, with one bit for each.
+inline constexpr std::size_t kWordBits = 64;
+
 /// Each byte is 1. The product with a byte repeats that byte eight times.
 inline constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
 

@@ -50,8 +50,7 @@ class ShortNumbers {
   }
 
  private:
-  static constexpr int kHalf = 16;           // bits
-  static constexpr std::size_t kBlock = 64;  // numbers
+  static constexpr int kHalf = 16;  // bits
   struct Run {
     std::uint32_t begin;
     std::uint32_t upper;  // the lower bits are zero
@@ -67,14 +66,14 @@ class ShortNumbers {
       runs_.push_back({static_cast<std::uint32_t>(i), from[i] >> kHalf << kHalf});
     };
     if (count > 0) begin_run(0);
-    for (std::size_t begin = 1; begin < count; begin += kBlock) {
-      const std::size_t size = std::min(kBlock, count - begin);
+    for (std::size_t begin = 1; begin < count; begin += kWordBits) {
+      const std::size_t size = std::min(kWordBits, count - begin);
       const std::uint64_t begins = find_begins<Packs>(from + begin, size);
       for_each_bit(begins, [&](std::size_t i) { begin_run(begin + i); });
     }
   }
 
-  // Bit i is set if number i of at most kBlock begins a run. The number before the first must
+  // Bit i is set if number i of at most kWordBits begins a run. The number before the first must
   // exist.
   template <class Packs>
   static std::uint64_t find_begins(const std::uint32_t* numbers, std::size_t count) {
@@ -89,7 +88,7 @@ class ShortNumbers {
     for (; i < count; ++i) {
       same |= std::uint64_t{(numbers[i] ^ *(numbers + i - 1)) >> kHalf == 0} << i;
     }
-    return ~same & ~std::uint64_t{0} >> (kBlock - count);
+    return ~same & ~std::uint64_t{0} >> (kWordBits - count);
   }
 
   std::vector<std::uint16_t> lower_;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/simd/floor.hpp"
+#include "dynains/points.hpp"
 
 namespace dynains {
 
