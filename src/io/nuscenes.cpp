@@ -25,30 +25,41 @@ namespace fs = std::filesystem;
 
 #if defined(DYNAINS_HAS_JSON)
 
-/// A row of a table.
+using Json = nlohmann::json;
+
+/// A row of a table: an object.
 class TableRow {
  public:
-  TableRow(const fs::path& table, std::uint64_t index) : table_(table), index_(index) {}
+  TableRow(const fs::path& table, std::size_t index, const Json& values)
+      : table_(table), index_(index), values_(values) {}
 
-  std::map<std::string, std::string> texts;
-  std::map<std::string, std::vector<double>> numbers;
-
-  const std::string& text(const char* name) const {
-    const auto found = texts.find(name);
-    if (found == texts.end()) fail(std::string("expected a text \"") + name + '"');
-    return found->second;
+  std::string text(const char* name) const {
+    const auto found = values_.find(name);
+    if (found == values_.end() || !found->is_string()) {
+      fail(std::string("expected a text \"") + name + '"');
+    }
+    return found->get<std::string>();
   }
-  const std::vector<double>& list(const char* name, std::size_t size) const {
-    const auto found = numbers.find(name);
-    if (found == numbers.end() || found->second.size() != size) {
+  double number(const char* name) const {
+    const auto found = values_.find(name);
+    if (found == values_.end() || !found->is_number()) {
+      fail(std::string("expected a number \"") + name + '"');
+    }
+    return found->get<double>();
+  }
+  std::vector<double> list(const char* name, std::size_t size) const {
+    const auto found = values_.find(name);
+    const auto is_number = [](const Json& value) { return value.is_number(); };
+    if (found == values_.end() || !found->is_array() || found->size() != size ||
+        !std::all_of(found->begin(), found->end(), is_number)) {
       fail("expected " + std::to_string(size) + " numbers \"" + name + '"');
     }
-    return found->second;
+    return found->get<std::vector<double>>();
   }
   /// `translation` and `rotation` (w x y z).
   Pose pose() const {
-    const std::vector<double>& p = list("translation", 3);
-    const std::vector<double>& q = list("rotation", 4);
+    const std::vector<double> p = list("translation", 3);
+    const std::vector<double> q = list("rotation", 4);
     const auto pose = rigid_pose({p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]});
     if (!pose) fail("expected a finite translation and a quaternion of length 1");
     return *pose;
@@ -59,82 +70,25 @@ class TableRow {
 
  private:
   const fs::path& table_;
-  std::uint64_t index_;
+  std::size_t index_;
+  const Json& values_;
 };
 
-/// Takes a table, an array of flat objects, row by row.
-template <class Take>
-class TableHandler final : public nlohmann::json::json_sax_t {
- public:
-  TableHandler(const fs::path& table, Take& take) : table_(table), take_(take) {}
-
-  bool null() override { return true; }
-  bool boolean(bool) override { return true; }
-  bool number_integer(number_integer_t value) override {
-    return number(static_cast<double>(value));
-  }
-  bool number_unsigned(number_unsigned_t value) override {
-    return number(static_cast<double>(value));
-  }
-  bool number_float(number_float_t value, const string_t&) override { return number(value); }
-  bool string(string_t& text) override {
-    if (depth_ == kRow && row_) row_->texts[key_] = std::move(text);
-    return true;
-  }
-  bool binary(binary_t&) override { return true; }
-  bool start_object(std::size_t) override {
-    if (++depth_ == kRow) row_.emplace(table_, count_++);
-    return true;
-  }
-  bool end_object() override {
-    if (depth_-- != kRow) return true;
-    take_(*row_);
-    row_.reset();
-    return true;
-  }
-  bool key(string_t& text) override {
-    if (depth_ == kRow) key_ = std::move(text);
-    return true;
-  }
-  bool start_array(std::size_t) override {
-    if (++depth_ == kList && row_) row_->numbers[key_].clear();
-    return true;
-  }
-  bool end_array() override {
-    --depth_;
-    return true;
-  }
-  bool parse_error(std::size_t position, const std::string&,
-                   const nlohmann::detail::exception&) override {
-    fail_at_byte(table_, position, "expected JSON, an array of objects");
-  }
-
- private:
-  static constexpr int kRow = 2;   // depth of an object in the array
-  static constexpr int kList = 3;  // depth of an array in such an object
-
-  bool number(double value) {
-    if (!row_ || depth_ > kList) return true;
-    std::vector<double>& list = row_->numbers[key_];
-    if (depth_ == kRow) list.clear();
-    constexpr std::size_t kMost = 16;
-    if (list.size() < kMost) list.push_back(value);
-    return true;
-  }
-
-  const fs::path& table_;
-  Take& take_;
-  std::optional<TableRow> row_;
-  std::string key_;
-  int depth_ = 0;
-  std::uint64_t count_ = 0;
-};
-
+/// Calls `take(row)` for each row of a table, an array of objects, of which one is in memory.
 template <class Take>
 void read_table(const fs::path& table, Take&& take) {
   std::ifstream file = open_input(table);
-  TableHandler<std::remove_reference_t<Take>> handler(table, take);
-  nlohmann::json::sax_parse(file, &handler);
+  std::size_t count = 0;
+  const auto take_row = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event != Json::parse_event_t::object_end || depth != 1) return true;
+    take(TableRow(table, count++, parsed));
+    return false;
+  };
+  try {
+    const Json rest = Json::parse(file, take_row);  // without the rows
+  } catch (const Json::parse_error& error) {
+    fail_at_byte(table, error.byte, "expected JSON, an array of objects");
+  }
 }
 
 struct SweepRow {
@@ -152,11 +106,10 @@ std::vector<SweepRow> read_sample_data(const fs::path& table) {
   constexpr double kMicrosecond = 1e-6;
   std::vector<SweepRow> sweeps;
   read_table(table, [&](const TableRow& row) {
-    const std::string& file = row.text("filename");
+    const std::string file = row.text("filename");
     if (!is_sweep(file)) return;
     sweeps.push_back({file, row.text("sample_token"), row.text("ego_pose_token"),
-                      row.text("calibrated_sensor_token"),
-                      kMicrosecond * row.list("timestamp", 1).front()});
+                      row.text("calibrated_sensor_token"), kMicrosecond * row.number("timestamp")});
   });
   if (sweeps.empty()) fail(table, "expected sweeps of a LiDAR (.pcd.bin), found none");
   return sweeps;
@@ -200,7 +153,7 @@ using Poses = std::unordered_map<std::string, Pose>;
 Poses read_poses_by_token(const fs::path& table, const std::set<std::string>& wanted) {
   Poses poses;
   read_table(table, [&](const TableRow& row) {
-    const std::string& token = row.text("token");
+    const std::string token = row.text("token");
     if (wanted.count(token) > 0) poses[token] = row.pose();
   });
   for (const std::string& token : wanted) {
