@@ -277,16 +277,6 @@ void Recording::list_scans() {
 
   const bool is_usual = options_.bin_layout.columns == 4 && !options_.bin_layout.is_double;
   if (format_ == ScanFormat::kBin && is_usual) check_bin_content(files.front());
-  if (scan_folder_ == folder_ / "velodyne" && format_ == ScanFormat::kBin) {
-    numbered_ = true;
-    for (const NumberedScan& scan : list_kitti_scans(scan_folder_)) {
-      scans_.emplace_back();
-      scans_.back().file = scan_folder_ / (scan.name + ".bin");
-      scans_.back().name = scan.name;
-      scans_.back().number = scan.number;
-    }
-    return;
-  }
   for (const fs::path& file : files) {
     scans_.emplace_back();
     scans_.back().file = file;
@@ -295,11 +285,16 @@ void Recording::list_scans() {
   check_names();
   numbered_ = std::all_of(scans_.begin(), scans_.end(),
                           [](const Scan& scan) { return is_number(scan.name); });
+  for (const Scan& scan : scans_) {
+    const bool is_kitti = format_ == ScanFormat::kBin && scan_folder_ == folder_ / "velodyne";
+    if (!is_kitti || scan.name.find_first_not_of("0123456789") == std::string::npos) continue;
+    fail(scan.file, "expected a number as name, such as 000123.bin");
+  }
   for (std::size_t i = 0; i < scans_.size(); ++i) {
     scans_[i].number = numbered_ ? std::stoull(scans_[i].name) : i;
     if (i > 0 && numbered_ && scans_[i].number == scans_[i - 1].number) {
-      fail(scan_folder_,
-           "two scans with one number: " + scans_[i - 1].name + " and " + scans_[i].name);
+      fail(scan_folder_, "two scans with one number: " + scans_[i - 1].file.filename().string() +
+                             " and " + scans_[i].file.filename().string());
     }
   }
 }
@@ -396,8 +391,6 @@ std::optional<FileTransform> Recording::T_sensor_file(std::size_t i) const {
   if (options_.point_unit != 1.0) T.scale(options_.point_unit);
   return T;
 }
-
-void Recording::check_scan(std::size_t i) const { reader_->check(address(i)); }
 
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   const std::optional<FileTransform> T = T_sensor_file(i);

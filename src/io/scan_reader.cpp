@@ -33,7 +33,6 @@ class BinReader final : public ScanReader {
     columns.ring = has_ring_;
     return columns;
   }
-  void check(const ScanAddress& scan) const override { point_count(scan); }
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return count_bin_points(scan.file, layout_, !has_ring_);
   }
@@ -61,7 +60,6 @@ class PointFileReader final : public ScanReader {
   PointColumns columns(const ScanAddress& scan) const override {
     return read_point_file_header(scan.file).columns;
   }
-  void check(const ScanAddress& scan) const override { check_point_file(scan.file); }
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return read_point_file_header(scan.file).point_count;
   }
@@ -94,7 +92,6 @@ class LogReader final : public ScanReader {
   explicit LogReader(std::unique_ptr<LogScans> scans) : scans_(std::move(scans)) {}
 
   PointColumns columns(const ScanAddress&) const override { return scans_->columns(); }
-  void check(const ScanAddress&) const override {}
   std::uint64_t point_count(const ScanAddress& scan) const override {
     return scans_->point_count(scan.index);
   }

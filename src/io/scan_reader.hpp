@@ -32,9 +32,7 @@ class ScanReader {
 
   /// Columns in addition to x y z.
   virtual PointColumns columns(const ScanAddress& scan) const = 0;
-  /// Throws unless header and size of the scan are valid.
-  virtual void check(const ScanAddress& scan) const = 0;
-  /// Points by the header or the size of the file.
+  /// Points by the header or the size of the file. Throws unless both are valid.
   virtual std::uint64_t point_count(const ScanAddress& scan) const = 0;
   /// Reads the points, transformed by `T_target_file` if there is one. Columns that the scan
   /// lacks become empty; memory of `points` is reused.

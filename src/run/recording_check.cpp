@@ -76,7 +76,7 @@ void check_files(const Recording& recording) {
   std::size_t broken = 0;
   for (std::size_t i = 0; i < recording.size(); ++i) {
     try {
-      recording.check_scan(i);
+      recording.point_count(i);
     } catch (const IoError& error) {
       if (broken == 0) first = error.what();
       ++broken;

@@ -29,7 +29,7 @@ nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
 /// So that a broken file or pose is noticed before anything is written.
 void check_scans(const Recording& sequence, const ScanRange& range) {
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    sequence.check_scan(i);
+    sequence.point_count(i);
     naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
   }
 }

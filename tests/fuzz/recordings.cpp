@@ -91,7 +91,7 @@ void read_whole(const fs::path& folder, const RecordingOptions& options) {
     require(std::isfinite(recording.time(i)), "times are finite");
     require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
     expect_value_or_place(folder, [&] {
-      recording.check_scan(i);
+      recording.point_count(i);
       const RecordedScan scan = recording.read_scan(i);
       require(scan.xyzi.size() % 4 == 0, "points have four numbers");
       require(scan.ring.empty() || scan.ring.size() == scan.size(), "a ring for each point");

@@ -111,10 +111,10 @@ TEST_CASE("nuScenes: malformed tables and sweeps are refused with file and place
   const fs::path sweep = folder / "samples/LIDAR_TOP/a__LIDAR_TOP__1.pcd.bin";
   write_text(sweep, "12345678901234567890x");
   const Recording recording(folder.path(), scene("scene-0061"));
-  CHECK_THAT(message_of<IoError>([&] { recording.check_scan(0); }),
+  CHECK_THAT(message_of<IoError>([&] { recording.point_count(0); }),
              StartsWith(sweep.string()) && ContainsSubstring("expected a multiple of 20"));
   fs::remove(sweep);
-  CHECK_THROWS_AS(recording.check_scan(0), IoError);
+  CHECK_THROWS_AS(recording.point_count(0), IoError);
 }
 
 TEST_CASE("Sweeps of nuScenes without tables are scans with five columns") {

@@ -24,7 +24,6 @@ PointFile read(const std::string& name, const std::string& content) {
   const TemporaryFolder folder;
   const fs::path path = folder / name;
   write_text(path, content);
-  check_point_file(path);
   PointFile points = read_points(path);
   const PointFileHeader header = read_point_file_header(path);
   CHECK(header.point_count == points.positions.size());

@@ -83,14 +83,10 @@ PointFile read_points(const std::filesystem::path& path);
 struct PointFileHeader {
   Pose viewpoint = Pose::Identity();  ///< as in PointFile
   PointColumns columns;               ///< without rgb and double_xyz
-  std::uint64_t point_count = 0;  ///< as in the header; check_point_file() compares the file size
+  std::uint64_t point_count = 0;
 };
-/// Reads the header of a point file; lines of a text are counted. Throws IoError like
-/// read_points().
+/// Reads the header of a point file, but no points; lines of a text are counted. Throws IoError
+/// like read_points(), also unless the file is large enough for its points.
 PointFileHeader read_point_file_header(const std::filesystem::path& path);
-
-/// Throws IoError unless the header is valid and the file is large enough for its points. Does not
-/// read points.
-void check_point_file(const std::filesystem::path& path);
 
 }  // namespace dynains

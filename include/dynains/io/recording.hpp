@@ -196,10 +196,9 @@ class Recording {
   double time(std::size_t i) const { return scans_.at(i).time; }
   const Pose& T_world_sensor(std::size_t i) const { return scans_.at(i).T_world_sensor; }
 
-  /// Number of points of scan i, from the size of its file or from its header.
+  /// Number of points of scan i, from the size of its file or from its header. Throws unless both
+  /// are valid. Does not read points.
   std::uint64_t point_count(std::size_t i) const;
-  /// Throws unless the header and the size of the file of scan i are valid. Does not read points.
-  void check_scan(std::size_t i) const;
   /// Reads scan i, m, sensor frame, and reuses the memory of `scan`. May contain NaN and infinity.
   /// With RecordingOptions::deskew, the poses of the recording between the scans are interpolated
   /// at the time of each point; times of points keep their values. Points whose time cannot be that

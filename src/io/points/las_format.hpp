@@ -3,13 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
 #include "../scalar.hpp"
 
 namespace dynains::las {
 
-inline constexpr char kMagic[] = "LASF";
-inline constexpr std::size_t kMagicSize = 4;
+inline const std::string kMagic = "LASF";
 inline constexpr std::size_t kHeaderSize12 = 227;  // bytes, of version 1.2
 inline constexpr std::size_t kHeaderSize14 = 375;  // bytes, of version 1.4
 inline constexpr std::size_t kVlrHeaderSize = 54;  // bytes, of a variable length record

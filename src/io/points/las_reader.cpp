@@ -107,8 +107,8 @@ LasHeader read_header(RawFile& file, PointSink& sink) {
   const auto head =
       file.read(0, std::min<std::uint64_t>(file.size(), las::kHeaderSize12), "the header of LAS");
   Bytes fields(file.path(), 0, head.data(), head.size());
-  if (head.size() < las::kMagicSize ||
-      !std::equal(las::kMagic, las::kMagic + las::kMagicSize, head.begin())) {
+  if (head.size() < las::kMagic.size() ||
+      !std::equal(las::kMagic.begin(), las::kMagic.end(), head.begin())) {
     fields.fail("expected LASF, the magic bytes of LAS");
   }
   fields.skip(24, "the header of LAS");
@@ -190,13 +190,8 @@ PointFileHeader read_las_header(const std::filesystem::path& path) {
   RawFile file(path);
   PointSink sink;
   const LasHeader header = read_header(file, sink);
+  check_size(file, header);
   return {Pose::Identity(), sink.columns(), header.point_count};
-}
-
-void check_las(const std::filesystem::path& path) {
-  RawFile file(path);
-  PointSink sink;
-  check_size(file, read_header(file, sink));
 }
 
 }  // namespace dynains

@@ -90,7 +90,7 @@ std::string LasWriter::header() const {
     records += vlr("LASF_Projection", kWktRecord, "OGC WKT", options_.wkt + '\0');
   }
   LasFields out;
-  out.text(las::kMagic, las::kMagicSize).zeros(2).number(kWktIsUsed).zeros(16);
+  out.text(las::kMagic, las::kMagic.size()).zeros(2).number(kWktIsUsed).zeros(16);
   out.number(std::uint8_t{1}).number(std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files

@@ -49,9 +49,8 @@ NpyPoints structured_points(const Bytes& place, const NpyArray& array, PointSink
 
 /// Points of an array whose last dimension is x y z, intensity if there is a fourth value, others.
 NpyPoints plain_points(const Bytes& place, const NpyArray& array, PointSink& sink) {
-  constexpr std::uint64_t kMostColumns = 1000;
   const bool is_table =
-      array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMostColumns;
+      array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMostHeaderItems;
   if (!is_table || (array.is_column_major && array.shape.size() > 2)) {
     place.fail(
         "expected an array of N rows with x y z, or a structured array with the fields x, "
@@ -119,7 +118,5 @@ PointFileHeader read_npy_header(const std::filesystem::path& path) {
   const NpyFile file = open_npy(path, sink, false);
   return {Pose::Identity(), sink.columns(), file.points.count};
 }
-
-void check_npy(const std::filesystem::path& path) { read_npy_header(path); }
 
 }  // namespace dynains

@@ -48,8 +48,6 @@ struct PcdHeader {
   }
 };
 
-constexpr std::size_t kMaxHeaderLines = 1000;
-constexpr std::size_t kMaxFields = 1000;
 constexpr std::size_t kMaxFieldCount = 1 << 16;
 
 std::uint64_t parse_unsigned(const ByteReader& reader, std::string_view token,
@@ -119,7 +117,7 @@ Scalar scalar_of(const ByteReader& reader, const Field& field) {
 void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& header) {
   if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
   for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
-    if (header.fields.size() == kMaxFields) reader.fail_on_line("expected fewer fields");
+    if (header.fields.size() == kMostHeaderItems) reader.fail_on_line("expected fewer fields");
     Field field;
     field.name = name;
     header.fields.push_back(std::move(field));
@@ -203,7 +201,7 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
 PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
   PcdHeader header;
   std::string line;
-  for (std::size_t i = 0; i < kMaxHeaderLines; ++i) {
+  for (std::size_t i = 0; i < kMostHeaderItems; ++i) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected a line DATA");
     std::string_view rest = line;
     const std::string_view keyword = text::next_token(rest);
@@ -407,13 +405,6 @@ PointFileHeader read_pcd_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
   const PcdHeader header = parse_pcd_header(reader, sink);
-  return {sink.file().viewpoint, sink.columns(), header.points};
-}
-
-void check_pcd(const std::filesystem::path& path) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PcdHeader header = parse_pcd_header(reader, sink);
   switch (header.encoding) {
     case PcdEncoding::kAscii:
       check_ascii(reader, header);
@@ -425,6 +416,7 @@ void check_pcd(const std::filesystem::path& path) {
       read_block_sizes(reader, header);
       break;
   }
+  return {sink.file().viewpoint, sink.columns(), header.points};
 }
 
 }  // namespace dynains

@@ -37,8 +37,6 @@ struct PlyHeader {
   std::vector<Element> elements;  ///< up to and with the vertices
 };
 
-constexpr std::size_t kMaxHeaderItems = 1000;
-
 Scalar parse_type(const ByteReader& reader, std::string_view name) {
   struct Entry {
     std::string_view name;
@@ -131,7 +129,7 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::size_t items = 0;
   for (;;) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected end_header");
-    if (++items > kMaxHeaderItems) reader.fail_on_line("expected end_header before this line");
+    if (++items > kMostHeaderItems) reader.fail_on_line("expected end_header before this line");
     std::string_view rest = line;
     const std::string_view keyword = text::next_token(rest);
     if (keyword == "end_header") break;
@@ -287,14 +285,8 @@ PointFileHeader read_ply_header(const std::filesystem::path& path) {
   ByteReader reader(path);
   PointSink sink;
   const PlyHeader header = parse_ply_header(reader, sink);
-  return {sink.file().viewpoint, sink.columns(), header.elements.back().count};
-}
-
-void check_ply(const std::filesystem::path& path) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PlyHeader header = parse_ply_header(reader, sink);
   for (const Element& element : header.elements) check_count(reader, element, header.encoding);
+  return {sink.file().viewpoint, sink.columns(), header.elements.back().count};
 }
 
 }  // namespace dynains

@@ -31,13 +31,12 @@ struct PointFileFormat {
   const char* extension;
   void (*read)(const fs::path&, PointSink&);
   PointFileHeader (*read_header)(const fs::path&);
-  void (*check)(const fs::path&);
 };
 
 constexpr PointFileFormat kPointFileFormats[] = {
-    {".ply", read_ply, read_ply_header, check_ply}, {".pcd", read_pcd, read_pcd_header, check_pcd},
-    {".las", read_las, read_las_header, check_las}, {".npy", read_npy, read_npy_header, check_npy},
-    {".xyz", read_xyz, read_xyz_header, check_xyz}, {".csv", read_xyz, read_xyz_header, check_xyz}};
+    {".ply", read_ply, read_ply_header}, {".pcd", read_pcd, read_pcd_header},
+    {".las", read_las, read_las_header}, {".npy", read_npy, read_npy_header},
+    {".xyz", read_xyz, read_xyz_header}, {".csv", read_xyz, read_xyz_header}};
 
 const PointFileFormat& format_to_read(const fs::path& path) {
   const std::string extension = extension_in_lower_case(path);
@@ -185,7 +184,5 @@ PointFile read_points(const fs::path& path) {
 PointFileHeader read_point_file_header(const fs::path& path) {
   return format_to_read(path).read_header(path);
 }
-
-void check_point_file(const fs::path& path) { format_to_read(path).check(path); }
 
 }  // namespace dynains

@@ -142,9 +142,4 @@ PointFileHeader read_xyz_header(const std::filesystem::path& path) {
   return {Pose::Identity(), sink.columns(), count};
 }
 
-void check_xyz(const std::filesystem::path& path) {
-  PointSink sink;
-  count_points(path, sink);
-}
-
 }  // namespace dynains
