@@ -87,7 +87,6 @@ void run_scan(Bytes bytes) {
     std::vector<float> xyzi;
     read_scan(path, xyzi);
     require(xyzi.size() * sizeof(float) == bytes.size(), "every byte is read");
-    require(count_scan_points(path) * 4 == xyzi.size(), "the count is that of the points");
   });
 }
 

@@ -27,16 +27,12 @@ namespace dynains {
 // and the numbers of rows and scans are equal (a clip of a longer recording), the i-th scan has
 // row i. Rows without a scan are ignored.
 
-/// Number of points of a file NNNNNN.bin, from its size. Throws IoError unless the size is a
-/// multiple of 16 bytes.
-std::size_t count_scan_points(const std::filesystem::path& file);
-/// Reads x y z intensity of each point of a file NNNNNN.bin, interleaved. Throws IoError.
+/// Reads x y z intensity of each point of a file NNNNNN.bin, interleaved. Throws IoError, also
+/// unless the size is a multiple of 16 bytes.
 void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
 
 /// Reads a file of labels, one uint32 per point. Throws IoError unless it has `count` labels.
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
-/// Throws IoError unless the file has the size of `count` labels.
-void check_labels(const std::filesystem::path& file, std::size_t count);
 
 /// Writers of this layout. Each file is replaced atomically; folders must exist. Scans and labels
 /// are not synchronized with the disk: see `sync_files()`. They throw IoError.

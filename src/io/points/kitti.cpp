@@ -5,6 +5,7 @@
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
 #include "../text.hpp"
+#include "bin_layout.hpp"
 #include "dynains/io/atomic_file.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
@@ -14,16 +15,6 @@ namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kFloatsPerPoint = 4;
-constexpr std::uintmax_t kBytesPerPoint = kFloatsPerPoint * sizeof(float);
-
-std::uintmax_t size_of(const fs::path& path) {
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(path, error);
-  if (error) fail(path, "cannot be read: " + error.message());
-  return size;
-}
 
 /// Fills `values` from a file that must have exactly that size.
 template <class T>
@@ -41,17 +32,8 @@ void write_all(const fs::path& path, Span<const T> values) {
 
 }  // namespace
 
-std::size_t count_scan_points(const fs::path& file) {
-  const std::uintmax_t size = size_of(file);
-  if (size % kBytesPerPoint != 0) {
-    fail(file, "truncated at byte " + std::to_string(size) + ": expected a multiple of " +
-                   std::to_string(kBytesPerPoint) + " bytes (float32 x y z intensity)");
-  }
-  return static_cast<std::size_t>(size / kBytesPerPoint);
-}
-
 void read_scan(const fs::path& file, std::vector<float>& xyzi) {
-  const std::size_t count = count_scan_points(file) * kFloatsPerPoint;
+  const std::size_t count = 4 * static_cast<std::size_t>(count_bin_points(file, BinLayout()));
   if (count > xyzi.capacity()) {
     xyzi = {};
     xyzi.reserve(count + count / 8);  // scans of one sensor differ in size; resize() would double
@@ -60,24 +42,22 @@ void read_scan(const fs::path& file, std::vector<float>& xyzi) {
   read_all(file, xyzi);
 }
 
-void check_labels(const fs::path& file, std::size_t count) {
-  const std::uintmax_t size = size_of(file);
+std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error) fail(file, "cannot be read: " + error.message());
   if (size != count * sizeof(std::uint32_t)) {
     fail(file, "has " + std::to_string(size) + " bytes, expected " +
                    std::to_string(count * sizeof(std::uint32_t)) + " (uint32 for each of " +
                    std::to_string(count) + " points)");
   }
-}
-
-std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) {
-  check_labels(file, count);
   std::vector<std::uint32_t> labels(count);
   read_all(file, labels);
   return labels;
 }
 
 void write_scan(const fs::path& file, Span<const float> xyzi) {
-  if (xyzi.size() % kFloatsPerPoint != 0) fail(file, "expected 4 floats for each point to write");
+  if (xyzi.size() % 4 != 0) fail(file, "expected 4 floats for each point to write");
   write_all(file, xyzi);
 }
 

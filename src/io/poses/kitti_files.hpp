@@ -3,10 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "dynains/pose.hpp"
@@ -14,14 +12,6 @@
 namespace dynains {
 
 inline constexpr double kKittiPeriod = 0.1;  // s, the 10 Hz of KITTI
-
-struct NumberedScan {
-  std::uint64_t number;
-  std::string name;  ///< the digits, as in the name of the file
-};
-
-/// Scans NNNNNN.bin of a folder in the order of their numbers, at least one.
-std::vector<NumberedScan> list_kitti_scans(const std::filesystem::path& folder);
 
 /// Strictly increasing.
 std::vector<double> read_kitti_times(const std::filesystem::path& path);
