@@ -75,6 +75,9 @@ class ChunkedLog : public LogFile {
   }
   void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
 
+  /// Bytes from which the fields before the data of a record are read: names are short.
+  static constexpr std::uint64_t kLongestHead = 4096;
+
   RawFile file_;
 
  private:

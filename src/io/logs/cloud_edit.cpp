@@ -129,9 +129,6 @@ std::string without_points_of_cloud(const SerialisedMessage& message,
   return result + points + bytes.tail();
 }
 
-/// Without the padding between the points of CDR.
-constexpr std::size_t kLivoxPoint = 19;  // bytes
-
 std::string without_points_of_livox(const SerialisedMessage& message,
                                     Span<const std::uint8_t> keep) {
   MessageReader in(message);

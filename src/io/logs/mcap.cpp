@@ -96,7 +96,6 @@ void McapFile::take_header(std::uint64_t position, std::uint64_t size) {
 }
 
 void McapFile::take_chunk(std::uint64_t position, std::uint64_t size) {
-  constexpr std::uint64_t kLongestHead = 128;  // compression names are short
   const auto head = file_.read(position, std::min(size, kLongestHead), "a chunk");
   Bytes fields(path_, position, head.data(), head.size());
   Chunk chunk;
@@ -166,7 +165,6 @@ void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
 }
 
 void McapFile::copy_others(McapWriter& writer) {
-  constexpr std::uint64_t kLongestHead = std::uint64_t{1} << 16;  // names are short
   for (const std::uint64_t position : others_) {
     const std::uint64_t size = record_size(position).value_or(0);
     const auto begin = file_.read(position, std::min(size, kLongestHead), "a record");

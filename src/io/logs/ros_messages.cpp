@@ -90,12 +90,11 @@ PointColumns livox_columns() {
 
 /// Number of points of a CustomMsg behind its header, checked against the size of the message.
 std::uint32_t read_livox_size(MessageReader& in) {
-  constexpr std::size_t kLeastPoint = 19;  // bytes
   in.number<std::uint64_t>("a time base");
   in.number<std::uint32_t>("a number of points");
   in.number<std::uint8_t>("a lidar id");
   in.take(3, "reserved bytes");
-  return in.length(kLeastPoint, "points");
+  return in.length(kLivoxPoint, "points");
 }
 
 void read_livox(MessageReader& in, RecordedScan& scan) {

@@ -37,6 +37,9 @@ struct CloudInfo {
   PointColumns columns;
 };
 
+/// A point of CustomMsg of Livox, bytes, without the padding between points of CDR.
+inline constexpr std::size_t kLivoxPoint = 19;
+
 /// Whether read_cloud() decodes the type: sensor_msgs/PointCloud2, and CustomMsg of Livox.
 bool is_cloud_type(const std::string& type);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "../poses/kitti_files.hpp"
 #include "../text.hpp"
 
 namespace dynains {
@@ -11,7 +12,6 @@ namespace {
 
 constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
 constexpr double kAbsolute = 10.0;       // s; larger times count from the origin of stamps
-constexpr double kUsualPeriod = 0.1;     // s
 constexpr double kShortestShare = 0.05;  // of the interval between scans
 constexpr double kNoGap = 0.125;         // s; scans that are farther apart may be some of all scans
 
@@ -139,7 +139,7 @@ double PointClockSearch::longest_scan() const {
 }
 
 double PointClockSearch::shortest_scan() const {
-  const double period = period_ > 0.0 ? std::min(period_, kUsualPeriod) : kUsualPeriod;
+  const double period = period_ > 0.0 ? std::min(period_, kKittiPeriod) : kKittiPeriod;
   return kShortestShare * period;
 }
 
