@@ -94,11 +94,11 @@ CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, st
       b, [&](std::size_t session, std::size_t i) { after.insert(voxel(session, i)); });
   Candidates removed(grid, history), added(grid, history);
   history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
-    if (!history.is_above_ground(history.points(session)[i])) return;
+    if (history.points(session)[i].is_ground != 0) return;
     if (!is_in(after, voxel(session, i))) removed.add(session, i);
   });
   history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
-    if (!history.is_above_ground(history.points(session)[i])) return;
+    if (history.points(session)[i].is_ground != 0) return;
     if (is_in(before, voxel(session, i))) {
       removed.add_standing(session, i);
       added.add_standing(session, i);

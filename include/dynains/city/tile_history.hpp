@@ -30,9 +30,9 @@ namespace dynains {
 ///   stands there. A part whose place was free, and that its own session hit too seldom, does not
 ///   enter the map.
 /// - A later session that passes through it removes it.
-/// Touching parts of a session above the ground form components. A component that has mostly left
-/// leaves as a whole; if it is larger than a vehicle, each of its cubes of 8 blocks decides for
-/// itself.
+/// Touching parts of a session above the ground form components. One that is larger than a vehicle
+/// is cut into cubes of 8 blocks: a tree that was felled beside others leaves alone. A component
+/// that has mostly left leaves as a whole.
 class TileHistory {
  public:
   static constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
@@ -59,12 +59,6 @@ class TileHistory {
   /// Whether a session before its own saw the place of a point free.
   bool was_free(std::size_t session, std::size_t point) const {
     return part_of(session, point).was_free;
-  }
-  /// Whether a point is no ground, or at least 0.35 m higher than the lowest ground around of the
-  /// sessions that have tested.
-  bool is_above_ground(const SessionPoint& point) const {
-    constexpr float kRise = 0.35F;  // m
-    return point.is_ground == 0 || point.z > lowest_ground_around(point) + kRise;
   }
   /// Whether a point is neither removed by a session up to number `last`, nor newer than `last`.
   bool stands(std::size_t session, std::size_t point, std::uint32_t last) const {
@@ -128,7 +122,6 @@ class TileHistory {
   /// Ends the references of session number tested_count().
   void end_session() {
     const std::uint32_t by = tested_count_++;
-    for (const SessionPoint& point : sessions_[by].points) add_ground(point);
     find_components(by);
     remove_parts(by);
     remove_components(by);
@@ -175,9 +168,8 @@ class TileHistory {
     float per_hit;  ///< ratio to the parts that are hit
     float of_all;   ///< ratio to all its parts
   };
-  static constexpr Limits kNotStanding = {2.0F, 0.3F};   // in its own session
-  static constexpr Limits kCompactLeft = {0.25F, 0.1F};  // the size of a vehicle
-  static constexpr Limits kLeft = {1.0F, 0.2F};
+  static constexpr Limits kNotStanding = {2.0F, 0.3F};  // in its own session
+  static constexpr Limits kLeft = {0.25F, 0.1F};
 
   struct Block {
     CellSamples samples;
@@ -197,9 +189,6 @@ class TileHistory {
     std::uint8_t own_hits = 0;  // references of its own session that hit
     bool was_free = false;      // after a session before its own
   };
-  struct Ground {
-    float lowest = std::numeric_limits<float>::max();  // m
-  };
   struct Session {
     std::vector<SessionPoint> points;
     std::vector<std::uint32_t> part_of;  // by point
@@ -212,27 +201,6 @@ class TileHistory {
   }
   std::uint32_t parts_begin(std::uint32_t session) const {
     return session == 0 ? 0 : sessions_[session - 1].parts_end;
-  }
-
-  static VoxelKey ground_cell(const SessionPoint& point) {
-    constexpr float kCell = 1.0F;  // m
-    return voxel_key(static_cast<std::int64_t>(point.x / kCell),
-                     static_cast<std::int64_t>(point.y / kCell), 0);
-  }
-  void add_ground(const SessionPoint& point) {
-    if (point.is_ground == 0) return;
-    float& lowest = ground_.values[ground_.add(ground_cell(point))].lowest;
-    lowest = std::min(lowest, point.z);
-  }
-  // m, in the cell of a point and those that touch it; the largest float if there is none.
-  float lowest_ground_around(const SessionPoint& point) const {
-    float lowest = std::numeric_limits<float>::max();
-    for (int i = 0; i < 9; ++i) {
-      const Ground* const ground =
-          ground_.find(ground_cell(point) + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (ground != nullptr) lowest = std::min(lowest, ground->lowest);
-    }
-    return lowest;
   }
 
   // Adds what a reference tells.
@@ -250,23 +218,21 @@ class TileHistory {
     VoxelTile<std::uint32_t> parts;
     const Session& own = sessions_[session];
     for (std::size_t i = 0; i < own.points.size(); ++i) {
-      if (!is_above_ground(own.points[i])) continue;
+      if (own.points[i].is_ground != 0) continue;
       const std::uint32_t part = own.part_of[i];
       parts.values[parts.add(blocks_.keys[parts_[part].block])] = part;
     }
     for_each_component(parts.keys, parts.numbers, [&](const std::vector<std::uint32_t>& members) {
-      const auto first = static_cast<std::uint32_t>(is_compact_.size());
       const bool is_whole = is_compact(parts.keys, members);
       VoxelHashTable<> cubes;
       for (const std::uint32_t member : members) {
-        // A tree that was felled beside others leaves alone.
         const auto cube = [&](int axis) {
           return voxel_index(parts.keys[member], axis) >> kCubeBits;
         };
         const VoxelKey key = is_whole ? 0 : voxel_key(cube(0), cube(1), cube(2));
-        parts_[parts.values[member]].component = first + cubes.insert(key);
+        parts_[parts.values[member]].component = component_count_ + cubes.insert(key);
       }
-      is_compact_.resize(first + cubes.size(), is_whole);
+      component_count_ += static_cast<std::uint32_t>(cubes.size());
     });
   }
 
@@ -293,7 +259,7 @@ class TileHistory {
     struct Count {
       float free = 0.0F, hit = 0.0F, all = 0.0F;
     };
-    std::vector<Count> counts(is_compact_.size());
+    std::vector<Count> counts(component_count_);
     const std::uint32_t end = sessions_[by].parts_end;
     for (std::uint32_t i = 0; i < end; ++i) {
       const Part& part = parts_[i];
@@ -307,9 +273,7 @@ class TileHistory {
       Part& part = parts_[i];
       if (part.component == kNone || part.removed_by != kNever) continue;
       const Count& count = counts[part.component];
-      const Limits& limits = by == part.session            ? kNotStanding
-                             : is_compact_[part.component] ? kCompactLeft
-                                                           : kLeft;
+      const Limits& limits = by == part.session ? kNotStanding : kLeft;
       const bool has_left = count.free > 0.0F && count.free >= limits.per_hit * count.hit &&
                             count.free >= limits.of_all * count.all;
       if (has_left) part.removed_by = by;
@@ -323,9 +287,8 @@ class TileHistory {
   float level_ = static_cast<float>(log_odds(0.95));  // from which a part is free (Eq. 19)
   std::vector<Session> sessions_;
   VoxelTile<Block> blocks_;
-  std::vector<Part> parts_;       // those of a session are together
-  std::vector<bool> is_compact_;  // by component
-  VoxelTile<Ground> ground_;      // of the sessions that have tested
+  std::vector<Part> parts_;  // those of a session are together
+  std::uint32_t component_count_ = 0;
   std::uint32_t tested_count_ = 0;
   TestedCells tested_;
 };
