@@ -126,6 +126,7 @@ inline void require_in(const Bounds& bounds, double value, const char* owner, co
                        const char* unit, const char* help) {
   if (bounds.contain(value)) return;
   std::ostringstream number, expected;
+  number.precision(10);  // integers of 32 bits have no exponent
   number << value;
   expected << "in " << bounds.to_string() << (*unit == '\0' ? "" : " ") << unit;
   refuse_value(std::string(owner) + '.' + name, number.str(), expected.str(), help);
