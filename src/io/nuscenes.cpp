@@ -79,7 +79,7 @@ template <class Take>
 void read_table(const fs::path& table, Take&& take) {
   std::ifstream file = open_input(table);
   std::size_t count = 0;
-  const auto take_row = [&](int depth, Json::parse_event_t event, Json& parsed) {
+  const auto take_row = [&](int depth, Json::parse_event_t event, const Json& parsed) {
     if (event != Json::parse_event_t::object_end || depth != 1) return true;
     take(TableRow(table, count++, parsed));
     return false;
