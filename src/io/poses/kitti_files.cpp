@@ -54,9 +54,8 @@ std::optional<Pose> nearest_rigid(const double* rows) {
     return std::nullopt;
   }
   Pose pose = Pose::Identity();
-  pose.linear() = detail::Quaternion(rotation).normalized().toRotationMatrix();
-  pose.translation() = matrix.col(3);
-  return pose;
+  pose.matrix().topRows<3>() = matrix;
+  return orthonormalized(pose);
 }
 
 std::vector<double> read_kitti_times(const fs::path& path) {
