@@ -10,7 +10,7 @@
 namespace dynains::program {
 namespace {
 
-/// What the second pass needs of the first.
+/// The verdicts of the first pass by scan, and the poses under which it compared the scans.
 struct FirstPass {
   explicit FirstPass(std::size_t scans) : verdicts(scans) {}
 

@@ -15,7 +15,7 @@
 namespace dynains::python {
 namespace {
 
-// What the properties hold, and the text.
+// Values of the properties of Diagnosis, and the text that represents it.
 struct CheckedRecording {
   bool passed;
   py::dict options;
