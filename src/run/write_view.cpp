@@ -159,6 +159,9 @@ ResultFolder open_finished_run(const fs::path& folder) {
 std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& recording) {
   std::vector<std::size_t> scans;
   std::set<std::string> missing = out.listing().scans;
+  if (missing.empty()) {
+    throw IoError(out.marker_path().string() + ": /outputs/scans: expected the scans of the run");
+  }
   for (std::size_t i = 0; i < recording.size(); ++i) {
     if (missing.erase(listed_name(recording.name(i))) > 0) scans.push_back(i);
   }

@@ -252,6 +252,12 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
        },
        "/complete: expected true"},
       {[](const auto& f) {
+         auto report = nlohmann::json::parse(read_text(f.report));
+         report["outputs"]["scans"] = nlohmann::json::array();
+         write_text(f.report, report.dump());
+       },
+       "/outputs/scans: expected the scans of the run"},
+      {[](const auto& f) {
          fs::remove_all(f.out);
          fs::create_directory(f.out);
        },
