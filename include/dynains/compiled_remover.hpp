@@ -9,7 +9,6 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <utility>
 
 #include "dynains/belief/belief_updater.hpp"
 #include "dynains/clusters/curved_voxel_clusterer.hpp"

@@ -5,7 +5,6 @@
 #include <array>
 #include <string>
 #include <type_traits>
-#include <utility>
 
 #include "dynains/clusters/comparison.hpp"
 #include "dynains/errors.hpp"

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <system_error>
 #include <thread>
-#include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <set>
 #include <sstream>
 #include <string>
-#include <utility>
 
 #include "dynains/errors.hpp"
 #include "poses/given_motion.hpp"

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <vector>
 
 #include "io/byte_reader.hpp"
 #include "io/failure.hpp"

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <string>
 #include <utility>
 
 #include "dynains/errors.hpp"

@@ -1,6 +1,5 @@
 #include "dynains/evaluation/report.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>

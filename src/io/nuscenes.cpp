@@ -1,14 +1,11 @@
 #include "nuscenes.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <fstream>
-#include <map>
 #include <set>
 #include <string_view>
 #include <system_error>
 #include <unordered_map>
-#include <utility>
 
 #include "failure.hpp"
 #include "input_file.hpp"

@@ -14,7 +14,6 @@
 #include "dynains/median.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
-#include "io/poses/kitti_files.hpp"
 #include "logs/log_scans.hpp"
 #include "nuscenes.hpp"
 #include "points/bin_layout.hpp"

@@ -1,7 +1,6 @@
 #include "scan_reader.hpp"
 
 #include <mutex>
-#include <string>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
@@ -9,7 +8,6 @@
 #include "failure.hpp"
 #include "logs/log_scans.hpp"
 #include "points/bin_layout.hpp"
-#include "points/point_readers.hpp"
 
 namespace dynains {
 namespace {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/pose.hpp"
 
 namespace dynains {
 

@@ -1,7 +1,6 @@
 // Text and numbers in files, independent of the locale of the process.
 #pragma once
 
-#include <cstddef>
 #include <limits>
 #include <locale>
 #include <optional>

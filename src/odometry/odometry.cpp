@@ -1,10 +1,8 @@
 #include "dynains/odometry/odometry.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "dynains/pose.hpp"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 
 namespace dynains {

@@ -1,7 +1,6 @@
 #include "evaluation_options.hpp"
 
 #include <algorithm>
-#include <type_traits>
 #include <utility>
 
 #include "dynains/io/atomic_file.hpp"

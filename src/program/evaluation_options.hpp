@@ -6,7 +6,6 @@
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
-#include "run/labelled_sequence.hpp"
 #include "run/output_folder.hpp"
 
 namespace dynains::program {

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
+#include "recording_options.hpp"
 #include "run/output_folder.hpp"
 #include "run/run_doubts.hpp"
 #include "run/start_check.hpp"

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "recording_options.hpp"
 #include "run/estimate_poses.hpp"
 
 namespace dynains::program {

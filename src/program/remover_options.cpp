@@ -1,6 +1,5 @@
 #include "remover_options.hpp"
 
-#include <type_traits>
 #include <utility>
 
 #include "run/preset.hpp"

@@ -8,7 +8,6 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/verdict.hpp"
 #include "run/labelled_sequence.hpp"
 
 namespace dynains::program {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "interrupt.hpp"
 #include "io/logs/cloud_edit.hpp"
 #include "io/logs/log_copy.hpp"

@@ -1,7 +1,5 @@
 #include "map_attributes.hpp"
 
-#include <cmath>
-
 namespace dynains::program {
 
 MapAttributes attributes_of(const RecordedScan& scan, const ScanVerdict& verdict,

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
-#include <string>
 
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"

@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "dynains/io/folder_lock.hpp"
 #include "folder.hpp"

@@ -1,7 +1,6 @@
 #include "parameter_values.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <limits>
 #include <locale>
 #include <sstream>

@@ -7,7 +7,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/extrinsic.hpp"
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
 #include "io/fingerprint.hpp"

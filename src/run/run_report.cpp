@@ -11,7 +11,6 @@
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/version.hpp"
 
 namespace dynains::program {
 namespace {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>

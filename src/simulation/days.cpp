@@ -1,9 +1,7 @@
 // One place on several days.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include "dynains/simulation/simulator.hpp"
 #include "simulation/materials.hpp"

@@ -2,7 +2,6 @@
 // function arguments are evaluated differs between compilers (braces are ordered).
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 

@@ -1,5 +1,4 @@
 #include <cstddef>
-#include <iterator>
 
 #include "dynains/simulation/config.hpp"
 #include "simulation/random.hpp"

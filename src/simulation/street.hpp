@@ -1,7 +1,6 @@
 // Lines along which streets run and objects move.
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <vector>
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <bitset>
-#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"

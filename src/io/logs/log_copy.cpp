@@ -1,6 +1,5 @@
 #include "log_copy.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>

@@ -1,7 +1,6 @@
 // Logs of robots: files of messages by topic and time.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>

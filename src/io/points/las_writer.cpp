@@ -5,7 +5,6 @@
 
 #include "../failure.hpp"
 #include "../scalar.hpp"
-#include "dynains/errors.hpp"
 #include "dynains/io/las_file.hpp"
 #include "las_format.hpp"
 

@@ -1,8 +1,6 @@
 // Decoder of the LZF compression that PCD files use.
 #pragma once
 
-#include <vector>
-
 #include "dynains/points.hpp"
 
 namespace dynains {

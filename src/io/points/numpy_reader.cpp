@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <iterator>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "../failure.hpp"

@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstring>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -1,6 +1,5 @@
 #include <array>
 #include <charconv>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "dynains/io/point_file.hpp"
 
 #include <limits>
-#include <ostream>
 #include <sstream>
 #include <string>
 #include <system_error>

@@ -1,7 +1,5 @@
 #include "point_sink.hpp"
 
-#include <algorithm>
-
 #include "../scalar.hpp"
 #include "../text.hpp"
 

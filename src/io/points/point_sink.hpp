@@ -8,7 +8,6 @@
 #include <string>
 #include <string_view>
 
-#include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
 
 namespace dynains {

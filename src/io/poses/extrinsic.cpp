@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <optional>
 #include <sstream>
-#include <string_view>
 
 #include "../text.hpp"
 #include "dynains/errors.hpp"

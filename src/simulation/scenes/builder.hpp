@@ -1,14 +1,11 @@
 // Builds a scene from static and moving objects that keep their distance.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <utility>
 #include <vector>
 
-#include "simulation/scenes/layout.hpp"
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {

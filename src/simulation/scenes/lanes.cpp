@@ -1,7 +1,6 @@
 #include "simulation/scenes/lanes.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace dynains::simulation {

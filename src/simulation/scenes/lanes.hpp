@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "simulation/scenes/builder.hpp"
+#include "simulation/scenes/layout.hpp"
 
 namespace dynains::simulation {
 
