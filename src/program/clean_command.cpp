@@ -1,8 +1,13 @@
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,15 +17,17 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/parameters.hpp"
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 #include "io/points/point_file_copy.hpp"
 #include "parameter_flags.hpp"
+#include "poses/scan_registration.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/input_files.hpp"
 #include "run/interrupt.hpp"
 #include "run/labelled_sequence.hpp"
-#include "run/map_alignment.hpp"
-#include "run/map_votes.hpp"
 #include "run/output_folder.hpp"
 #include "run/write_view.hpp"
 
@@ -28,6 +35,138 @@ namespace dynains::program {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Counts the static and the moving points of scans in the voxels that hold points of a map.
+class MapVotes {
+ public:
+  enum class Verdict : std::uint8_t {
+    kStatic,  ///< as many static as moving points of scans in the voxel, or more
+    kMoving,
+    kUnseen,  ///< no point of a scan in the voxel, or coordinates that are not finite
+  };
+
+  /// `map`: positions in the world frame, m. `voxel`: edge of the voxels, m, above 0.
+  MapVotes(Span<const Eigen::Vector3d> map, double voxel) : voxel_(voxel) {
+    voxels_.reserve(map.size());
+    for (const Eigen::Vector3d& point : map) {
+      // The first point is the centre of its voxel.
+      if (!origin_ && point.allFinite()) origin_ = point.array() - 0.5 * voxel;
+      const std::optional<VoxelKey> key = key_of(point);
+      voxels_.push_back(key ? table_.insert(*key) : VoxelHashTable<>::kNone);
+    }
+    counts_.resize(table_.size());
+  }
+
+  std::size_t voxel_count() const { return counts_.size(); }
+
+  /// Adds a point of a scan, in the world frame.
+  void add(const Eigen::Vector3d& point, bool is_moving) {
+    const std::optional<VoxelKey> key = key_of(point);
+    const std::uint32_t voxel = key ? table_.find(*key) : VoxelHashTable<>::kNone;
+    if (voxel != VoxelHashTable<>::kNone)
+      ++(is_moving ? counts_[voxel].moving : counts_[voxel].rest);
+  }
+
+  /// Verdict on point `i` of the map.
+  Verdict verdict(std::size_t i) const {
+    if (voxels_[i] == VoxelHashTable<>::kNone) return Verdict::kUnseen;
+    const Counts& counts = counts_[voxels_[i]];
+    if (counts.moving > counts.rest) return Verdict::kMoving;
+    return counts.rest > 0 ? Verdict::kStatic : Verdict::kUnseen;
+  }
+
+ private:
+  struct Counts {
+    std::uint32_t rest = 0, moving = 0;  // static and moving points
+  };
+
+  // Empty for points far from the map, and those that are not finite.
+  std::optional<VoxelKey> key_of(const Eigen::Vector3d& point) const {
+    if (!origin_) return std::nullopt;
+    constexpr auto kEnd = static_cast<double>(kVoxelKeyOffset);
+    std::int64_t index[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double scaled = std::floor((point[axis] - (*origin_)[axis]) / voxel_);
+      if (!(scaled >= -kEnd && scaled < kEnd)) return std::nullopt;
+      index[axis] = static_cast<std::int64_t>(scaled);
+    }
+    return voxel_key(index[0], index[1], index[2]);
+  }
+
+  double voxel_;
+  std::optional<Eigen::Vector3d> origin_;  // a corner of the voxels
+  VoxelHashTable<> table_;
+  std::vector<std::uint32_t> voxels_;  // by point of the map
+  std::vector<Counts> counts_;         // by voxel
+};
+
+/// Where the scans of a recording lie in a map that was made with other poses. A scan each 2 m of
+/// way is aligned with the surfaces of the map around it; the scans up to the next one are moved
+/// with it. Where the alignment is uncertain, the motion before it stays.
+class MapAlignment {
+ public:
+  /// `map`: positions in the frame of the map, m; those that are not finite do not count.
+  explicit MapAlignment(const std::vector<Eigen::Vector3d>& map) {
+    std::copy_if(map.begin(), map.end(), std::back_inserter(map_),
+                 [](const Eigen::Vector3d& point) { return point.allFinite(); });
+    std::sort(map_.begin(), map_.end(), is_before);
+  }
+
+  /// Whether the next scan is 2 m or more from the latest one that align() took.
+  bool is_due(const Pose& T_world_sensor) const {
+    constexpr double kWay = 2.0;  // m
+    return !latest_ || (T_world_sensor.translation() - *latest_).norm() >= kWay;
+  }
+
+  /// `standing`: m, sensor frame, points that do not move. The frame of the map has to be that of
+  /// the poses but for about a metre and a few degrees.
+  void align(PointsView standing, const Pose& T_world_sensor) {
+    const Eigen::Vector3d sensor = T_world_sensor.translation();
+    latest_ = sensor;
+    const Eigen::Vector3d centre = T_map_world_ * sensor;
+    const Pose T_map_centre(Eigen::Translation3d{centre});
+    const Pose T_centre_map = T_map_centre.inverse();
+    const Pose T_latest = T_centre_map * T_map_world_ * T_world_sensor;
+    const RegistrationScan map(around(centre), kReach), scan(standing, kReach);
+    const auto found =
+        register_scans(map.surfaces(), scan.points(), {T_latest, T_centre_map * T_world_sensor});
+    if (!found || found->score < kLeastScore || found->uncertainty > kMostUncertain) return;
+    T_map_world_ = T_map_centre * found->T_a_b * T_world_sensor.inverse();
+    ++aligned_;
+    farthest_ = std::max(farthest_, (T_map_world_ * sensor - sensor).norm());
+  }
+
+  /// From the frame of the poses, at the latest certain alignment.
+  const Pose& T_map_world() const { return T_map_world_; }
+  std::size_t aligned() const { return aligned_; }  ///< scans whose alignment was certain
+  double farthest() const { return farthest_; }     ///< m, most that a sensor was moved
+
+ private:
+  static constexpr double kReach = 40.0;  // m, points that count
+
+  static bool is_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return a.x() < b.x();
+  }
+
+  // Points of the map relative to `centre`, along the axes of the map.
+  PointBuffer around(const Eigen::Vector3d& centre) const {
+    PointBuffer points;
+    const Eigen::Vector3d reach(kReach, 0.0, 0.0);
+    auto point = std::lower_bound(map_.begin(), map_.end(), centre - reach, is_before);
+    const auto end = std::upper_bound(point, map_.end(), centre + reach, is_before);
+    for (; point != end; ++point) {
+      const Eigen::Vector3f p = (*point - centre).cast<float>();
+      if (p.norm() < kReach) points.push_back(p.x(), p.y(), p.z());
+    }
+    return points;
+  }
+
+  std::vector<Eigen::Vector3d> map_;  // by x
+  Pose T_map_world_ = Pose::Identity();
+  std::optional<Eigen::Vector3d> latest_;  // m, sensor of the latest scan that align() took
+  std::size_t aligned_ = 0;
+  double farthest_ = 0.0;
+};
 
 struct CleanOptions {
   explicit CleanOptions(CLI::App& command)

@@ -1,3 +1,4 @@
+#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -13,11 +14,40 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
+#include "dynains/points.hpp"
 #include "parameters.hpp"
-#include "verdict.hpp"
 
 namespace dynains::python {
 namespace {
+
+/// A copy of a span.
+template <class To, class From>
+py::array_t<To> to_array_of(Span<const From> values) {
+  std::vector<To> copy;
+  copy.reserve(values.size());
+  for (const From value : values) copy.push_back(static_cast<To>(value));
+  return to_array(std::move(copy));
+}
+
+/// ScanVerdict with arrays that Python owns.
+struct Verdict {
+  std::uint64_t scan;
+  double time;
+  py::array_t<double> T_world_sensor;
+  py::array_t<std::uint8_t> labels;
+  py::array_t<std::uint32_t> instances;
+  py::array_t<float> beliefs;
+  py::array_t<std::uint8_t> causes;
+
+  explicit Verdict(const ScanVerdict& verdict)
+      : scan(verdict.scan),
+        time(verdict.time),
+        T_world_sensor(to_array(verdict.T_world_sensor)),
+        labels(to_array_of<std::uint8_t>(verdict.labels)),
+        instances(to_array_of<std::uint32_t>(verdict.instances)),
+        beliefs(to_array_of<float>(verdict.beliefs)),
+        causes(to_array_of<std::uint8_t>(verdict.causes)) {}
+};
 
 struct Frame {
   py::object newest;

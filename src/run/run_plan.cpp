@@ -3,15 +3,17 @@
 #include <algorithm>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/sensor/own_body.hpp"
 #include "io/fingerprint.hpp"
+#include "io/points/finite_points.hpp"
 #include "naming_scan.hpp"
-#include "own_body_range.hpp"
 
 namespace dynains::program {
 namespace {
@@ -23,6 +25,29 @@ nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
   DynaInsRemover::Config::visit(
       config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
+}
+
+/// OwnBody::min_range() of a sample of the scans of `range`, m, at most `otherwise`; that value if
+/// the sensor moves less than 5 m or the scans are too few to tell. A body that reaches farther is
+/// judged like other things; otherwise the road around it would be lost. Throws IoError.
+double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
+  constexpr std::size_t kScans = 24;
+  constexpr double kLeastMotion = 5.0;  // m
+  const std::size_t count = std::min(kScans, range.size());
+  std::vector<PointBuffer> scans;
+  RecordedScan scan;
+  double motion = 0.0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1));
+    motion = std::max(motion, (recording.T_world_sensor(i).translation() -
+                               recording.T_world_sensor(range.first).translation())
+                                  .norm());
+    recording.read_scan(i, scan);
+    scans.push_back(finite_points(scan));
+  }
+  if (motion < kLeastMotion) return otherwise;
+  const OwnBody body = estimate_own_body(scans);
+  return body.known ? std::min(body.min_range(), otherwise) : otherwise;
 }
 
 /// So that a broken file or pose is noticed before anything is written.
