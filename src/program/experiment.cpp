@@ -185,8 +185,7 @@ std::vector<Variant> table1_variants() {
   using Config = DynaInsRemover::Config;
   std::vector<Variant> variants = {{"dynains, paper preset, IOC only", Config::paper()},
                                    {"dynains, paper preset, full", Config::paper()},
-                                   {"dynains, default preset, one pass", Config()},
-                                   {"dynains, default preset", Config(), 2}};
+                                   {"dynains, default preset", Config()}};
   variants[0].config.use_belief = false;
   return variants;
 }

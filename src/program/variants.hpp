@@ -15,7 +15,6 @@ namespace dynains::program {
 struct Variant {
   std::string name;
   DynaInsRemover::Config config;
-  int passes = 1;  ///< 2: final verdicts are those of the second pass over the window
 };
 
 /// Which answer of the remover is judged.
@@ -25,9 +24,8 @@ enum class Answer { kFinal, kNewest };
 /// point.
 using VariantVerdicts = std::vector<std::vector<std::uint8_t>>;
 
-/// Runs every variant over the window, in one pass or two. `done(scans)` is called after each scan
-/// of the first pass. Memory: 1 byte per point, 7 of a second pass. Throws ConfigError for more
-/// than evaluation::kMaxEstimates variants.
+/// Runs every variant over the window. `done(scans)` is called after each scan. Memory: 1 byte per
+/// point. Throws ConfigError for more than evaluation::kMaxEstimates variants.
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done);
 
