@@ -6,43 +6,29 @@
 #include <functional>
 #include <string>
 #include <type_traits>
-#include <vector>
 
 #include "dynains/parameters.hpp"
 #include "run/parameter_values.hpp"
 
 namespace dynains::program {
 
-/// A flag for each parameter of a configuration.
-class ParameterFlags {
- public:
-  /// Adds the flags to `command`. `defaults` are shown in --help.
-  template <class Config>
-  void add_to(CLI::App& command, const Config& defaults, const std::string& group) {
-    Config::visit(defaults, [&](const auto& parameter) {
-      const std::string help =
-          std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
-      options_.push_back(command.add_option("--" + flag_name(parameter.name), help)
-                             ->type_name(describe_range(parameter))
-                             ->expected(1)
-                             ->group(group));
-    });
-  }
-
-  /// The flags that were given.
-  ParameterValues values() const {
-    ParameterValues values;
-    for (const CLI::Option* option : options_) {
-      if (option->count() == 0) continue;
-      const std::string& name = option->get_lnames().front();
-      values.set(name, option->results().empty() ? "" : option->results().back(), "--" + name);
-    }
-    return values;
-  }
-
- private:
-  std::vector<CLI::Option*> options_;
-};
+/// Adds a flag for each parameter of a configuration, which notes its text in `values`. These
+/// outlive the command. `defaults` are shown in --help.
+template <class Config>
+void add_parameter_flags(CLI::App& command, const Config& defaults, const std::string& group,
+                         ParameterValues& values) {
+  Config::visit(defaults, [&](const auto& parameter) {
+    const std::string name = flag_name(parameter.name), flag = "--" + name;
+    const auto note = [&values, name, flag](const std::string& text) {
+      values.set(name, text, flag);
+    };
+    const std::string help =
+        std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
+    command.add_option_function<std::string>(flag, note, help)
+        ->type_name(describe_range(parameter))
+        ->group(group);
+  });
+}
 
 /// Help of a setting, with its default unless that is a text.
 template <class T>

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "parameter_flags.hpp"
 #include "run/preset.hpp"
 
 namespace dynains::program {
@@ -16,21 +17,21 @@ RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
       ->capture_default_str();
   command.add_option("--config", config_file_, "config file, see dynains config");
   const auto defaults = DynaInsRemover::Config::preset(preset_);
-  DynaInsRemover::Config::visit_sections(defaults, [&](const char* name, const auto& section) {
-    flags_.add_to(command, section, name);
+  DynaInsRemover::Config::visit_sections(defaults, [&](const char* group, const auto& section) {
+    add_parameter_flags(command, section, group, flags_);
   });
 }
 
 DynaInsRemover::Config RemoverOptions::config() const {
   DynaInsRemover::Config config = DynaInsRemover::Config::preset(preset_);
   if (!config_file_.empty()) read_config_file(config_file_).apply(config);
-  flags_.values().apply(config);
+  flags_.apply(config);
   config.validate();
   return config;
 }
 
 bool RemoverOptions::sets(const std::string& flag_name) const {
-  return flags_.values().has(flag_name) ||
+  return flags_.has(flag_name) ||
          (!config_file_.empty() && read_config_file(config_file_).has(flag_name));
 }
 

@@ -5,13 +5,16 @@
 #include <string>
 
 #include "dynains/compiled_remover.hpp"
-#include "parameter_flags.hpp"
+#include "run/parameter_values.hpp"
 
 namespace dynains::program {
 
 class RemoverOptions {
  public:
+  /// This is not moved afterwards: flags refer to it.
   RemoverOptions(CLI::App& command, std::string default_preset);
+  RemoverOptions(const RemoverOptions&) = delete;
+  RemoverOptions& operator=(const RemoverOptions&) = delete;
 
   const std::string& preset_name() const { return preset_; }
 
@@ -19,7 +22,7 @@ class RemoverOptions {
   const std::string& config_file() const { return config_file_; }
 
   /// Whether anything but the preset was named.
-  bool given() const { return !config_file_.empty() || !flags_.values().empty(); }
+  bool given() const { return !config_file_.empty() || !flags_.empty(); }
 
   /// Throws ConfigError.
   DynaInsRemover::Config config() const;
@@ -29,7 +32,7 @@ class RemoverOptions {
  private:
   std::string preset_;
   std::string config_file_;
-  ParameterFlags flags_;
+  ParameterValues flags_;  // that were given
 };
 
 }  // namespace dynains::program

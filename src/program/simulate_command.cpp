@@ -24,12 +24,12 @@ struct SimulateOptions {
   std::string format = kFolder;
   bool force = false;
   bool quiet = false;
-  ParameterFlags flags;
+  ParameterValues flags;  // that were given
 };
 
 simulation::Config make_config(const SimulateOptions& options) {
   simulation::Config config;
-  ParameterValues values = options.flags.values();
+  ParameterValues values = options.flags;
   const bool is_random = values.take("scene", "random");
   values.apply(config);
   if (is_random) {
@@ -118,7 +118,7 @@ void add_simulate_command(CLI::App& app) {
       ->check(CLI::IsMember({kFolder, kLog}))
       ->type_name("kitti|mcap");
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  options->flags.add_to(command, simulation::Config(), "Parameters");
+  add_parameter_flags(command, simulation::Config(), "Parameters", options->flags);
   command.footer(
       "The same flags give the same files. --scene random draws scene, sensor and every parameter "
       "that is not given\nfrom the seed. simulation.json keeps all parameters.");
