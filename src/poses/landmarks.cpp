@@ -104,10 +104,4 @@ Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
           count};
 }
 
-Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan) {
-  recording.read_scan(i, scan);
-  const PointBuffer points = sampled_points(scan);
-  return Landmarks(points, estimate_mounting(points));
-}
-
 }  // namespace dynains

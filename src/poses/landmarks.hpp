@@ -52,8 +52,4 @@ inline PointBuffer sampled_points(const RecordedScan& scan) {
   return finite_points(scan, sample_step(scan));
 }
 
-/// Those of scan i, without the ground under its mounting. `scan`: memory for the scan. Throws
-/// IoError.
-Landmarks landmarks_of(const Recording& recording, std::size_t i, RecordedScan& scan);
-
 }  // namespace dynains

@@ -40,7 +40,6 @@ class TileHistory {
   /// Throws ConfigError.
   explicit TileHistory(const SessionGrid& grid) : grid_((grid.validate(), grid)) {}
 
-  std::size_t session_count() const { return sessions_.size(); }
   const std::vector<SessionPoint>& points(std::size_t session) const {
     return sessions_[session].points;
   }
@@ -88,8 +87,8 @@ class TileHistory {
     session.parts_end = static_cast<std::uint32_t>(parts_.size());
   }
 
-  /// Tests all points by a reference of session number tested_count(). `sensor`: position of the
-  /// sensor, m, in the frame of SessionPoint. `test_visibility(points, count)`: see
+  /// Tests all points by a reference of the first session that end_session() has not ended.
+  /// `sensor`: its position, m, in the frame of SessionPoint. `test_visibility(points, count)`: see
   /// detail::test_visibility(); points in the frame of SessionPoint, relative to `sensor`.
   template <class TestVisibility>
   void revise(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
@@ -116,10 +115,7 @@ class TileHistory {
     }
   }
 
-  /// Number of sessions whose references have tested the points.
-  std::uint32_t tested_count() const { return tested_count_; }
-
-  /// Ends the references of session number tested_count().
+  /// Ends the references of a session.
   void end_session() {
     const std::uint32_t by = tested_count_++;
     find_components(by);
@@ -198,9 +194,6 @@ class TileHistory {
   double edge() const { return 2.0 * grid_.map_voxel; }  // m, of a block
   const Part& part_of(std::size_t session, std::size_t point) const {
     return parts_[sessions_[session].part_of[point]];
-  }
-  std::uint32_t parts_begin(std::uint32_t session) const {
-    return session == 0 ? 0 : sessions_[session - 1].parts_end;
   }
 
   // Adds what a reference tells.
@@ -289,7 +282,7 @@ class TileHistory {
   VoxelTile<Block> blocks_;
   std::vector<Part> parts_;  // those of a session are together
   std::uint32_t component_count_ = 0;
-  std::uint32_t tested_count_ = 0;
+  std::uint32_t tested_count_ = 0;  // sessions whose references have tested the points
   TestedCells tested_;
 };
 
