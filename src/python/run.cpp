@@ -231,7 +231,7 @@ void bind_run(py::module_& module) {
       "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "
       "RuntimeWarning. Other threads run meanwhile.";
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
-  // For dynains.fleet.
+  // For dynains.view().
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
              py::arg("max_points") = program::kDefaultViewPoints);
 }

@@ -2,15 +2,57 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
-#include "map_attributes.hpp"
+#include "dynains/io/recording.hpp"
+#include "dynains/verdict.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::program {
+
+/// Values of a point of a static map that the map itself does not hold.
+struct MapAttributes {
+  double scan_time = 0.0;  ///< s
+  double time = 0.0;       ///< of the point, as in the recording
+  float intensity = 0.0F;
+  float belief = 0.0F;
+  std::uint32_t label = 0;  ///< of the recording
+  std::uint32_t instance = 0;
+  std::uint16_t session = 0;  ///< of a map of many sessions
+  Cause cause{};
+  bool is_ground = false;
+};
+
+/// For each voxel of the world, the attributes of the first point that was kept in it. Memory grows
+/// with the map: some 100 bytes for each voxel.
+class MapAttributeTable {
+ public:
+  /// `voxel`: edge of the voxels of the map, m. `origin`: m, world frame, within 200 km of the map.
+  MapAttributeTable(double voxel, const Eigen::Vector3d& origin);
+
+  /// Adds the points of a scan that the verdict keeps.
+  void add(const RecordedScan& scan, const ScanVerdict& verdict,
+           const std::vector<std::uint32_t>& labels);
+
+  /// Attributes of a point of the map, world frame, by its voxel. Rounding can move a point over a
+  /// border, so that a neighbouring voxel counts if its own one is empty.
+  MapAttributes at(const Eigen::Vector3d& position) const;
+
+ private:
+  VoxelKey key_of(const Eigen::Vector3d& position) const;
+
+  double voxel_;
+  Eigen::Vector3d origin_;
+  VoxelHashTable<> voxels_;
+  std::vector<MapAttributes> attributes_;  // by number of the voxel
+};
 
 /// Whether the extension is that of a map: .ply, .pcd or .las.
 bool is_map_name(const std::filesystem::path& path);

@@ -191,7 +191,7 @@ fs::path map_path(const std::string& name, const fs::path& out) {
   if (!is_map_name(name) || !is_map_name(map)) {
     throw ConfigError("--map " + name + ": expected a name that ends in .ply, .pcd or .las");
   }
-  if (map == out / "dynamic_points.ply" || map == out / "dynamic_points.las") {
+  if (map == out / "dynamic_points.ply") {
     throw ConfigError("--map " + name + ": the moving points go there");
   }
   if (is_in_results(map, out) && map.parent_path() != out) {

@@ -24,8 +24,6 @@ bool is_far(const Recording& recording, const ScanRange& range) {
   return false;
 }
 
-constexpr const char* kDynamicLas = "dynamic_points.las";
-
 PointColumns map_columns(bool far, const Recording& recording, bool with_attributes) {
   PointColumns columns;
   columns.double_xyz = far;
@@ -80,7 +78,6 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(listed_name(map_name()));
-  if (has_las_map()) listing.files.insert(kDynamicLas);
   if (write_poses) listing.files.insert(kEstimatedPoses);
   if (write_page) listing.files.insert(kViewPage);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
@@ -123,9 +120,6 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
   if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
-  if (outputs.has_las_map()) {
-    dynamic_las_ = open_map(outputs.folder / kDynamicLas, recording, range, outputs);
-  }
   if (outputs.map_attributes) {
     map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
   }
@@ -232,11 +226,6 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
   if (session_ != nullptr) session_->add(scan, verdict, labels, index);
-  if (!dynamic_las_) return;
-  for_each_moving(verdict.labels, [&](std::size_t i) {
-    const Eigen::Vector3d position = verdict.T_world_sensor * scan.point(i).position;
-    dynamic_las_->add(position, attributes_of(scan, verdict, labels, i));
-  });
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
@@ -247,7 +236,6 @@ void RunResults::commit() {
   finish();
   writing_online_.wait();
   dynamic_points_.commit();
-  if (dynamic_las_) dynamic_las_->commit();
   overview_.picture().write_png(overview_file_);
   if (map_) map_->commit();
 }

@@ -71,7 +71,7 @@ struct RunOutputs {
   OutputListing listing(const Recording& recording, const ScanRange& range) const;
 };
 
-/// Opens a file for the map of these scans, or for its moving points. Throws IoError.
+/// Opens a file for the map of these scans. Throws IoError.
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, const RunOutputs& outputs);
 
@@ -137,7 +137,6 @@ class RunResults {
   Overview overview_;
   std::filesystem::path overview_file_;
   std::unique_ptr<MapFile> map_;
-  std::unique_ptr<MapFile> dynamic_las_;  ///< moving points beside a LAS map
   std::optional<MapAttributeTable> map_attributes_;
   bool needs_beliefs_;
   SessionContribution* session_ = nullptr;
