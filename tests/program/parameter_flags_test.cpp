@@ -36,12 +36,12 @@ struct Sample {
 
 Sample parse(std::vector<std::string> arguments) {
   CLI::App app;
-  ParameterFlags flags;
-  flags.add_to(app, Sample(), "Sample");
+  ParameterValues values;
+  add_parameter_flags(app, Sample(), "Sample", values);
   std::reverse(arguments.begin(), arguments.end());
   app.parse(arguments);
   Sample sample;
-  flags.values().apply(sample);
+  values.apply(sample);
   return sample;
 }
 
