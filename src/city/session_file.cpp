@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using Vector = std::array<double, 3>;
 
-constexpr char kMagic[9] = "DYNSESS2";
+constexpr char kMagic[9] = "DYNSESS3";
 constexpr std::uint64_t kNumber = sizeof(std::uint64_t);
 
 std::uint64_t checksum(const char* data, std::size_t size) {
@@ -53,12 +53,11 @@ SessionAlignment alignment_of(const Json& json) {
 }
 
 Json json_of(const RangeImageGrid& grid) {
-  return {
-      grid.rows,           grid.columns,  grid.lowest, grid.rows_per_level, grid.columns_per_radian,
-      grid.last_inner_row, grid.hole_rows};
+  return {grid.rows,     grid.columns, grid.lowest, grid.rows_per_level, grid.columns_per_radian,
+          grid.hole_rows};
 }
 RangeImageGrid image_grid_of(const Json& json) {
-  return {json.at(0), json.at(1), json.at(2), json.at(3), json.at(4), json.at(5), json.at(6)};
+  return {json.at(0), json.at(1), json.at(2), json.at(3), json.at(4), json.at(5)};
 }
 
 Json json_of(const SessionInfo& session) {

@@ -1,6 +1,6 @@
 // The file of a session. Numbers are little endian, checksums FNV-1a of 64 bits. In this order:
 //
-//  "DYNSESS2"
+//  "DYNSESS3"
 //  blocks, each with the uint64 checksum of its bytes behind it:
 //    tiles: for each point float x, y (m, from the corner of the tile), z (m, world); uint32 number
 //    of its scan, label of the recording or 0, 1 for ground, else 0

@@ -424,7 +424,7 @@ TEST_CASE("a city: another grid or version is refused") {
   std::ofstream(folder.path() / "old.session") << "DYNSESS1 and more";
   fs::create_directory(folder.path() / "older");
   fs::rename(folder.path() / "old.session", folder.path() / "older" / "monday.session");
-  CHECK_THROWS_WITH(City(folder.path() / "older"), ContainsSubstring("expected \"DYNSESS2\""));
+  CHECK_THROWS_WITH(City(folder.path() / "older"), ContainsSubstring("expected \"DYNSESS3\""));
   std::ofstream(city.folder() / "city.json") << "{}";
   CHECK_THROWS_WITH(City(city.folder()), ContainsSubstring("of an earlier version"));
 

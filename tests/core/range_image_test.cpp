@@ -62,8 +62,6 @@ TEST_CASE("cells of an image are derived from the beams of a sensor, within limi
   CHECK(std::abs(grid.rows - 34.0 / 0.3) < 2.0);  // 2 deg more than the beams on each side
   CHECK(std::abs(grid.lowest * kDegrees + 22.0) < 0.2);
   CHECK(grid.hole_rows == 4);  // 1.2 deg
-  // The row of the highest beam, at 10 deg, is 32 deg above the lower edge.
-  CHECK(std::abs(grid.last_inner_row - (31.75 / 0.3 - 1.0)) < 2.0);
   sensor.azimuth_step = 0.05;
   CHECK(RangeImageGrid::for_sensor(sensor).columns == 1800);
   sensor.azimuth_step = 2.0;
@@ -141,7 +139,6 @@ class ReferenceImage {
       ++count;
     }
     const int here = cells_[at(row, column)];
-    if (!is_between_beams(row, column)) return is_moving(here) ? here : RangeImage::kBeyond;
     if (count < 2 || !is_crossed(row, column)) {
       return is_moving(here) ? here : RangeImage::kUnknown;
     }
@@ -156,21 +153,6 @@ class ReferenceImage {
   static constexpr int kNothing = RangeImage::kNothing;
 
   static bool is_static_return(int value) { return value != kNothing && !is_moving(value); }
-
-  // One of three neighbouring cells of a row has a static return.
-  bool has_return(int row, int column) const {
-    if (row < 0 || row >= grid_.rows) return false;
-    bool found = false;
-    for (int c = column - 1; c <= column + 1; ++c) {
-      found |= is_static_return(cells_[at(row, (c + grid_.columns) % grid_.columns)]);
-    }
-    return found;
-  }
-
-  bool is_between_beams(int row, int column) const {
-    const bool both_sides = has_return(row - 1, column) && has_return(row + 1, column);
-    return both_sides || (row <= grid_.last_inner_row && has_return(row, column));
-  }
 
   // The cell, or both cells beside it, have a return.
   bool is_crossed(int row, int column) const {
@@ -236,14 +218,14 @@ TEST_CASE("an image equals its definition, cell by cell") {
 int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
                         const std::vector<int>& objects, float reach, int row, int column) {
   int result = all.around(row, column);
-  if (result == RangeImage::kBeyond) return result;
+  if (result == RangeImage::kUnknown) return result;
   for (int k = 2; k <= 4; ++k) {
     const float limit = reach * grid.columns_per_radian / (static_cast<float>(k) - 0.5F);
     for (int r = std::max(0, row - k); r <= std::min(grid.rows - 1, row + k); ++r) {
       for (int c = column - k; c <= column + k; ++c) {
         const int value = objects[all.at(r, (c + grid.columns) % grid.columns)];
         if (value >= static_cast<int>(std::min(limit, 320.0F) * 100.0F)) continue;
-        if (result == RangeImage::kUnknown || value < result) result = value;
+        result = std::min(result, value);
       }
     }
   }

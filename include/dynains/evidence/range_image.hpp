@@ -28,15 +28,13 @@ class RangeImage {
     std::int16_t nearest;
     /// Range of the nearest return in the 3x3 cells, except returns of moving points in the eight
     /// outer cells. kUnknown if fewer than two cells have such a return, or if no beam crosses the
-    /// cell: neither it nor both cells beside it have a return. kBeyond if the cell may lie beyond
-    /// the outermost beam.
+    /// cell: neither it nor both cells beside it have a return.
     std::int16_t around;
   };
   static constexpr float kCentimetres = 100.0F;  ///< unit of ranges, per metre
   static constexpr std::int16_t kMoving = 1;     ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
-  static constexpr std::int16_t kBeyond = -4;  ///< unknown, and not protected by near objects
 
   /// Maximum number of cells on each side that a return of an object protects.
   static constexpr std::size_t kWidest = 4;
@@ -49,9 +47,8 @@ class RangeImage {
     std::vector<std::uint8_t> nearby;   // by group of columns: protected cells around one row
     std::array<std::vector<std::int16_t>, kWidest> lines;  // by protected cells and column
     std::vector<std::int16_t> below, gap;                  // by column, see close_holes()
-    std::vector<std::int16_t> least, least_moving, count,
-        rows;                          // by column, see merge_three_rows()
-    std::vector<std::int16_t> border;  // row of kNothing
+    std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
+    std::vector<std::int16_t> border;                      // row of kNothing
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
@@ -235,7 +232,6 @@ class RangeImage {
     scratch.least.resize(stride);
     scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
-    scratch.rows.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
     }
@@ -255,12 +251,8 @@ class RangeImage {
                                                      : scratch.border.data();
   }
 
-  // Bits of the rows of three that have a static return.
-  static constexpr std::int16_t kBelow = 1, kSame = 2, kAbove = 4;
-  static constexpr std::int16_t kNoRow = 8;  // bit that no row has
-
   // Computes for each column of three rows: the nearest static return, the nearest moving return,
-  // the negative number of static returns, and the bits of their rows.
+  // and the negative number of static returns.
   template <class Short>
   static void merge_three_rows(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
     const Short nothing(kNothing);
@@ -271,7 +263,6 @@ class RangeImage {
     std::int16_t* const leasts = scratch.least.data();
     std::int16_t* const moving_leasts = scratch.least_moving.data();
     std::int16_t* const counts = scratch.count.data();
-    std::int16_t* const rows = scratch.rows.data();
     for (std::size_t column = 0; column < stride; column += detail::kShortPackWidth) {
       const Short below = Short::load(low + column);
       const Short here = Short::load(middle + column);
@@ -284,28 +275,19 @@ class RangeImage {
       min(min(a, b), c).store(leasts + column);
       // The number of a set mask is -1.
       ((a < nothing) + (b < nothing) + (c < nothing)).store(counts + column);
-      (((a < nothing) & Short(kBelow)) | ((b < nothing) & Short(kSame)) |
-       ((c < nothing) & Short(kAbove)))
-          .store(rows + column);
     }
   }
 
   // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, or if
-  // no beam crosses it. It lies beyond the outermost beam if only rows on one side have returns. In
-  // the row of the highest beam and above, its own row is not enough, because a slanted surface a
-  // little above that beam is much nearer than its return.
+  // no beam crosses it.
   template <class Short>
   void store_row(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
-    const Short nothing(kNothing), unknown(kUnknown), beyond(kBeyond), zero(0), one_return(-1);
+    const Short nothing(kNothing), unknown(kUnknown), zero(0), one_return(-1);
     const std::size_t stride = grid.stride();
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
     const std::int16_t* const leasts = scratch.least.data();
     const std::int16_t* const moving_leasts = scratch.least_moving.data();
     const std::int16_t* const counts = scratch.count.data();
-    const std::int16_t* const rows = scratch.rows.data();
-    const Short both_sides(kBelow | kAbove);
-    const bool is_inner = static_cast<std::int32_t>(row) <= grid.last_inner_row;
-    const Short same(is_inner ? kSame : kNoRow);
     Cell* const cells = &cells_[row * stride];
     const auto least_of_three = [](const std::int16_t* at) {
       return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
@@ -314,18 +296,14 @@ class RangeImage {
          column += detail::kShortPackWidth) {
       const std::int16_t* const count = counts + column;
       const Short returns = Short::load(count - 1) + Short::load(count) + Short::load(count + 1);
-      const std::int16_t* const row_bits = rows + column;
-      const Short bits =
-          Short::load(row_bits - 1) | Short::load(row_bits) | Short::load(row_bits + 1);
-      const Short is_between = ((bits & same) == same) | ((bits & both_sides) == both_sides);
       const Short here = Short::load(middle + column);
       const Short is_crossed = (here < nothing) | ((Short::load(middle + column - 1) < nothing) &
                                                    (Short::load(middle + column + 1) < nothing));
-      const Short known = (returns < one_return) & is_between & is_crossed;
+      const Short known = (returns < one_return) & is_crossed;
       const Short staying = select(known, least_of_three(leasts + column), unknown);
       // A moving point in the cell itself occludes the points behind it.
       const Short hiding = min(select(staying < zero, nothing, staying), here);
-      const Short around = select(is_moving(here), hiding, select(is_between, staying, beyond));
+      const Short around = select(is_moving(here), hiding, staying);
       const Short moving = least_of_three(moving_leasts + column);
       const Short nearest = select(moving < nothing, moving, here);
       nearest.store_interleaved_with(around, &cells[column].nearest);
@@ -415,18 +393,15 @@ class RangeImage {
     }
   }
 
-  // Limits Cell::around of the cells of one group to `reach`, if it is not kNothing.
+  // Limits Cell::around of the known cells of one group to `reach`.
   template <class Short>
   static void protect(Cell* cells, const Short& reach) {
     using namespace detail;
-    const Short nothing(kNothing);
     std::int16_t limits[2 * kShortPackWidth];
-    nothing.store_interleaved_with(reach, limits);
+    Short(kNothing).store_interleaved_with(reach, limits);
     for (std::size_t half = 0; half < 2; ++half) {
       std::int16_t* const at = &cells[half * kShortPackWidth / 2].nearest;
-      const Short here = Short::load(at);
-      const Short limit = Short::load(limits + half * kShortPackWidth);
-      min(select((here == Short(kUnknown)) & (limit < nothing), nothing, here), limit).store(at);
+      min(Short::load(at), Short::load(limits + half * kShortPackWidth)).store(at);
     }
   }
 

@@ -21,8 +21,7 @@ struct RangeImageGrid {
   float lowest = 0.0F;       ///< level() of the lower edge of row 0
   float rows_per_level = 0.0F;
   float columns_per_radian = 0.0F;
-  std::int32_t last_inner_row = 0;  ///< highest row that lies below the highest beam as a whole
-  std::int32_t hole_rows = 0;       ///< largest gap between two beams that is filled, in rows
+  std::int32_t hole_rows = 0;  ///< largest gap between two beams that is filled, in rows
 
   /// Approximate elevation (rad) by its sine: a monotonic cubic, with an error up to 0.2 deg at
   /// elevations within 50 deg. Rows at steeper elevations are wider.
@@ -49,9 +48,6 @@ struct RangeImageGrid {
     grid.lowest = level_at(sensor.elevation_min - kBorder);
     grid.rows_per_level = static_cast<float>(1.0 / (height * detail::kRadians));
     grid.rows = static_cast<std::int32_t>((highest - grid.lowest) * grid.rows_per_level) + 1;
-    const float inner = level_at(sensor.elevation_max - 0.5 * sensor.elevation_gap);
-    grid.last_inner_row =
-        static_cast<std::int32_t>((inner - grid.lowest) * grid.rows_per_level) - 1;
     grid.columns = static_cast<std::int32_t>(std::round(360.0 / width));
     grid.columns_per_radian = static_cast<float>(grid.columns / (2.0 * M_PI));
     grid.hole_rows =
