@@ -72,7 +72,6 @@ struct DefaultStages {
   using Clusterer = CurvedVoxelClusterer;
   using Descriptor = OccupancyDescriptor;
   using Belief = BeliefUpdater;
-  using Evidence = FreeSpaceEvidence;
   using Map = StaticMapAccumulator;
 };
 

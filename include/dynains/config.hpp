@@ -14,7 +14,6 @@
 
 namespace dynains {
 
-class FreeSpaceEvidence;
 class GroundSegmenter;
 
 namespace detail {
@@ -27,22 +26,8 @@ template <>
 struct ConfigOfStage<GroundSegmenter> {
   using type = GroundConfig;
 };
-template <>
-struct ConfigOfStage<FreeSpaceEvidence> {
-  using type = FreeSpaceConfig;
-};
 template <class Stage>
 using ConfigOf = typename ConfigOfStage<Stage>::type;
-
-/// Stages::Evidence, or FreeSpaceEvidence if `Stages` has no such alias.
-template <class Stages, class = void>
-struct EvidenceOf {
-  using type = FreeSpaceEvidence;
-};
-template <class Stages>
-struct EvidenceOf<Stages, std::void_t<typename Stages::Evidence>> {
-  using type = typename Stages::Evidence;
-};
 
 /// Whether `Operation<T>` is well-formed; detects optional members of T.
 template <template <class> class Operation, class T, class = void>
@@ -73,11 +58,6 @@ Config published_config() {
     return paper_config<Config>();
   }
 }
-
-template <class Config>
-using Offline = decltype(Config::offline());
-template <class Config>
-using Odometry = decltype(Config::odometry());
 
 }  // namespace detail
 
@@ -218,13 +198,11 @@ struct RemoverConfig {
 /// All parameters: `BasicDynaInsRemover<Stages>::Config`.
 template <class Stages>
 struct PipelineConfig : RemoverConfig {
-  using Evidence = typename detail::EvidenceOf<Stages>::type;
-
   detail::ConfigOf<typename Stages::Ground> ground;
   detail::ConfigOf<typename Stages::Clusterer> clusterer;
   detail::ConfigOf<typename Stages::Descriptor> descriptor;
   detail::ConfigOf<typename Stages::Belief> belief;
-  detail::ConfigOf<Evidence> evidence;
+  FreeSpaceConfig evidence;
   detail::ConfigOf<typename Stages::Map> map;
 
   /// Method and parameters of the paper. Voxels, cells and ground, for which the paper gives no
@@ -255,10 +233,7 @@ struct PipelineConfig : RemoverConfig {
   /// memory.
   static PipelineConfig offline() {
     PipelineConfig config;
-    using EvidenceConfig = decltype(config.evidence);
-    if constexpr (detail::Offers<detail::Offline, EvidenceConfig>::value) {
-      config.evidence = EvidenceConfig::offline();
-    }
+    config.evidence = FreeSpaceConfig::offline();
     return config;
   }
 
@@ -267,10 +242,7 @@ struct PipelineConfig : RemoverConfig {
   static PipelineConfig odometry() {
     PipelineConfig config;
     config.build_map = false;
-    using EvidenceConfig = decltype(config.evidence);
-    if constexpr (detail::Offers<detail::Odometry, EvidenceConfig>::value) {
-      config.evidence = EvidenceConfig::odometry();
-    }
+    config.evidence = FreeSpaceConfig::odometry();
     return config;
   }
 

@@ -366,67 +366,25 @@ TEST_CASE("a scan on which a stage throws is dropped, and a new window begins") 
   CHECK(finished == expected);
 }
 
-// Throws once, at a chosen call.
-class FaintingEvidence : public FreeSpaceEvidence {
+// Throws at the first sensor that it gets.
+class FaintingClusterer : public CurvedVoxelClusterer {
  public:
-  struct Config : FreeSpaceConfig {
-    int failing_verdict = -1;  // number of the final verdict that fails
-    bool fails_to_adapt = false;
-  };
-  explicit FaintingEvidence(const Config& config)
-      : FreeSpaceEvidence(config),
-        verdicts_left_(config.failing_verdict),
-        fails_to_adapt_(config.fails_to_adapt) {}
+  using CurvedVoxelClusterer::CurvedVoxelClusterer;
 
   void adapt(const SensorModel& sensor) {
     if (std::exchange(fails_to_adapt_, false)) throw std::bad_alloc();
-    FreeSpaceEvidence::adapt(sensor);
-  }
-  void judge(std::uint64_t scan, bool is_final) {
-    if (is_final && verdicts_left_-- == 0) throw std::bad_alloc();
-    FreeSpaceEvidence::judge(scan, is_final);
+    CurvedVoxelClusterer::adapt(sensor);
   }
 
  private:
-  int verdicts_left_;
-  bool fails_to_adapt_;
+  bool fails_to_adapt_ = true;
 };
-
-struct FaintingStages : DefaultStages {
-  using Evidence = FaintingEvidence;
+struct FaintingClustererStages : DefaultStages {
+  using Clusterer = FaintingClusterer;
 };
-
-TEST_CASE("only the final verdict that throws is lost") {
-  using Remover = BasicDynaInsRemover<FaintingStages>;
-  Remover::Config config;
-  config.evidence.failing_verdict = 2;
-  config.threads = GENERATE(1, 2);
-  Remover remover(config);
-  const std::vector<Scan> scans = drive(oncoming(), 40, 0.0);
-  std::vector<std::uint64_t> finished;
-  std::vector<std::uint64_t> expected;
-  for (std::size_t s = 0; s < scans.size(); ++s) {
-    if (s != 2) expected.push_back(s);
-    const auto push = [&] {
-      return remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
-    };
-    if (s == remover.latency() + 2) {
-      CHECK_THROWS_AS(push(), std::bad_alloc);
-      continue;
-    }
-    const FrameResult frame = push();
-    REQUIRE(frame.newest.scan == s);
-    if (frame.finished) finished.push_back(frame.finished->scan);
-  }
-  remover.flush([&](const ScanVerdict& verdict) { finished.push_back(verdict.scan); });
-  CHECK(finished == expected);
-}
 
 TEST_CASE("a remover that failed to adapt to its sensor adapts at the next scan") {
-  using Remover = BasicDynaInsRemover<FaintingStages>;
-  Remover::Config config;
-  config.evidence.fails_to_adapt = true;
-  Remover remover(config);
+  BasicDynaInsRemover<FaintingClustererStages> remover;
   const std::vector<Scan> scans = good_scans();
   const Scan& first = scans.front();
   CHECK_THROWS_AS(remover.push(first.points, first.T_world_sensor, first.time), std::bad_alloc);

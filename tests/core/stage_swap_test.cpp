@@ -129,19 +129,9 @@ class ToldClusterer : public CurvedVoxelClusterer {
   void adapt(const SensorModel& sensor) { gap = sensor.elevation_gap; }
   static inline double gap = 0.0;
 };
-class ToldEvidence : public FreeSpaceEvidence {
- public:
-  using FreeSpaceEvidence::FreeSpaceEvidence;
-  void adapt(const SensorModel& sensor) {
-    step = sensor.azimuth_step;
-    FreeSpaceEvidence::adapt(sensor);
-  }
-  static inline double step = 0.0;
-};
 struct ToldStages : DefaultStages {
   using Ground = ToldGround;
   using Clusterer = ToldClusterer;
-  using Evidence = ToldEvidence;
 };
 
 TEST_CASE("stages get the sensor model from the first scan that shows it") {
@@ -152,7 +142,6 @@ TEST_CASE("stages get the sensor model from the first scan that shows it") {
   run(remover, {yard().scan(T_world_sensor, 0.0)});
   CHECK(ToldGround::height == Approx(2.6).margin(0.03));
   CHECK(ToldClusterer::gap == Approx(36.8 / 79.0).margin(0.02));
-  CHECK(ToldEvidence::step == Approx(0.25).margin(0.01));
 }
 
 struct OwnGround : DefaultStages {

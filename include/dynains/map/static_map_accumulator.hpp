@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +11,6 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include "dynains/parameters.hpp"
@@ -238,11 +236,7 @@ class StaticMapAccumulator {
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t first = 0; first < blocks_.size(); first += kGroup) {
-      const std::uint32_t last = std::min(blocks_.size(), first + kGroup);
-      prefetch_points(first, last);
-      for (std::uint32_t block = first; block < last; ++block) visit_block(block, visit);
-    }
+    for (std::uint32_t block = 0; block < blocks_.size(); ++block) visit_block(block, visit);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame) inside `box` (m, world frame,
@@ -276,8 +270,6 @@ class StaticMapAccumulator {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   static constexpr int kBlockVoxels[3] = {8, 4, 2};
   static constexpr int kLongestBlock = 8;  // voxels
-  static constexpr int kVoxelsOfBlock = 64;
-  static constexpr std::uint32_t kGroup = 32;  // blocks whose points are prefetched together
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
@@ -401,23 +393,6 @@ class StaticMapAccumulator {
       block.first =
           points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
       block.occupied |= bit;
-    }
-  }
-
-  // Prefetches the points of the blocks from `first` to `last`, exclusive. Each point of a block
-  // gives the place of the next one, so the points of many blocks are looked up side by side.
-  void prefetch_points(std::uint32_t first, std::uint32_t last) const {
-    std::array<std::uint32_t, kGroup> points;
-    std::size_t count = 0;
-    const auto add = [&](std::uint32_t point) {
-      if (point == kNone) return;
-      __builtin_prefetch(&points_[point]);
-      points[count++] = point;
-    };
-    for (std::uint32_t block = first; block < last; ++block) add(blocks_[block].data.first);
-    for (int depth = 1; depth < kVoxelsOfBlock && count > 0; ++depth) {
-      const std::size_t before = std::exchange(count, 0);
-      for (std::size_t i = 0; i < before; ++i) add(points_[points[i]].next);
     }
   }
 

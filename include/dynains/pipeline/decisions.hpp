@@ -15,6 +15,7 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/evidence/free_space_evidence.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/stage_checks.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
@@ -154,7 +155,6 @@ class ScanWindow {
 /// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
 /// observe() and judge() for each scan, and judge() again for the same scan after latency() later
 /// scans, followed by write_final().
-template <class Map>
 class ScanDecision {
  public:
   virtual ~ScanDecision() = default;
@@ -187,7 +187,7 @@ class ScanDecision {
   virtual std::optional<EpochReason> misfit() const { return std::nullopt; }
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
-  virtual std::optional<SurfaceCounts> surfaces() const { return std::nullopt; }
+  virtual SurfaceCounts surfaces() const { return {}; }
 
   /// Restores the state after construction. Buffers keep their capacity.
   virtual void clear() = 0;
@@ -197,7 +197,7 @@ class ScanDecision {
 /// accumulates the votes of all windows that contain a scan. The points that two windows have in
 /// common propagate the instance ids.
 template <class Stages>
-class WindowDecision final : public ScanDecision<typename Stages::Map> {
+class WindowDecision final : public ScanDecision {
  public:
   explicit WindowDecision(const PipelineConfig<Stages>& config)
       : length_(static_cast<std::size_t>(config.window)),
@@ -359,30 +359,23 @@ class WindowDecision final : public ScanDecision<typename Stages::Map> {
 };
 
 /// Decision by free space. Each scan is clustered alone. Instance ids follow the associations of
-/// instances between scans (Evidence::predecessors()).
-template <class Stages>
-class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
+/// instances between scans (FreeSpaceEvidence::predecessors()).
+class FreeSpaceDecision final : public ScanDecision {
  public:
-  using Map = typename Stages::Map;
-  using Evidence = typename PipelineConfig<Stages>::Evidence;
-
-  FreeSpaceDecision(const PipelineConfig<Stages>& config, Background* other)
-      : evidence_(config.evidence) {
-    if constexpr (Offers<ShareWork, Evidence>::value) evidence_.share_work(other);
+  FreeSpaceDecision(const FreeSpaceConfig& config, Background* other) : evidence_(config) {
+    evidence_.share_work(other);
   }
 
   std::size_t window_length() const override { return 1; }
   std::size_t latency() const override { return evidence_.lookahead_scans(); }
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
-  void reserve(std::size_t scans) override {
-    if constexpr (Offers<Reserve, Evidence>::value) evidence_.reserve(scans);
-  }
+  void reserve(std::size_t scans) override { evidence_.reserve(scans); }
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
-    if constexpr (Offers<SetTime, Evidence>::value) evidence_.set_time(newest.time);
+    evidence_.set_time(newest.time);
     evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
     propagate_ids(scans);
@@ -401,18 +394,9 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     writer.flag_groups(scan, verdict);
   }
 
-  std::optional<PoseResidual> pose_residual() const override {
-    if constexpr (Offers<HasPoseResidual, Evidence>::value) return evidence_.pose_residual();
-    return std::nullopt;
-  }
-  std::optional<EpochReason> misfit() const override {
-    if constexpr (Offers<HasMisfit, Evidence>::value) return evidence_.misfit();
-    return std::nullopt;
-  }
-  std::optional<SurfaceCounts> surfaces() const override {
-    if constexpr (Offers<HasSurfaces, Evidence>::value) return evidence_.surfaces();
-    return std::nullopt;
-  }
+  std::optional<PoseResidual> pose_residual() const override { return evidence_.pose_residual(); }
+  std::optional<EpochReason> misfit() const override { return evidence_.misfit(); }
+  SurfaceCounts surfaces() const override { return evidence_.surfaces(); }
 
  private:
   void propagate_ids(ScanRing& scans) {
@@ -425,17 +409,17 @@ class FreeSpaceDecision final : public ScanDecision<typename Stages::Map> {
     instance_ids_.propagate(evidence_.predecessors(), old_ids, newest.ids);
   }
 
-  Evidence evidence_;
+  FreeSpaceEvidence evidence_;
   InstanceIds instance_ids_;
 };
 
 /// Creates the implementation of `config.decision`. `other`: its second thread, which outlives it;
 /// null for none.
 template <class Stages>
-std::unique_ptr<ScanDecision<typename Stages::Map>> make_decision(
-    const PipelineConfig<Stages>& config, Background* other) {
+std::unique_ptr<ScanDecision> make_decision(const PipelineConfig<Stages>& config,
+                                            Background* other) {
   if (config.decision == Decision::kWindow) return std::make_unique<WindowDecision<Stages>>(config);
-  return std::make_unique<FreeSpaceDecision<Stages>>(config, other);
+  return std::make_unique<FreeSpaceDecision>(config.evidence, other);
 }
 
 }  // namespace dynains::detail

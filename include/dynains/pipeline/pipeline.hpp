@@ -15,7 +15,6 @@
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/evidence/free_space_evidence.hpp"
 #include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
@@ -93,23 +92,19 @@ class Pipeline final : private NewestVerdictMaker {
   using Clusterer = typename Stages::Clusterer;
   using Descriptor = typename Stages::Descriptor;
   using Belief = typename Stages::Belief;
-  using Evidence = typename Config::Evidence;
   using Map = typename Stages::Map;
 
-  static_assert(IsConfigurable<Ground>::value && IsGround<Ground>::value,
+  static_assert(kIsStage<Ground, IsGround>,
                 "Stages::Ground needs Config and segment(PointsView, numbers, GroundSplit&)");
-  static_assert(IsConfigurable<Clusterer>::value && IsClusterer<Clusterer>::value,
+  static_assert(kIsStage<Clusterer, IsClusterer>,
                 "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
-  static_assert(IsConfigurable<Descriptor>::value && IsDescriptor<Descriptor>::value,
+  static_assert(kIsStage<Descriptor, IsDescriptor>,
                 "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), "
                 "heights(k), cluster_heights(k) and proposes_dynamic()");
-  static_assert(IsConfigurable<Belief>::value && IsBelief<Belief>::value,
+  static_assert(kIsStage<Belief, IsBelief>,
                 "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
                 "is_dynamic()");
-  static_assert(IsConfigurable<Evidence>::value && IsEvidence<Evidence>::value,
-                "Stages::Evidence needs Config, adapt(SensorModel), observe(...), judge(...), "
-                "verdict(...), make_reference(GroundSplit), predecessors() and lookahead_scans()");
-  static_assert(IsConfigurable<Map>::value && IsMap<Map>::value,
+  static_assert(kIsStage<Map, IsMap>,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
   explicit Pipeline(const Config& config)
@@ -194,7 +189,7 @@ class Pipeline final : private NewestVerdictMaker {
   Ground ground_;
   ScanWindow window_;
   Clusterer clusterer_;
-  std::unique_ptr<ScanDecision<Map>> decision_;
+  std::unique_ptr<ScanDecision> decision_;
   bool finishes_later_;  // the next push finishes a scan, beside its first stages
   VerdictWriter newest_writer_;
   VerdictWriter final_writer_;
@@ -393,7 +388,7 @@ Plausibility Pipeline<Stages>::plausibility(const ScanSlot& newest, const FrameR
   scan.scan = newest.scan;
   scan.points = newest.unjudged.size();
   scan.judged = newest.split.count;
-  scan.surfaces = decision_->surfaces().value_or(SurfaceCounts());
+  scan.surfaces = decision_->surfaces();
   if (result.pose_residual) scan.residual = result.pose_residual->translation;
   scan.is_misfit =
       result.began_epoch == EpochReason::kJump || result.began_epoch == EpochReason::kMisfit;
