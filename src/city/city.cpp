@@ -51,12 +51,14 @@ bool is_within(const SessionGrid& grid, const SessionPoint& point) {
 
 }  // namespace
 
-FolderLock lock_city(const fs::path& folder) {
+Folder lock_city(const fs::path& path) {
   using namespace std::chrono_literals;
   const auto end = std::chrono::steady_clock::now() + 10min;
   while (true) {
     try {
-      return FolderLock(folder);
+      Folder folder(path);
+      folder.lock();
+      return folder;
     } catch (const UsageError&) {
       if (std::chrono::steady_clock::now() > end) throw;
     }
@@ -158,7 +160,7 @@ void City::read_reference(const SessionInfo& session, const SessionReference& wh
 }
 
 void City::drop(const std::string& name) {
-  const FolderLock lock = lock_city(folder_);
+  const Folder lock = lock_city(folder_);
   const std::vector<std::string> all = names();
   if (!std::binary_search(all.begin(), all.end(), name)) {
     fail(folder_, "has no session \"" + name + '"');

@@ -17,9 +17,9 @@
 #include <string>
 
 #include "dynains/city/session.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "io/folder.hpp"
 
 namespace dynains {
 
@@ -43,9 +43,9 @@ using PoseRows = std::array<double, 12>;
 PoseRows rows_of(const Pose& T);
 Pose pose_of(const PoseRows& rows);
 
-/// Exclusive lock of a city. Waits up to ten minutes, since others hold it while they write a
-/// session. Throws UsageError, IoError.
-FolderLock lock_city(const std::filesystem::path& folder);
+/// The folder of a city with an exclusive lock. Waits up to ten minutes, since others hold it while
+/// they write a session. Throws UsageError, IoError.
+Folder lock_city(const std::filesystem::path& folder);
 
 /// Throw IoError with path and byte.
 SessionInfo read_session(const std::filesystem::path& path);

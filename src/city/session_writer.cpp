@@ -84,7 +84,7 @@ void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
 }
 
 void SessionWriter::prepare() {
-  lock_ = std::make_unique<FolderLock>(lock_city(city_.folder()));
+  locked_ = std::make_shared<Folder>(lock_city(city_.folder()));
   check();
   remove_temporaries(city_);
   file_ = std::make_unique<AtomicFile>(city_.session_file(session_.name));

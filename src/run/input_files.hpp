@@ -5,7 +5,7 @@
 #include <map>
 
 #include "dynains/io/recording.hpp"
-#include "folder.hpp"
+#include "io/folder.hpp"
 
 namespace dynains::program {
 

@@ -267,10 +267,10 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
 }
 
 OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
-    : target_(allowed_target(target, inputs)),
-      lock_(std::in_place, target_.parent_path(), FolderLock::Mode::kShared) {
+    : target_(allowed_target(target, inputs)), locked_(target_.parent_path()) {
+  locked_->lock(Folder::Lock::kShared);
   const std::string name = target_.filename().string();
-  const auto entry = Folder(target_.parent_path()).find(name);
+  const auto entry = locked_->find(name);
   if (entry && entry->kind != Folder::Kind::kFile) {
     throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
   }

@@ -12,9 +12,8 @@
 #include <optional>
 #include <string>
 
-#include "dynains/io/folder_lock.hpp"
-#include "folder.hpp"
 #include "input_files.hpp"
+#include "io/folder.hpp"
 #include "json_file.hpp"
 #include "output_listing.hpp"
 
@@ -169,7 +168,7 @@ class OutputFile {
 
  private:
   std::filesystem::path target_;
-  std::optional<FolderLock> lock_;
+  std::optional<Folder> locked_;  // of the target
   Folder::Rename how_ = Folder::Rename::kReplace;
   std::optional<PartialFolder> partial_;
   const Folder* folder_ = nullptr;  // of the target

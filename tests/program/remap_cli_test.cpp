@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
 #include "io/files.hpp"
+#include "io/folder.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
@@ -300,6 +300,7 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
   check_unchanged(made, {"--map", made.out + "/static_map.ply"}, 2,
                   "in the folder of the run, the map is static_map_remapped.ply");
   check_unchanged(made, {"--map-voxel", "0.001"}, 2, "map_voxel = 0.001");
-  const FolderLock lock(made.out);
+  const Folder folder(made.out);
+  folder.lock();
   check_unchanged(made, {}, 2, "is in use");
 }

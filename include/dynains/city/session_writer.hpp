@@ -8,7 +8,6 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_points.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/folder_lock.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -16,6 +15,8 @@
 #include "dynains/recording/references.hpp"
 
 namespace dynains {
+
+class Folder;
 
 struct SessionConfig {
   double contribution_range = 60.0;  ///< m
@@ -71,7 +72,7 @@ class SessionWriter {
   SessionPoints points_;
   RecordingReferences references_;
   std::vector<std::uint8_t> bytes_;
-  std::unique_ptr<FolderLock> lock_;
+  std::shared_ptr<Folder> locked_;
   std::unique_ptr<AtomicFile> file_;
 };
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace dynains::program {
+namespace dynains {
 
 /// Device and inode: equal for two paths that lead to one file.
 using FileIdentity = std::pair<dev_t, ino_t>;
@@ -42,9 +42,12 @@ class Folder {
   std::vector<std::string> names() const;
   std::optional<Entry> find(const std::string& name) const;
 
-  /// Locks the folder until destruction, for all processes of this machine; on a file system
-  /// without locks of folders, always. Throws UsageError if another one has locked it.
-  void lock() const;
+  /// An exclusive lock excludes all others; shared ones exclude exclusive ones only.
+  enum class Lock { kExclusive, kShared };
+  /// Locks the folder until destruction, for all processes of this machine, without a file; on a
+  /// file system without locks of folders, such as some network file systems, always. Throws
+  /// UsageError for a conflicting lock.
+  void lock(Lock how = Lock::kExclusive) const;
   /// Throws unless entries can be made and removed, as far as permissions tell.
   void check_changeable() const;
   /// Throws unless entry `name` can be replaced, as far as its attributes tell.
@@ -74,4 +77,4 @@ class Folder {
   int descriptor_ = -1;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains

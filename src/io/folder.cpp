@@ -9,18 +9,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <memory>
-#include <system_error>
 
 #include "dynains/errors.hpp"
+#include "failure.hpp"
 
-namespace dynains::program {
-namespace {
-
-[[noreturn]] void fail_with(const std::filesystem::path& path, const std::string& what, int error) {
-  throw IoError(path.string() + ": " + what + ": " + std::generic_category().message(error));
-}
-
-}  // namespace
+namespace dynains {
 
 std::optional<FileIdentity> identity_of(const std::filesystem::path& path) {
   struct stat status {};
@@ -31,7 +24,7 @@ std::optional<FileIdentity> identity_of(const std::filesystem::path& path) {
 Folder::Folder(std::filesystem::path path)
     : path_(std::move(path)),
       descriptor_(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  if (descriptor_ < 0) fail_with(path_, "cannot be opened", errno);
+  if (descriptor_ < 0) fail_by_system(path_, "cannot be opened", errno);
 }
 
 Folder::Folder(const Folder& parent, const std::string& name)
@@ -42,7 +35,7 @@ Folder::Folder(const Folder& parent, const std::string& name)
   if (errno == ELOOP || errno == ENOTDIR) {
     throw IoError(path_.string() + ": is a link or a file; expected a folder or nothing there");
   }
-  fail_with(path_, "cannot be opened", errno);
+  fail_by_system(path_, "cannot be opened", errno);
 }
 
 Folder::~Folder() {
@@ -54,7 +47,7 @@ Folder::Folder(Folder&& other) noexcept
 
 FileIdentity Folder::identity() const {
   struct stat status {};
-  if (::fstat(descriptor_, &status) != 0) fail_with(path_, "cannot be examined", errno);
+  if (::fstat(descriptor_, &status) != 0) fail_by_system(path_, "cannot be examined", errno);
   return {status.st_dev, status.st_ino};
 }
 
@@ -63,7 +56,7 @@ std::vector<std::string> Folder::names() const {
   const int descriptor = ::openat(descriptor_, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(
       descriptor < 0 ? nullptr : ::fdopendir(descriptor), ::closedir);
-  if (!entries) fail_with(path_, "cannot be listed", errno);
+  if (!entries) fail_by_system(path_, "cannot be listed", errno);
   std::vector<std::string> names;
   while (true) {
     errno = 0;
@@ -72,7 +65,7 @@ std::vector<std::string> Folder::names() const {
     const std::string name = entry->d_name;
     if (name != "." && name != "..") names.push_back(name);
   }
-  if (errno != 0) fail_with(path_, "cannot be listed", errno);
+  if (errno != 0) fail_by_system(path_, "cannot be listed", errno);
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -81,7 +74,7 @@ std::optional<Folder::Entry> Folder::find(const std::string& name) const {
   struct stat status {};
   if (::fstatat(descriptor_, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) != 0) {
     if (errno == ENOENT) return std::nullopt;
-    fail_with(path_ / name, "cannot be examined", errno);
+    fail_by_system(path_ / name, "cannot be examined", errno);
   }
   const Kind kind = S_ISREG(status.st_mode)   ? Kind::kFile
                     : S_ISDIR(status.st_mode) ? Kind::kFolder
@@ -89,10 +82,10 @@ std::optional<Folder::Entry> Folder::find(const std::string& name) const {
   return Entry{kind, {status.st_dev, status.st_ino}};
 }
 
-void Folder::lock() const {
+void Folder::lock(Lock how) const {
   int result = 0;
   do {
-    result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
+    result = ::flock(descriptor_, (how == Lock::kShared ? LOCK_SH : LOCK_EX) | LOCK_NB);
   } while (result != 0 && errno == EINTR);
   if (result != 0 && errno == EWOULDBLOCK) {
     throw UsageError(path_.string() +
@@ -102,7 +95,7 @@ void Folder::lock() const {
 
 void Folder::check_changeable() const {
   if (::faccessat(descriptor_, ".", W_OK | X_OK, AT_EACCESS) == 0) return;
-  fail_with(path_, "cannot be changed", errno);
+  fail_by_system(path_, "cannot be changed", errno);
 }
 
 void Folder::check_replaceable(const std::string& name) const {
@@ -110,14 +103,14 @@ void Folder::check_replaceable(const std::string& name) const {
   struct stat folder {};
   if (::statx(descriptor_, name.c_str(), AT_SYMLINK_NOFOLLOW, STATX_BASIC_STATS, &status) != 0 ||
       ::fstat(descriptor_, &folder) != 0) {
-    fail_with(path_ / name, "cannot be examined", errno);
+    fail_by_system(path_ / name, "cannot be examined", errno);
   }
   const uid_t user = ::geteuid();
   const bool is_of_others = (folder.st_mode & S_ISVTX) != 0 && user != 0 && user != folder.st_uid &&
                             user != status.stx_uid;
   const bool is_protected =
       (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0;
-  if (is_of_others || is_protected) fail_with(path_ / name, "cannot be replaced", EPERM);
+  if (is_of_others || is_protected) fail_by_system(path_ / name, "cannot be replaced", EPERM);
   if ((status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0) {
     throw IoError((path_ / name).string() +
                   ": is mounted and cannot be replaced; choose a folder in it");
@@ -126,19 +119,19 @@ void Folder::check_replaceable(const std::string& name) const {
 
 void Folder::remove_file(const std::string& name) const {
   if (::unlinkat(descriptor_, name.c_str(), 0) != 0 && errno != ENOENT) {
-    fail_with(path_ / name, "cannot be removed", errno);
+    fail_by_system(path_ / name, "cannot be removed", errno);
   }
 }
 
 bool Folder::remove_folder(const std::string& name) const {
   if (::unlinkat(descriptor_, name.c_str(), AT_REMOVEDIR) == 0 || errno == ENOENT) return true;
   if (errno == ENOTEMPTY || errno == EEXIST) return false;
-  fail_with(path_ / name, "cannot be removed", errno);
+  fail_by_system(path_ / name, "cannot be removed", errno);
 }
 
 bool Folder::make_folder(const std::string& name) const {
   if (::mkdirat(descriptor_, name.c_str(), 0777) == 0) return true;
-  if (errno != EEXIST) fail_with(path_ / name, "cannot be created", errno);
+  if (errno != EEXIST) fail_by_system(path_ / name, "cannot be created", errno);
   return false;
 }
 
@@ -155,14 +148,14 @@ bool Folder::rename(const std::string& name, const Folder& target, const std::st
   const bool is_unknown = flags != 0 && (errno == EINVAL || errno == ENOSYS);
   if (is_unknown && how == Rename::kExchange) return false;
   if (is_unknown && !target.find(new_name) && try_with(0)) return true;
-  fail_with(target.path_ / new_name, "cannot be put in place", errno);
+  fail_by_system(target.path_ / new_name, "cannot be put in place", errno);
 }
 
 void Folder::sync() const {
   // Some file systems cannot sync folders.
   if (::fsync(descriptor_) != 0 && errno != EINVAL) {
-    fail_with(path_, "cannot be written to the disk", errno);
+    fail_by_system(path_, "cannot be written to the disk", errno);
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains
