@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <string>
 #include <system_error>
 
 #include "failure.hpp"
 #include "input_file.hpp"
+#include "text.hpp"
 
 namespace dynains {
 namespace {
@@ -70,6 +73,30 @@ void ByteReader::skip(std::uint64_t count, const char* purpose) {
     file_.ignore(static_cast<std::streamsize>(count));
   }
   position_ += count;
+}
+
+std::uint64_t ByteReader::whole_number(std::string_view token, const std::string& what) const {
+  std::uint64_t value = 0;
+  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), value);
+  if (token.empty() || error != std::errc{} || stop != token.data() + token.size()) {
+    fail_on_line("expected " + what);
+  }
+  return value;
+}
+
+double ByteReader::number(std::string_view token, const std::string& name) const {
+  if (const auto value = text::parse_number(token)) return *value;
+  fail_on_line(
+      "expected a number for " + name + ", found " +
+      (token.empty() ? "the end of the line" : "\"" + std::string(token.substr(0, 40)) + "\""));
+}
+
+void ByteReader::check_room(std::uint64_t count, const char* what, std::uint64_t each,
+                            bool is_text) const {
+  if (each == 0 || count <= (remaining() + (is_text ? 1 : 0)) / each) return;
+  fail_here("expected " + std::to_string(count) + ' ' + what + " of at least " +
+            std::to_string(each) + " bytes, the file has " + std::to_string(remaining()) +
+            " bytes left");
 }
 
 void ByteReader::fail_here(const std::string& what) const { fail_at_byte(path_, position_, what); }

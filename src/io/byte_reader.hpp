@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 namespace dynains {
 
@@ -32,6 +33,15 @@ class ByteReader {
   }
   std::string read_block(std::uint64_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
+
+  /// Numbers of the last line. They throw IoError with `what` was expected, or the name of the
+  /// value.
+  std::uint64_t whole_number(std::string_view token, const std::string& what) const;
+  double number(std::string_view token, const std::string& name) const;
+  /// Throws IoError unless the rest of the file can hold `count` of `what`, at least `each` bytes
+  /// large. The last line of a text (`is_text`) may lack its end.
+  void check_room(std::uint64_t count, const char* what, std::uint64_t each,
+                  bool is_text = false) const;
 
   [[noreturn]] void fail_here(const std::string& what) const;     ///< names the current byte
   [[noreturn]] void fail_on_line(const std::string& what) const;  ///< names the last line

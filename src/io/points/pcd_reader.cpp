@@ -1,5 +1,4 @@
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -47,16 +46,6 @@ struct PcdHeader {
 };
 
 constexpr std::size_t kMaxFieldCount = 1 << 16;
-
-std::uint64_t parse_unsigned(const ByteReader& reader, std::string_view token,
-                             const std::string& what) {
-  std::uint64_t value = 0;
-  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  if (token.empty() || error != std::errc{} || stop != token.data() + token.size()) {
-    reader.fail_on_line("expected " + what);
-  }
-  return value;
-}
 
 /// Calls `parse(field, token)` for each field; the line must have a token for each.
 template <class Parse>
@@ -139,7 +128,7 @@ void parse_type(const ByteReader& reader, Field& field, std::string_view token) 
 
 void parse_count(const ByteReader& reader, Field& field, std::string_view token) {
   const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
-  const std::uint64_t count = parse_unsigned(reader, token, what);
+  const std::uint64_t count = reader.whole_number(token, what);
   if (count > kMaxFieldCount) reader.fail_on_line("expected " + what);
   field.count = static_cast<std::size_t>(count);
 }
@@ -160,14 +149,14 @@ void parse_header_line(const ByteReader& reader, std::string_view keyword, std::
       parse_count(reader, field, token);
     });
   } else if (keyword == "WIDTH") {
-    header.width = parse_unsigned(reader, text::next_token(line), "WIDTH as a whole number");
+    header.width = reader.whole_number(text::next_token(line), "WIDTH as a whole number");
     header.has_width = true;
   } else if (keyword == "HEIGHT") {
-    header.height = parse_unsigned(reader, text::next_token(line), "HEIGHT as a whole number");
+    header.height = reader.whole_number(text::next_token(line), "HEIGHT as a whole number");
   } else if (keyword == "VIEWPOINT") {
     sink.file().viewpoint = parse_viewpoint(reader, line);
   } else if (keyword == "POINTS") {
-    header.points = parse_unsigned(reader, text::next_token(line), "POINTS as a whole number");
+    header.points = reader.whole_number(text::next_token(line), "POINTS as a whole number");
     header.has_points = true;
   } else {
     reader.fail_on_line("expected a line of a PCD header (FIELDS, SIZE, ... DATA), found \"" +
@@ -214,14 +203,6 @@ PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
   reader.fail_on_line("expected a line DATA before this line");
 }
 
-void check_backed(const ByteReader& reader, const PcdHeader& header, std::uint64_t available,
-                  std::uint64_t each) {
-  if (header.points <= available / each) return;
-  reader.fail_here("expected " + std::to_string(header.points) + " points of at least " +
-                   std::to_string(each) + " bytes, the file has " +
-                   std::to_string(reader.remaining()) + " bytes left");
-}
-
 [[noreturn]] void fail_value(const Field& field, std::size_t i, const ByteReader& reader) {
   reader.fail_here("expected a whole number that " + field.name + " can have, at point " +
                    std::to_string(i));
@@ -230,12 +211,11 @@ void check_backed(const ByteReader& reader, const PcdHeader& header, std::uint64
 void check_ascii(const ByteReader& reader, const PcdHeader& header) {
   std::uint64_t values = 0;
   for (const Field& field : header.fields) values += field.count;
-  // The last line may lack its end.
-  check_backed(reader, header, reader.remaining() + 1, 2 * values);
+  reader.check_room(header.points, "points", 2 * values, true);
 }
 
 void check_binary(const ByteReader& reader, const PcdHeader& header) {
-  check_backed(reader, header, reader.remaining(), header.record_bytes());
+  reader.check_room(header.points, "points", header.record_bytes());
 }
 
 struct BlockSizes {
@@ -281,14 +261,7 @@ void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
     std::string_view rest = line;
     for (const Field& field : header.fields) {
       for (std::size_t k = 0; k < field.count; ++k) {
-        const std::string_view token = text::next_token(rest);
-        const auto value = text::parse_number(token);
-        if (!value) {
-          reader.fail_on_line("expected a number for " + field.name + ", found " +
-                              (token.empty() ? "the end of the line"
-                                             : "\"" + std::string(token.substr(0, 40)) + "\""));
-        }
-        if (!sink.set(i, field.role, *value)) {
+        if (!sink.set(i, field.role, reader.number(text::next_token(rest), field.name))) {
           reader.fail_on_line("expected a whole number that " + field.name + " can have");
         }
       }

@@ -1,5 +1,4 @@
 #include <array>
-#include <charconv>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +13,8 @@
 
 namespace dynains {
 namespace {
+
+constexpr const char* kElementCount = "a number of elements";
 
 struct Property {
   Scalar type;
@@ -55,15 +56,6 @@ Scalar parse_type(const ByteReader& reader, std::string_view name) {
                       std::string(name.substr(0, 40)) + "\"");
 }
 
-std::uint64_t parse_count(const ByteReader& reader, std::string_view token) {
-  std::uint64_t count = 0;
-  const auto [stop, error] = std::from_chars(token.data(), token.data() + token.size(), count);
-  if (token.empty() || error != std::errc{} || stop != token.data() + token.size()) {
-    reader.fail_on_line("expected a number of elements");
-  }
-  return count;
-}
-
 PlyEncoding parse_format(const ByteReader& reader, std::string_view line) {
   const std::string_view name = text::next_token(line);
   if (text::next_token(line) != "1.0") reader.fail_on_line("expected format version 1.0");
@@ -99,7 +91,7 @@ void parse_element(const ByteReader& reader, std::string_view line, HeaderProgre
   progress.past_vertices = progress.has_vertices;
   Element element;
   element.is_vertex = text::next_token(line) == "vertex";
-  element.count = parse_count(reader, text::next_token(line));
+  element.count = reader.whole_number(text::next_token(line), kElementCount);
   progress.has_vertices = progress.has_vertices || element.is_vertex;
   if (!progress.past_vertices) progress.header.elements.push_back(std::move(element));
 }
@@ -172,17 +164,6 @@ void read_binary_element(ByteReader& reader, const Element& element, bool swap, 
   }
 }
 
-double next_number(const ByteReader& reader, std::string_view& line, const Property& property) {
-  const std::string_view token = text::next_token(line);
-  const auto value = text::parse_number(token);
-  if (!value) {
-    reader.fail_on_line(
-        "expected a number for " + property.name + ", found " +
-        (token.empty() ? "the end of the line" : "\"" + std::string(token.substr(0, 40)) + "\""));
-  }
-  return *value;
-}
-
 template <class Store>
 void read_ascii_element(ByteReader& reader, const Element& element, std::string& line,
                         Store&& store) {
@@ -190,12 +171,12 @@ void read_ascii_element(ByteReader& reader, const Element& element, std::string&
   std::string_view rest = line;
   for (const Property& property : element.properties) {
     if (!property.is_list) {
-      store(property, next_number(reader, rest, property));
+      store(property, reader.number(text::next_token(rest), property.name));
       continue;
     }
-    const double length = next_number(reader, rest, property);
+    const double length = reader.number(text::next_token(rest), property.name);
     if (!(length >= 0.0)) reader.fail_on_line("expected the length of list " + property.name);
-    for (double i = 0; i < length; ++i) next_number(reader, rest, property);
+    for (double i = 0; i < length; ++i) reader.number(text::next_token(rest), property.name);
   }
   if (!text::next_token(rest).empty()) reader.fail_on_line("expected fewer values on this line");
 }
@@ -211,14 +192,8 @@ std::uint64_t min_bytes(const Element& element, PlyEncoding encoding) {
 }
 
 void check_count(const ByteReader& reader, const Element& element, PlyEncoding encoding) {
-  const std::uint64_t each = min_bytes(element, encoding);
-  // The last line of a text may lack its end.
-  const std::uint64_t available = reader.remaining() + (encoding == PlyEncoding::kAscii ? 1 : 0);
-  if (each != 0 && element.count > available / each) {
-    reader.fail_here("expected " + std::to_string(element.count) + " elements of at least " +
-                     std::to_string(each) + " bytes, the file has " +
-                     std::to_string(reader.remaining()) + " bytes left");
-  }
+  reader.check_room(element.count, "elements", min_bytes(element, encoding),
+                    encoding == PlyEncoding::kAscii);
 }
 
 /// Reads all elements; the sink gets the vertices.
@@ -252,7 +227,7 @@ void copy_ply_header(const std::filesystem::path& path, std::uint64_t size, std:
     std::string_view rest = line;
     if (text::next_token(rest) != "element") return line;
     if (text::next_token(rest) == "vertex") return "element vertex " + std::to_string(count);
-    if (parse_count(reader, text::next_token(rest)) == 0) return line;
+    if (reader.whole_number(text::next_token(rest), kElementCount) == 0) return line;
     fail(path, "expected points alone, found \"" + line.substr(0, 60) + "\"");
   });
 }
