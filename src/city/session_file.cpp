@@ -140,19 +140,17 @@ void SessionFileWriter::write(Span<const char> bytes) {
 SessionBlock SessionFileWriter::add(Span<const char> bytes) {
   const SessionBlock block = {position_, bytes.size()};
   write(bytes);
-  std::string end;
-  append_number(checksum(bytes.data(), bytes.size()), end);
-  write(end);
+  write(ByteWriter().number(checksum(bytes.data(), bytes.size())).bytes());
   return block;
 }
 
 void SessionFileWriter::finish(const SessionInfo& session) {
   const std::string text = json_of(session).dump(1, ' ', false, Json::error_handler_t::replace);
-  std::string end;
-  append_number(std::uint64_t{text.size()}, end);
-  append_number(checksum(text.data(), text.size()), end);
   write(text);
-  write(end);
+  write(ByteWriter()
+            .number(std::uint64_t{text.size()})
+            .number(checksum(text.data(), text.size()))
+            .bytes());
 }
 
 SessionInfo read_session(const fs::path& path) {

@@ -101,4 +101,31 @@ bool store_number(double value, Number& target) {
   return true;
 }
 
+/// Numbers and texts in a row, little endian.
+class ByteWriter {
+ public:
+  template <class Number>
+  ByteWriter& number(Number value) {
+    append_number(value, bytes_);
+    return *this;
+  }
+  ByteWriter& raw(const std::string& bytes) {
+    bytes_ += bytes;
+    return *this;
+  }
+  ByteWriter& zeros(std::size_t count) { return raw(std::string(count, '\0')); }
+  /// A text behind its length, uint32.
+  ByteWriter& string(const std::string& text) {
+    return number(static_cast<std::uint32_t>(text.size())).raw(text);
+  }
+  /// A text of at most `size` bytes, filled up with zeros.
+  ByteWriter& text(const std::string& text, std::size_t size) {
+    return raw(text.substr(0, size)).zeros(size - std::min(size, text.size()));
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
 }  // namespace dynains

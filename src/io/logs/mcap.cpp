@@ -24,20 +24,16 @@ std::string attachment_index(Bytes fields) {
   const std::string name = fields.string("the name of an attachment");
   const std::string type = fields.string("the type of an attachment");
   const auto size = fields.number<std::uint64_t>("the size of an attachment");
-  std::string index(times, times + 16);
-  append_number(size, index);
-  for (const std::string& text : {name, type}) {
-    append_number(static_cast<std::uint32_t>(text.size()), index);
-    index += text;
-  }
-  return index;
+  return ByteWriter()
+      .raw(std::string(times, times + 16))
+      .number(size)
+      .string(name)
+      .string(type)
+      .bytes();
 }
 
 std::string metadata_index(Bytes fields) {
-  const std::string name = fields.string("the name of metadata");
-  std::string index;
-  append_number(static_cast<std::uint32_t>(name.size()), index);
-  return index + name;
+  return ByteWriter().string(fields.string("the name of metadata")).bytes();
 }
 
 }  // namespace

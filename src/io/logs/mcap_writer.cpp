@@ -13,27 +13,7 @@ namespace {
 
 constexpr std::size_t kChunkSize = std::size_t{1} << 22;  // bytes, about
 
-/// Content of a record.
-class Fields {
- public:
-  template <class Number>
-  Fields& number(Number value) {
-    append_number(value, bytes_);
-    return *this;
-  }
-  Fields& string(const std::string& text) {
-    number(static_cast<std::uint32_t>(text.size()));
-    return raw(text);
-  }
-  Fields& raw(const std::string& bytes) {
-    bytes_ += bytes;
-    return *this;
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  std::string bytes_;
-};
+using Fields = ByteWriter;  // content of a record
 
 std::string record(mcap::Opcode opcode, const Fields& content) {
   return Fields().number(opcode).number(std::uint64_t{content.bytes().size()}).bytes() +

@@ -11,32 +11,10 @@
 namespace dynains {
 namespace {
 
-class LasFields {
- public:
-  template <class Number>
-  LasFields& number(Number value) {
-    append_number(value, bytes_);
-    return *this;
-  }
-  LasFields& zeros(std::size_t count) {
-    bytes_.append(count, '\0');
-    return *this;
-  }
-  /// The text, filled up with zeros.
-  LasFields& text(const std::string& text, std::size_t size) {
-    bytes_ += text.substr(0, size);
-    return zeros(size - std::min(size, text.size()));
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  std::string bytes_;
-};
-
 std::string extra_description(const char* name, Scalar type, const char* description) {
   const auto* const types = std::begin(las::kExtraTypes);
   const auto* const number = std::find(types + 1, std::end(las::kExtraTypes), type);
-  return LasFields()
+  return ByteWriter()
       .zeros(2)
       .number(static_cast<std::uint8_t>(number - types))
       .number(std::uint8_t{0})
@@ -48,7 +26,7 @@ std::string extra_description(const char* name, Scalar type, const char* descrip
 
 std::string vlr(const std::string& user, std::uint16_t record, const std::string& description,
                 const std::string& content) {
-  return LasFields()
+  return ByteWriter()
              .zeros(2)
              .text(user, 16)
              .number(record)
@@ -88,7 +66,7 @@ std::string LasWriter::header() const {
   if (!options_.wkt.empty()) {
     records += vlr("LASF_Projection", kWktRecord, "OGC WKT", options_.wkt + '\0');
   }
-  LasFields out;
+  ByteWriter out;
   out.text(las::kMagic, las::kMagic.size()).zeros(2).number(kWktIsUsed).zeros(16);
   out.number(std::uint8_t{1}).number(std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
@@ -126,7 +104,7 @@ void LasWriter::add(const LasPoint& point) {
     least_[axis] = std::min(least_[axis], steps[axis]);
     most_[axis] = std::max(most_[axis], steps[axis]);
   }
-  LasFields record;
+  ByteWriter record;
   for (const std::int32_t step : steps) record.number(step);
   record.number(point.intensity).number(kOnlyReturn).number(std::uint8_t{0});
   record.number(point.classification).number(std::uint8_t{0});
