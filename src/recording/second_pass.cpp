@@ -62,13 +62,4 @@ bool SecondPass::revise(PointsView points, std::uint32_t number, VerdictArrays& 
   return points_of_scan.removed + points_of_scan.restored > 0;
 }
 
-std::vector<SecondPass::Object> SecondPass::objects() const {
-  std::vector<Object> objects;
-  for (const std::unique_ptr<Visit>& visit : visits_) {
-    if (visit == nullptr) continue;
-    objects.insert(objects.end(), visit->objects().begin(), visit->objects().end());
-  }
-  return objects;
-}
-
 }  // namespace dynains

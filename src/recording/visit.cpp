@@ -34,10 +34,13 @@ void Visit::find_up(PointsView points, const Pose& T_world_sensor) {
 
 void Visit::add(PointsView points, const ScanVerdict& verdict, const Pose& T_world_sensor) {
   const std::uint32_t number = scans();
-  if (number == 0) find_up(points, T_world_sensor);
+  if (number == 0) {
+    first_ = static_cast<std::uint32_t>(verdict.scan);
+    find_up(points, T_world_sensor);
+  }
   const Pose T = orthonormalized(T_level_world_ * T_world_sensor);
   T_level_sensor_.push_back(T);
-  numbers_of_scans_.push_back(static_cast<std::uint32_t>(verdict.scan));
+  last_ = static_cast<std::uint32_t>(verdict.scan);
   places_.add(points, verdict.labels, verdict.causes, T, verdict.time, number);
   ground_.add(points, verdict.labels, T);
   const RecordingReference* const reference = references_.add(points, verdict.labels, T, number);
@@ -78,7 +81,6 @@ bool Visit::test(const std::function<bool()>& keep_going) {
         });
   }
   places_.decide();
-  list_objects();
   return true;
 }
 
@@ -89,21 +91,6 @@ void Visit::read(const Reference& kept, RecordingReference& reference) {
   if (!unpack_image(references_.grid(), packed_, reference.image)) {
     throw IoError("a reference of the second pass was damaged in its store");
   }
-}
-
-void Visit::list_objects() {
-  const Pose T_world_level = T_level_world_.inverse();
-  objects_.assign(places_.object_count(), {});
-  places_.for_each_changed([&](const Eigen::Vector3d& corner, const ChangedPlace& place) {
-    Object& object = objects_[place.object - 1];
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5 * kWorldCell);
-    const Eigen::Vector3d at = T_world_level * Eigen::Vector3d(corner + half);
-    object.lowest = object.lowest.cwiseMin(at - half);
-    object.highest = object.highest.cwiseMax(at + half);
-    if (!place.was_passed) return;
-    object.first_passed = std::min(object.first_passed, numbers_of_scans_[place.passed.first]);
-    object.last_passed = std::max(object.last_passed, numbers_of_scans_[place.passed.last]);
-  });
 }
 
 RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
@@ -129,9 +116,6 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
     } else if (place != nullptr && !stands && belongs_to(*place, label, point)) {
       remove(i, verdict);
       ++revised.removed;
-      Object& object = objects_[place->object - 1];
-      if (object.points++ == 0) object.first_measured = numbers_of_scans_[number];
-      object.last_measured = numbers_of_scans_[number];
     }
   }
   if (revised.removed > 0) revised.removed += remove_instances(verdict);

@@ -101,27 +101,6 @@ RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunT
   return outcome;
 }
 
-/// Objects that came or went, with the scans that measured them and those that passed them.
-nlohmann::ordered_json to_json(const SecondPass& pass, const RunPlan& plan) {
-  const auto name = [&](std::uint32_t scan) { return plan.sequence.name(plan.range.first + scan); };
-  const auto metres = [](const Eigen::Vector3d& v) {
-    return std::vector<double>{v.x(), v.y(), v.z()};
-  };
-  auto objects = nlohmann::ordered_json::array();
-  for (const SecondPass::Object& object : pass.objects()) {
-    if (object.points == 0) continue;
-    objects.push_back({{"lowest", metres(object.lowest)},
-                       {"highest", metres(object.highest)},
-                       {"points", object.points},
-                       {"measured", {name(object.first_measured), name(object.last_measured)}},
-                       {"passed", {name(object.first_passed), name(object.last_passed)}}});
-  }
-  return {{"places", pass.place_count()},
-          {"removed_points", pass.revised().removed},
-          {"restored_points", pass.revised().restored},
-          {"objects", std::move(objects)}};
-}
-
 /// Outputs outside of the folder of results.
 struct OutsideOutputs {
   /// Files of the results that `out` replaces are replaced, too.
@@ -254,7 +233,11 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   nlohmann::ordered_json told = to_json(doubts, plan.sequence);
   told["warnings"] = warnings;
   nlohmann::ordered_json report = make_report(plan, agreement, outcome.wall, told, results, timing);
-  if (second_pass) report["second_pass"] = to_json(*second_pass, plan);
+  if (second_pass) {
+    report["second_pass"] = {{"places", second_pass->place_count()},
+                             {"removed_points", second_pass->revised().removed},
+                             {"restored_points", second_pass->revised().restored}};
+  }
   publish(plan, outputs, report, out, outside, session ? &*session : nullptr, outcome);
   return outcome;
 }

