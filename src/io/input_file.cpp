@@ -50,4 +50,18 @@ void fail_to_read(const std::ifstream& file, const fs::path& path, std::uint64_t
   fail(path, what + ": the file ends there");
 }
 
+std::string read_text_file(const std::filesystem::path& path) {
+  std::ifstream file = open_input(path);
+  const std::uintmax_t size = std::filesystem::file_size(path);
+  if (size > kMaxTextBytes) {
+    fail(path,
+         "has " + std::to_string(size) + " bytes, more than " + std::to_string(kMaxTextBytes));
+  }
+  std::string text(static_cast<std::size_t>(size), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(size));
+  const auto count = static_cast<std::uint64_t>(file.gcount());
+  if (count < size) fail_to_read(file, path, count, size);
+  return text;
+}
+
 }  // namespace dynains

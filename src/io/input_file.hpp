@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <string>
 
 namespace dynains {
 
@@ -16,6 +17,11 @@ bool is_file(const std::filesystem::path& path);
 /// Opens a regular file to read. Throws IoError, also for folders, and for devices and pipes, whose
 /// reading may never end.
 std::ifstream open_input(const std::filesystem::path& path);
+
+/// Bytes that a text file may have.
+inline constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20U;
+/// The bytes of a regular file. Throws IoError, also for a larger file.
+std::string read_text_file(const std::filesystem::path& path);
 
 /// For a read that gave fewer bytes than the file has. Call it before anything else sets errno.
 /// Throws IoError.

@@ -2,7 +2,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
-#include "run/naming_scan.hpp"
+#include "run/recorded_scans.hpp"
 
 namespace dynains::program {
 

@@ -9,8 +9,8 @@
 #include "dynains/odometry/odometry.hpp"
 #include "interrupt.hpp"
 #include "io/text.hpp"
-#include "points_of.hpp"
 #include "read_ahead.hpp"
+#include "recorded_scans.hpp"
 #include "run_plan.hpp"
 
 namespace dynains::program {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "read_text_file.hpp"
+#include "io/input_file.hpp"
 
 namespace dynains::program {
 namespace {

@@ -9,12 +9,12 @@
 #include <string_view>
 #include <utility>
 
-#include "moving_points.hpp"
+#include "point_labels.hpp"
 
 namespace dynains::program {
 namespace {
 
-constexpr int kTextHeight = 14;  // pixels
+constexpr int kTextHeight = 14;                                                     // pixels
 constexpr int kColumns = 5, kRows = 7, kAdvance = 6, kScale = kTextHeight / kRows;  // of letters
 
 /// Rows of a letter from the top, five bits each, the left column in the highest bit.

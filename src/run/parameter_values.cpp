@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "dynains/parameters.hpp"
-#include "read_text_file.hpp"
+#include "io/input_file.hpp"
 
 namespace dynains::program {
 namespace {

@@ -9,8 +9,8 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/evidence/free_space_config.hpp"
-#include "points_of.hpp"
 #include "poses/given_motion.hpp"
+#include "recorded_scans.hpp"
 #include "scratch_file.hpp"
 
 namespace dynains::program {

@@ -13,7 +13,7 @@
 #include "dynains/sensor/own_body.hpp"
 #include "io/fingerprint.hpp"
 #include "io/points/finite_points.hpp"
-#include "naming_scan.hpp"
+#include "recorded_scans.hpp"
 
 namespace dynains::program {
 namespace {

@@ -6,10 +6,10 @@
 #include "dynains/io/coordinate_system.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/second_pass.hpp"
-#include "moving_points.hpp"
 #include "output_folder.hpp"
-#include "points_of.hpp"
+#include "point_labels.hpp"
 #include "read_ahead.hpp"
+#include "recorded_scans.hpp"
 
 namespace dynains::program {
 namespace {

@@ -20,11 +20,11 @@
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
-#include "label_counts.hpp"
 #include "label_writer.hpp"
 #include "map_file.hpp"
 #include "output_listing.hpp"
 #include "overview.hpp"
+#include "point_labels.hpp"
 #include "scan_range.hpp"
 #include "session_contribution.hpp"
 

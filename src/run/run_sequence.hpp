@@ -8,9 +8,8 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
-#include "naming_scan.hpp"
-#include "points_of.hpp"
 #include "read_ahead.hpp"
+#include "recorded_scans.hpp"
 #include "run_results.hpp"
 #include "run_timing.hpp"
 

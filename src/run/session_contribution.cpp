@@ -6,7 +6,7 @@
 #include "dynains/city/session_aligner.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
-#include "points_of.hpp"
+#include "recorded_scans.hpp"
 
 namespace dynains::program {
 namespace {

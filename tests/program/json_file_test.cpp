@@ -3,7 +3,7 @@
 #include <string>
 
 #include "io/files.hpp"
-#include "run/read_text_file.hpp"
+#include "io/input_file.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains::program;
@@ -59,7 +59,7 @@ TEST_CASE("A path that is no JSON file is refused with its kind") {
   CHECK_THROWS_WITH(read_json_file("/dev/null"),
                     ContainsSubstring("/dev/null: cannot be read: is a device or a pipe"));
   write_text(folder / "large.json", "");
-  std::filesystem::resize_file(folder / "large.json", kMaxTextBytes + 1);
+  std::filesystem::resize_file(folder / "large.json", dynains::kMaxTextBytes + 1);
   CHECK_THROWS_WITH(read_json_file(folder / "large.json"), ContainsSubstring("more than 67108864"));
 }
 

@@ -1,8 +1,10 @@
-// Recorded scans as the clouds that removers take.
+// Recorded scans as removers take them.
 #pragma once
 
 #include <cstddef>
+#include <utility>
 
+#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
@@ -25,6 +27,16 @@ inline void copy_points(const RecordedScan& scan, PointBuffer& points) {
     x[i] = from[4 * i];
     y[i] = from[4 * i + 1];
     z[i] = from[4 * i + 2];
+  }
+}
+
+/// Returns `work()`. A PoseError from it gets the name of scan i.
+template <class Work>
+decltype(auto) naming_scan(const Recording& recording, std::size_t i, Work&& work) {
+  try {
+    return std::forward<Work>(work)();
+  } catch (const PoseError& error) {
+    throw PoseError("scan " + recording.name(i) + ": " + error.what());
   }
 }
 

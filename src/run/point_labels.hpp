@@ -1,13 +1,31 @@
-// The moving points of a scan.
+// Final labels of points: their numbers, and the moving ones.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 #include "dynains/points.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::program {
+
+struct LabelCounts {
+  std::array<std::uint64_t, 5> of{};  ///< by PointLabel
+
+  void add(Span<const PointLabel> labels) {
+    detail::with_packs([&](auto) {
+      for (std::size_t value = 0; value < of.size(); ++value) {
+        std::uint32_t count = 0;
+        for (const PointLabel label : labels) count += label == static_cast<PointLabel>(value);
+        of[value] += count;
+      }
+    });
+  }
+  std::uint64_t operator[](PointLabel label) const { return of[static_cast<std::size_t>(label)]; }
+};
 
 /// Calls `visit(i)` for each point with the label kDynamic, in their order. They are few: the time
 /// is that of a search for bytes.
