@@ -1,6 +1,5 @@
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstdint>
 #include <iomanip>
 #include <iostream>
 #include <memory>
@@ -35,26 +34,26 @@ struct RunFlags {
 
 void print_results(const RunOutcome& run) {
   const RunOutputs& outputs = run.outputs;
-  const auto percent = [&](std::uint64_t count) {
-    return run.points == 0 ? 0.0
-                           : 100.0 * static_cast<double>(count) / static_cast<double>(run.points);
-  };
-  const std::uint64_t moving = run.labels[PointLabel::kDynamic];
-  const std::uint64_t kept = run.labels[PointLabel::kGround] + run.labels[PointLabel::kStatic];
-  std::cout << std::fixed << std::setprecision(2) << run.scans << " scans, " << run.points
-            << " points: " << percent(moving) << " % moving, " << percent(kept) << " % static, "
-            << percent(run.points - moving - kept) << " % not judged\n"
-            << "time per scan: median " << run.time.median << " ms, p95 " << run.time.p95
-            << " ms, max " << run.time.max << " ms\n"
-            << "wall time: " << run.wall.ms / 1000.0 << " s"
-            << "; " << 100.0 * run.wall.outside
+  const nlohmann::ordered_json &report = run.report, &labels = report["labels"],
+                               &ms = report["milliseconds"]["total"];
+  const auto number = [](const nlohmann::ordered_json& value) { return value.get<double>(); };
+  const double points = number(report["points"]), moving = number(labels["dynamic"]);
+  const double kept = number(labels["ground"]) + number(labels["static"]);
+  const auto percent = [&](double count) { return points == 0.0 ? 0.0 : 100.0 * count / points; };
+  std::cout << std::fixed << std::setprecision(2) << report["scans"] << " scans, "
+            << report["points"] << " points: " << percent(moving) << " % moving, " << percent(kept)
+            << " % static, " << percent(points - moving - kept)
+            << " % not judged\ntime per scan: median " << number(ms["median"]) << " ms, p95 "
+            << number(ms["p95"]) << " ms, max " << number(ms["max"])
+            << " ms\nwall time: " << number(report["wall_milliseconds"]) / 1000.0 << " s; "
+            << 100.0 * number(report["share_outside_pipeline"])
             << " % of it outside the pipeline (reading, writing, starting)\n";
-  if (run.map_points) {
+  if (const nlohmann::ordered_json& map = report["static_map"]; !map.is_null()) {
     std::cout << "static map: " << (outputs.folder / outputs.map_name()).string() << " ("
-              << *run.map_points << " points)\n";
+              << map["points"] << " points)\n";
   }
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
-            << moving << " points)\n"
+            << labels["dynamic"] << " points)\n"
             << "labels: " << (outputs.folder / "labels").string()
             << "\npicture: " << (outputs.folder / kOverviewPicture).string()
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
@@ -124,8 +123,9 @@ void run_as_asked(RunFlags& flags) {
   progress.reset();
 
   if (!outcome.complete) {
-    std::cerr << "dynains: interrupted; the results of " << outcome.scans << " scans stay in "
-              << outcome.outputs.folder.string() << " until the next run" << std::endl;
+    std::cerr << "dynains: interrupted; the results of " << outcome.report["scans"]
+              << " scans stay in " << outcome.outputs.folder.string() << " until the next run"
+              << std::endl;
     throw Interrupted{outcome.signal};
   }
   if (!flags.quiet) print_summary(outcome);

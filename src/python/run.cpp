@@ -112,7 +112,7 @@ program::RunListener listen(const RunArguments& run) {
 /// Raises what Python raises for a signal.
 [[noreturn]] void raise_signal(const RunOutcome& outcome) {
   const std::string folder = outcome.outputs.folder.string();
-  const std::string text = "the results of " + std::to_string(outcome.scans) + " scans stay in " +
+  const std::string text = "the results of " + outcome.report["scans"].dump() + " scans stay in " +
                            folder + " until the next run";
   if (outcome.signal == SIGINT) {
     PyErr_SetString(PyExc_KeyboardInterrupt, text.c_str());

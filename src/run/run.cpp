@@ -16,6 +16,7 @@
 #include "output_folder.hpp"
 #include "run_doubts.hpp"
 #include "run_plan.hpp"
+#include "run_report.hpp"
 #include "run_sequence.hpp"
 #include "scratch_file.hpp"
 #include "start_check.hpp"
@@ -87,20 +88,6 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 " invalid (NaN, infinite or at the origin)");
 }
 
-RunOutcome outcome_of(const RunPlan& plan, const RunResults& results, const RunTiming& timing) {
-  RunOutcome outcome;
-  outcome.outputs = plan.settings.outputs;
-  outcome.complete = results.is_complete();
-  outcome.scans = results.finished();
-  outcome.points = results.points();
-  outcome.labels = results.labels();
-  outcome.map_points = results.map_points();
-  std::vector<double> totals;
-  for (const TimingRow& row : timing.rows) totals.push_back(row.total);
-  outcome.time = statistics(std::move(totals));
-  return outcome;
-}
-
 /// Outputs outside of the folder of results.
 struct OutsideOutputs {
   /// Files of the results that `out` replaces are replaced, too.
@@ -160,20 +147,19 @@ RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
 }
 
 /// Puts all outputs in place, or keeps what a signal has left.
-void publish(const RunPlan& plan, const RunOutputs& outputs, const nlohmann::ordered_json& report,
-             OutputFolder& out, OutsideOutputs& outside, SessionContribution* session,
-             RunOutcome& outcome) {
+void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
+             OutsideOutputs& outside, SessionContribution* session, RunOutcome& outcome) {
   if (!outcome.complete) {
     outcome.signal = InterruptGuard::signal();
     outcome.outputs.folder = out.path();
-    return out.keep_unfinished(report);
+    return out.keep_unfinished(outcome.report);
   }
   if (outputs.write_page) {
     outcome.page = plan.settings.outputs.folder / kViewPage;
     write_page(outputs.folder / kViewPage, outputs.folder, plan.sequence, plan.range,
                plan.settings.config.map.map_voxel, kDefaultViewPoints);
   }
-  out.finish(report, [&] {
+  out.finish(outcome.report, [&] {
     if (outside.map) outside.map->put_in_place();
     if (outside.log) outside.log->put_in_place();
     if (session != nullptr) session->commit();
@@ -216,7 +202,9 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
     results.watch(returns);
   }
   const RunTiming timing = process(plan, listener, results);
-  RunOutcome outcome = outcome_of(plan, results, timing);
+  RunOutcome outcome;
+  outcome.outputs = plan.settings.outputs;
+  outcome.complete = results.is_complete();
   outcome.alignment = alignment;
   check_not_empty(plan, results);
   RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
@@ -229,16 +217,15 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   if (outside.log && outcome.complete) {
     write_log(outside.log->path(), plan, outputs.folder, listener, outcome);
   }
-  outcome.wall = wall_time(ms_since(plan.settings.started), timing);
   nlohmann::ordered_json told = to_json(doubts, plan.sequence);
   told["warnings"] = warnings;
-  nlohmann::ordered_json report = make_report(plan, agreement, outcome.wall, told, results, timing);
+  outcome.report = make_report(plan, agreement, told, results, timing);
   if (second_pass) {
-    report["second_pass"] = {{"places", second_pass->place_count()},
-                             {"removed_points", second_pass->revised().removed},
-                             {"restored_points", second_pass->revised().restored}};
+    outcome.report["second_pass"] = {{"places", second_pass->place_count()},
+                                     {"removed_points", second_pass->revised().removed},
+                                     {"restored_points", second_pass->revised().restored}};
   }
-  publish(plan, outputs, report, out, outside, session ? &*session : nullptr, outcome);
+  publish(plan, outputs, out, outside, session ? &*session : nullptr, outcome);
   return outcome;
 }
 

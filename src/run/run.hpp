@@ -2,16 +2,15 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "dynains/city/session.hpp"
 #include "dynains/io/recording.hpp"
 #include "interrupt.hpp"
-#include "run_report.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
 
@@ -30,14 +29,9 @@ struct RunListener {
 
 struct RunOutcome {
   RunOutputs outputs;    ///< their folder is that of unfinished results after a signal
-  bool complete = true;  ///< false after a signal: `scans` were finished
+  bool complete = true;  ///< false after a signal
   int signal = 0;        ///< that ended the run
-  std::size_t scans = 0;
-  std::uint64_t points = 0;
-  LabelCounts labels;
-  std::optional<std::size_t> map_points;
-  Statistics time;  ///< ms per scan
-  WallTime wall;
+  nlohmann::ordered_json report;
   std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
   std::filesystem::path page;                 ///< empty: none was asked for
   std::filesystem::path log;                  ///< empty: none was written

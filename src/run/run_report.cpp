@@ -11,6 +11,7 @@
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "run_sequence.hpp"
 
 namespace dynains::program {
 namespace {
@@ -66,14 +67,9 @@ Statistics statistics(std::vector<double> values) {
   return {quantile(0.5), quantile(0.95), quantile(0.99), values.back()};
 }
 
-WallTime wall_time(double ms, const RunTiming& timing) {
-  if (!(ms > 0.0)) return {ms, 0.0};
-  return {ms, std::clamp(1.0 - timing.pipeline / ms, 0.0, 1.0)};
-}
-
 nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
-                                   const WallTime& wall, const nlohmann::ordered_json& doubts,
-                                   const RunResults& results, const RunTiming& timing) {
+                                   const nlohmann::ordered_json& doubts, const RunResults& results,
+                                   const RunTiming& timing) {
   const Recording& sequence = plan.sequence;
   const RunSettings& settings = plan.settings;
   const LabelCounts& labels = results.labels();
@@ -100,8 +96,9 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreeme
                       {"dynamic", labels[PointLabel::kDynamic]}};
   report["milliseconds"] = times_to_json(timing);
   report["flush_milliseconds"] = timing.flush;
-  report["wall_milliseconds"] = wall.ms;
-  report["share_outside_pipeline"] = wall.outside;
+  const double wall = ms_since(settings.started);
+  report["wall_milliseconds"] = wall;
+  report["share_outside_pipeline"] = std::clamp(1.0 - timing.pipeline / wall, 0.0, 1.0);
   report["peak_memory_bytes"] = peak_memory_bytes();
   report["pose_agreement"] = nullptr;
   if (agreement.points > 0) report["pose_agreement"] = agreement.share;

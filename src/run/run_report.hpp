@@ -22,19 +22,11 @@ struct Statistics {
 };
 Statistics statistics(std::vector<double> values);
 
-/// Time of a whole run.
-struct WallTime {
-  double ms = 0.0;       ///< from the start of the command to the report
-  double outside = 0.0;  ///< share of the jobs' time that is not the pipeline, [0, 1]
-};
-/// `ms`: from the start of the command on.
-WallTime wall_time(double ms, const RunTiming& timing);
-
 /// `agreement`: of the scans under the poses, by a sample. `doubts`: see to_json(RunDoubts), and
 /// "warnings".
 nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
-                                   const WallTime& wall, const nlohmann::ordered_json& doubts,
-                                   const RunResults& results, const RunTiming& timing);
+                                   const nlohmann::ordered_json& doubts, const RunResults& results,
+                                   const RunTiming& timing);
 
 /// The folder of a run.
 const OutputKind& run_output_kind();
