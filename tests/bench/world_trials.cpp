@@ -73,8 +73,8 @@ std::string name_of(const simulation::Config& config) {
   return text.str();
 }
 
-/// For each scan and point, bit `bit` is set if the point is static.
-using InMap = std::vector<std::vector<std::uint8_t>>;
+/// For each scan and point, a bit of each setting is set if the point is static.
+using InMap = test::StaticPoints;
 
 /// Sets the bits of `in_map`. Returns how far the corrected motions, one after the other, lead from
 /// the true poses at most, m; a scan without a corrected motion keeps the pushed one.
@@ -104,24 +104,6 @@ double judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned 
   }
   remover.flush(keep);
   return farthest;
-}
-
-evaluation::Evaluation evaluate(const Scans& scans, const InMap& in_map,
-                                const std::vector<std::string>& names) {
-  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
-    if (i == scans.size()) return false;
-    scan.xyz = scans[i].xyzi.data();
-    scan.stride = 4;
-    scan.T_world_sensor = scans[i].T_world_sensor;
-    scan.time = scans[i].time;
-    scan.truth = scans[i].labels;
-    scan.in_map = in_map[i];
-    return true;
-  };
-  evaluation::EvaluationConfig config;
-  config.max_range = 50.0;
-  config.analyses_errors = false;
-  return evaluation::evaluate(source, names, {}, config);
 }
 
 /// Scores of one setting in one world; NaN where a world has none. More is better, except for the
@@ -244,7 +226,7 @@ void run(const Options& options) {
     for (std::size_t s = 0; s < settings.size(); ++s) {
       moved.push_back(judge(scans, configs[s], static_cast<unsigned>(s), in_map));
     }
-    const evaluation::Evaluation result = evaluate(scans, in_map, settings);
+    const evaluation::Evaluation result = test::evaluate(scans, in_map, settings);
     for (std::size_t s = 0; s < settings.size(); ++s) {
       const Scores scores = scores_of(result.rows[2 + s], moved[s]);
       print_row(settings.size() == 1 ? name_of(world) : name_of(world) + ": " + settings[s],

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
@@ -47,9 +48,10 @@ inline StaticByVerdict static_points(
   return result;
 }
 
-/// PR, RR and F1 of ERASOR within 50 m.
-inline evaluation::VoxelScore score(const std::vector<simulation::SimulatedScan>& scans,
-                                    const StaticPoints& in_map) {
+/// Scores within 50 m. Bit k of `in_map` tells the static points of estimate k, which has name k.
+inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedScan>& scans,
+                                       const StaticPoints& in_map,
+                                       const std::vector<std::string>& names) {
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     if (i == scans.size()) return false;
     scan.xyz = scans[i].xyzi.data();
@@ -62,7 +64,14 @@ inline evaluation::VoxelScore score(const std::vector<simulation::SimulatedScan>
   };
   evaluation::EvaluationConfig config;
   config.max_range = 50.0;
-  return evaluation::evaluate(source, {"run"}, {}, config).rows[2].voxels;
+  config.analyses_errors = false;
+  return evaluation::evaluate(source, names, {}, config);
+}
+
+/// PR, RR and F1 of ERASOR.
+inline evaluation::VoxelScore score(const std::vector<simulation::SimulatedScan>& scans,
+                                    const StaticPoints& in_map) {
+  return evaluate(scans, in_map, {"run"}).rows[2].voxels;
 }
 
 }  // namespace dynains::test
