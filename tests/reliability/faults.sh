@@ -80,24 +80,6 @@ done
 echo "$kept of them left the earlier results"
 ((kept > 0)) || fail "no kill of --force left the earlier results"
 
-echo "--- Ctrl-C: the results so far, which the next run replaces"
-# On a busy machine a run may end before the signal arrives. Such a run is repeated. A program that
-# ignores the signal ends before it every time, and the test fails.
-code=0
-for ((attempt = 0; attempt < 20 && code == 0; ++attempt)); do
-  rm -rf "$work"/out*
-  # In a script, `&` makes a command ignore SIGINT.
-  env --default-signal=INT "$program" run "$seq" --out "$work/out" --quiet &
-  pid=$!
-  await "$work/out.partial/labels"
-  kill -INT "$pid"
-  wait "$pid" || code=$?
-done
-[[ $code == 130 ]] || fail "Ctrl-C: exit code $code"
-grep -q '"complete": false' "$work/out.partial/report.json" || fail "Ctrl-C: no report"
-"$program" run "$seq" --out "$work/out" --quiet || fail "after Ctrl-C"
-as expected || fail "after Ctrl-C: other bytes"
-
 echo "--- input that vanishes in the middle"
 cp -r "$seq" "$work/vanishing"
 "$program" run "$work/vanishing" --out "$work/vanished" --quiet 2>"$work/err" &

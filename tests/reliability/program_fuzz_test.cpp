@@ -11,40 +11,36 @@
 #include <cctype>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "rehearsal.hpp"
-#include "world.hpp"
+#include "support/random.hpp"
 
 namespace dynains::test {
 namespace {
 
 namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
 
-Tree recording_of_clouds() {
-  Tree clouds;
-  std::string poses;
-  for (const std::string name : {"a", "b,\"1\"", "c\n\x1b[31m"}) {
-    std::string text =
-        "ply\nformat ascii 1.0\nelement vertex 60\nproperty float x\n"
-        "property float y\nproperty float z\nend_header\n";
-    for (int i = 0; i < 60; ++i) {
-      text += std::to_string(4 + i % 10) + ' ' + std::to_string(i / 10 - 3) + " -1.7\n";
-    }
-    clouds[name + ".ply"] = {Kind::kFile, text};
-    poses += "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  }
-  clouds["poses.txt"] = {Kind::kFile, poses};
-  return clouds;
+bool is_below(const std::string& path, const std::string& folder) {
+  return path.rfind(folder + '/', 0) == 0;
 }
+
+/// Parts of a world, each relative to its own folder.
+struct Parts {
+  Tree kitti;       ///< a recording
+  Tree complete;    ///< results of run over kitti
+  Tree unfinished;  ///< the same, marked as unfinished
+  Tree simulated;   ///< results of simulate
+};
 
 Parts make_parts() {
   Parts parts;
   const Rehearsal run(fresh_run({"--write-online", "--write-clean"}));
   parts.kitti = below(run.after(), "seq");
   parts.complete = below(run.after(), "disk/out");
-  parts.clouds = recording_of_clouds();
   parts.unfinished = parts.complete;
   auto report = nlohmann::ordered_json::parse(parts.complete.at("report.json").bytes.text());
   report["complete"] = false;
@@ -52,6 +48,239 @@ Parts make_parts() {
   parts.simulated = below(Rehearsal(simulation()).after(), "disk/out");
   return parts;
 }
+
+struct World {
+  Tree tree;
+  std::set<std::string> ours;  ///< names of files that a marker beside or above them lists
+  Words locked;                ///< without permission to write
+  std::string kitti, out;      ///< names of folders, beside "other" and "foreign"
+};
+
+/// A start of the program in the folder of the world.
+struct Start {
+  Arguments arguments;
+  Words inputs;             ///< files and folders that the arguments name as input
+  std::string out;          ///< of run and simulate
+  Words targets;            ///< files that the arguments name as output
+  std::vector<int> closed;  ///< descriptors
+  bool full = false;        ///< standard output is full
+};
+
+/// Random folders of a user and random starts of the program in them, from a seed.
+class WorldMaker {
+ public:
+  WorldMaker(const Parts& parts, std::size_t seed) : parts_(parts), random_(seed) {}
+
+  World world() {
+    const std::string strange = chance(0.6) ? ""
+                                            : pick({" x", "\n", "\x1b[31m", ",\"", "\xc3\xb6",
+                                                    "\xff", std::string(200, 'l'), ".tmp"});
+    World world;
+    world.kitti = "seq" + strange;
+    world.out = pick({"out", "out", ".out", "-out"}) + (chance(0.3) ? strange : "");
+    add(world, world.kitti, parts_.kitti, false);
+    add(world, "foreign",
+        {{"mine.txt", {Kind::kFile, "mine"}},
+         {"mine.ply", {Kind::kFile, "ply, mine"}},
+         {"000000.label", {Kind::kFile, "by hand"}}},
+        false);
+    const auto result = [&]() -> const Tree& {
+      const Tree* const all[] = {&parts_.complete, &parts_.complete, &parts_.unfinished,
+                                 &parts_.simulated};
+      return *all[random_.index(4)];
+    };
+    if (chance(0.7)) add(world, world.out, result(), true);
+    if (chance(0.4)) add(world, "other", result(), true);
+    for (std::size_t i = random_.index(4); i > 0; --i) change(world);
+    return world;
+  }
+
+  Start start(const World& world) {
+    Start start;
+    const std::size_t kind = random_.index(20);
+    if (kind < 13) {
+      run(world, start);
+    } else if (kind < 17) {
+      eval(world, start);
+    } else if (kind == 17) {
+      start.out = output(world);
+      start.arguments = {"simulate",       start.out,     "--scans=1",    "--scene=car-park",
+                         "--sensor=vlp16", "--traffic=0", "--max-range=1"};
+      if (chance(0.6)) start.arguments.emplace_back("--force");
+    } else {
+      const std::vector<Arguments> others = {
+          {"check", input(world)}, {"config"}, {"config", "--markdown"}, {"--help"}, {}, {"rum"}};
+      start.arguments = others[random_.index(others.size())];
+    }
+    if (chance(0.05)) start.arguments.push_back(pick({"", "-1", "--", "nan", "--x"}));
+    for (int descriptor = 0; descriptor < 3; ++descriptor) {
+      if (chance(0.06)) start.closed.push_back(descriptor);
+    }
+    start.full = chance(0.05);
+    return start;
+  }
+
+ private:
+  bool chance(double share) { return random_.uniform(0.0, 1.0) < share; }
+  std::string pick(const Words& from) { return from[random_.index(from.size())]; }
+
+  static void add(World& world, const std::string& folder, const Tree& part, bool ours) {
+    world.tree[folder] = {Kind::kFolder, {}};
+    for (const auto& [name, item] : part) {
+      world.tree[folder + '/' + name] = item;
+      if (ours && item.kind == Kind::kFile) world.ours.insert(folder + '/' + name);
+    }
+  }
+
+  static void erase(World& world, const std::string& path) {
+    for (auto item = world.tree.begin(); item != world.tree.end();) {
+      const bool within = item->first == path || is_below(item->first, path);
+      item = within ? world.tree.erase(item) : std::next(item);
+    }
+  }
+
+  /// Removes the paths below OUT from `ours`.
+  static void disown(World& world) {
+    for (auto name = world.ours.begin(); name != world.ours.end();) {
+      name = is_below(*name, world.out) ? world.ours.erase(name) : std::next(name);
+    }
+  }
+
+  /// Puts an item of another owner there if its folder exists.
+  static void put(World& world, const std::string& path, const Item& item) {
+    const std::size_t slash = path.rfind('/');
+    if (slash != std::string::npos) {
+      const std::string folder = path.substr(0, slash);
+      if (world.tree.count(folder) == 0) put(world, folder, {Kind::kFolder, {}});
+      if (world.tree.count(folder) == 0 || world.tree[folder].kind != Kind::kFolder) return;
+    }
+    erase(world, path);
+    world.tree[path] = item;
+  }
+
+  void change(World& world) {
+    const std::string name =
+        world.out + '/' +
+        pick({"report.json", "static_map.ply", "dynamic_points.ply", "timing.csv", "labels",
+              "clean", "online", "velodyne", "simulation.json", "labels/000000.label",
+              "causes/000001.cause", "clean/000000.bin", "poses.txt", "notes.txt",
+              ".notes.2024.tmp", "labels/mine.txt", "labels/.x.0123456789abcdef.tmp", "a/b/c.txt"});
+    std::string above;
+    for (std::ptrdiff_t i = std::count(name.begin(), name.end(), '/'); i > 0; --i) above += "../";
+    const std::string input =
+        world.kitti + pick({"/velodyne/000001.bin", "/poses.txt", "/times.txt",
+                            "/labels/000000.label", "/run.cfg"});
+    const std::string bytes = world.tree[input].bytes.text();
+    switch (random_.index(10)) {
+      case 0:
+        return put(world, name, {Kind::kFile, "mine"});
+      case 1:
+        put(world, name, {Kind::kFolder, {}});
+        return put(world, name + "/mine.txt", {Kind::kFile, "mine"});
+      case 2:
+        return put(
+            world, name,
+            {Kind::kLink, above + "foreign" + pick({"", "/mine.txt", "/mine.ply", "/none"})});
+      case 3:
+        disown(world);
+        return put(world, world.out,
+                   {Kind::kLink, pick({"other", "foreign", world.kitti, "nothing", world.out})});
+      case 4:
+        return damage_marker(world);
+      case 5:
+        return erase(world, input);
+      case 6:
+        return put(world, input, {Kind::kFile, bytes.substr(0, random_.index(bytes.size() + 1))});
+      case 7:
+        return put(world, input, {Kind::kFolder, {}});
+      case 8:
+        world.locked.push_back(pick({world.out, world.out + "/labels", name, "."}));
+        return;
+      default:
+        return put(world, "link",
+                   {Kind::kLink, pick({world.out, world.kitti, world.kitti + "/velodyne"})});
+    }
+  }
+
+  /// Damages the markers, so that no result in OUT belongs to the program.
+  void damage_marker(World& world) {
+    const std::string program = "{\"program\": \"dynains\"";
+    for (const char* marker : {"/report.json", "/simulation.json"}) {
+      const auto item = world.tree.find(world.out + marker);
+      if (item == world.tree.end() || item->second.kind != Kind::kFile) continue;
+      const std::string bytes = item->second.bytes.text();
+      item->second.bytes =
+          pick({"", "[", "null", std::string(50000, '['), program + "}",
+                program + ", \"complete\": true, \"files\": [\"../foreign/mine.txt\"]}",
+                bytes.substr(0, bytes.size() / 2)});
+    }
+    disown(world);
+  }
+
+  /// One of the ways to write a path.
+  std::string spelled(const std::string& path) {
+    return pick({"./" + path, "foreign/../" + path, path + '/', path, path});
+  }
+
+  std::string input(const World& world) {
+    return spelled(chance(0.85) ? world.kitti
+                                : pick({world.out + "/clean", world.out, "link", "none",
+                                        world.kitti + "/velodyne", "foreign"}));
+  }
+
+  std::string output(const World& world) {
+    return spelled(chance(0.7)
+                       ? world.out
+                       : pick({"other", "link", "new/a", world.kitti, world.kitti + "/velodyne",
+                               "foreign", world.kitti + "/labels", ""}));
+  }
+
+  void add_target(const World& world, Start& start, const std::string& flag) {
+    start.targets.push_back(pick(
+        {"map.ply", "map.pcd", "foreign/mine.ply", world.out + "/map.ply",
+         world.out + "/dynamic_points.ply", "other/static_map.ply", "none/map.ply",
+         world.kitti + "/poses.txt", world.out + "/labels/000000.label", world.out + "/report.json",
+         "link/map.ply", world.kitti + "/velodyne/000000.bin", world.out + "/clean/000000.ply"}));
+    start.arguments.insert(start.arguments.end(), {flag, start.targets.back()});
+  }
+
+  void run(const World& world, Start& start) {
+    start.out = output(world);
+    start.inputs = {input(world)};
+    start.arguments = {"run", start.inputs[0], "--out", start.out};
+    if (chance(0.6)) start.arguments.emplace_back("--force");
+    if (chance(0.3)) add_target(world, start, "--map");
+    const std::vector<Arguments> flags = {{"--write-online"},
+                                          {"--write-clean"},
+                                          {"--quiet"},
+                                          {"--end", "2"},
+                                          {"--window", "3"},
+                                          {"--preset", "paper"},
+                                          {"--poses", world.kitti + "/poses.txt"},
+                                          {"--times", world.kitti + "/times.txt"},
+                                          {"--config", world.kitti + "/run.cfg"},
+                                          {"--build-map", "false"}};
+    for (const Arguments& flag : flags) {
+      if (!chance(0.08)) continue;
+      start.arguments.insert(start.arguments.end(), flag.begin(), flag.end());
+      if (is_below(flag.back(), world.kitti)) start.inputs.push_back(flag.back());
+    }
+  }
+
+  void eval(const World& world, Start& start) {
+    const std::string run = chance(0.8) ? world.out : "other";
+    const bool online = chance(0.2);
+    start.arguments = {"eval", spelled(world.kitti), spelled(run)};
+    start.inputs = {world.kitti + "/velodyne", world.kitti + "/labels", world.kitti + "/poses.txt",
+                    run + (online ? "/online" : "/labels")};
+    if (online) start.arguments.emplace_back("--online");
+    if (chance(0.6)) add_target(world, start, "--json");
+    if (chance(0.3)) add_target(world, start, "--csv");
+  }
+
+  const Parts& parts_;
+  Random random_;
+};
 
 /// Runs in the new process. Drops the privileges of root, so that permissions have an effect.
 void prepare(const Start& start, const std::string& root) {
@@ -76,10 +305,6 @@ class RandomStart {
     for (const std::string& target : start_.targets) {
       if (const auto path = real_path(target)) targets_.push_back(*path);
     }
-    const Environment environment({{"LD_PRELOAD", start_.fault.empty() ? "" : DYNAINS_SHIM},
-                                   {"DYNAINS_SHIM_ROOT", root},
-                                   {"DYNAINS_SHIM_FAULT", start_.fault},
-                                   {"ASAN_OPTIONS", "verify_asan_link_order=0"}});
     outcome_ = test::start(start_.arguments, [&] { prepare(start_, root); });
     set_permissions(fs::perm_options::add);
     after_ = read_tree(root);
@@ -102,7 +327,7 @@ class RandomStart {
   }
 
   std::string description() const {
-    std::string text = start_.fault.empty() ? "" : '[' + start_.fault + "] ";
+    std::string text;
     for (const std::string& argument : start_.arguments) text += '\'' + argument + "' ";
     for (const int descriptor : start_.closed) text += std::to_string(descriptor) + ">&- ";
     if (start_.full) text += ">/dev/full ";
@@ -141,9 +366,8 @@ class RandomStart {
   }
 
   bool may_change(const std::string& path) const {
-    const bool is_eval = command() == "eval";
     if (is_input(path)) return false;
-    if (is_target(path) && is_eval) return true;
+    if (is_target(path) && command() == "eval") return true;
     if (!out_ || !is_below(path, *out_)) return false;
     const Kind kind = before_.at(path).kind;
     // A folder may be removed if it is empty or holds only files of the program.
@@ -152,10 +376,6 @@ class RandomStart {
 
   bool may_appear(const std::string& path) const {
     if (is_target(path)) return true;
-    const std::string name = path.substr(path.rfind('/') + 1);
-    // After a failed call, a temporary file and an unfinished output may stay.
-    const bool is_partial = path.find(".partial") != path.npos || ends_with(name, ".tmp");
-    if (!start_.fault.empty() && is_partial) return true;
     if (!out_) return false;
     if (path == *out_ || is_below(*out_, path)) return true;
     if (!is_below(path, *out_)) return false;
@@ -187,7 +407,7 @@ class RandomStart {
     const Claim claim = claim_of(below(after_, *out_));
     if (outcome_.code == 0) return claim == Claim::kComplete ? "" : "exit code 0, but not complete";
     // A call that failed after the new results were in place is an error, too.
-    const bool is_disturbed = start_.full || !start_.closed.empty() || !start_.fault.empty();
+    const bool is_disturbed = start_.full || !start_.closed.empty();
     if (claim != Claim::kComplete || is_disturbed) return {};
     for (const std::string& path : world_.ours) {
       const auto earlier = before_.find(path);
