@@ -5,7 +5,7 @@ import assert from "node:assert";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 
-import { packages, require } from "../support/node_check.mjs";
+import { openMcap, packages, require } from "../support/node_check.mjs";
 
 const { core, rosmsg, serialization } = await packages(() => ({
   core: require("@mcap/core"),
@@ -18,26 +18,15 @@ const [log, copy, folder] = process.argv.slice(2);
 const decompress = (command) => (data) =>
   execFileSync(command, ["-d", "-c", "-q"], { input: data, maxBuffer: 1 << 28 });
 
-async function open(file) {
-  const bytes = fs.readFileSync(file);
-  return core.McapIndexedReader.Initialize({
-    readable: {
-      size: async () => BigInt(bytes.length),
-      read: async (offset, length) =>
-        new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
-    },
-    decompressHandlers: { lz4: decompress("lz4"), zstd: decompress("zstd") },
-  });
-}
-
 async function all(messages) {
   const result = [];
   for await (const message of messages) result.push(message);
   return result;
 }
 
-const a = await open(log);
-const b = await open(copy);
+const handlers = { lz4: decompress("lz4"), zstd: decompress("zstd") };
+const a = await openMcap(core, log, handlers);
+const b = await openMcap(core, copy, handlers);
 assert.strictEqual(b.header.profile, a.header.profile);
 assert.strictEqual(b.statistics.messageCount, a.statistics.messageCount);
 // Ids may differ.

@@ -77,11 +77,7 @@ TEST_CASE("clean removes the trail of a mover from a map that another program ha
   CHECK_THAT(outcome.out, ContainsSubstring(std::to_string(f.points) + " points, " +
                                             std::to_string(f.points - kept) + " left as moving"));
   CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
-
-  SECTION("an earlier result is replaced by --force alone") {
-    check_refused(f.clean(), 1, "exists; choose another name, or replace it by --force");
-    CHECK(f.clean({"--force"}).code == 0);
-  }
+  check_refused(f.clean(), 1, "exists; choose another name, or replace it by --force");
 }
 
 TEST_CASE("clean finds where the scans lie in a map that was made with other poses") {

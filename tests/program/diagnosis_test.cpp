@@ -233,13 +233,6 @@ TEST_CASE("On a motorway, plants and posts tell the way that walls and rails lea
   CHECK(Eigen::AngleAxisd(R.transpose() * T_body_sensor.linear()).angle() < 0.03);
 }
 
-TEST_CASE("A narrow view along a motorway tells the way, too") {
-  const simulation::Config config =
-      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 40, 910);
-  const Street road(config);
-  check_way_is_told(road);
-}
-
 TEST_CASE("few beams ahead on a fast empty road give no warning about the poses") {
   const simulation::Config config =
       drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 61);

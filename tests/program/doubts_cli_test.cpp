@@ -72,24 +72,6 @@ TEST_CASE("run says nothing about a right recording, and its report has no doubt
   CHECK(drive.report()["doubts"]["warnings"].empty());
 }
 
-TEST_CASE("run stops before its first output if the poses are those of a turned body") {
-  const Drive drive;
-  drive.with_poses([](std::size_t, const Pose& T) { return Pose(T * yawed(90.0)); });
-  const Outcome stopped = drive.run();
-  CHECK(stopped.code == 2);
-  CHECK_THAT(stopped.err,
-             ContainsSubstring("--accept-poses") && ContainsSubstring("See: dynains check"));
-  CHECK_FALSE(fs::exists(drive.out()));
-  CHECK(start({"check", drive.path()}).code == 1);
-
-  // With --accept-poses, the run goes on and names the first suspicious scan.
-  const Outcome accepted = drive.run({"--accept-poses"});
-  CHECK(accepted.code == 0);
-  CHECK_THAT(accepted.err, ContainsSubstring("suspicious since scan 0000"));
-  REQUIRE_FALSE(drive.report()["doubts"]["suspicious"].empty());
-  CHECK(drive.report()["doubts"]["suspicious"][0]["suspicion"] != "none");
-}
-
 TEST_CASE("run names the scan at which poses jump, and the size") {
   const Drive drive;
   const Pose& T_world_c = drive.pose(15);

@@ -22,32 +22,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kLogScans = 12;
-const Eigen::Vector3d kPosition(30.0, 4.0, 0.0);
-
-/// The tiny sequence as a log whose points have a label.
-std::string tiny_log() {
-  const std::vector<CloudField> fields = {
-      {"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"intensity", 12, 7}, {"label", 16, 6}};
-  std::vector<WrittenMessage> messages;
-  for (std::size_t i = 0; i < kLogScans; ++i) {
-    const double time = 0.1 * static_cast<double>(i);
-    const std::vector<float> scan = tiny_scan(i);
-    ByteWriter points;
-    for (std::size_t k = 0; k < scan.size(); k += 4) {
-      for (std::size_t c = 0; c < 4; ++c) points.number(scan[k + c]);
-      points.number(std::uint32_t{9});
-    }
-    messages.push_back(
-        {0, nanoseconds(time),
-         cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 20, points.text())});
-    messages.push_back(
-        {1, nanoseconds(time),
-         odometry(time, "lidar", Eigen::Isometry3d(Eigen::Translation3d(kPosition)))});
-  }
-  return mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"}, {"/odom", "nav_msgs/msg/Odometry"}},
-                   messages, {});
-}
-
 std::string all_labels(const fs::path& out) {
   std::string all;
   for (std::size_t i = 0; i < kLogScans; ++i) {
@@ -57,45 +31,6 @@ std::string all_labels(const fs::path& out) {
 }
 
 }  // namespace
-
-TEST_CASE("run on a log gives the labels of run on the folder; check and eval read it, too") {
-  const TemporaryFolder folder;
-  write_tiny_sequence(folder / "seq", kLogScans, kPosition);
-  write_text(folder / "drive.mcap", tiny_log());
-  const std::string log = folder / "drive.mcap";
-  succeed(start({"run", folder / "seq", "--out", folder / "of_folder"}));
-  const Outcome outcome = succeed(start({"run", log, "--out", folder / "of_log", "--write-clean"}));
-  CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
-  CHECK(all_labels(folder / "of_log") == all_labels(folder / "of_folder"));
-  const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
-  CHECK(report["scans"] == kLogScans);
-  CHECK(report["log_ends_early"] == false);
-  CHECK(start({"eval", log, folder / "of_log"}).code == 0);
-  const Outcome check = start({"check", log});
-  CHECK_THAT(check.out, ContainsSubstring("clouds from topic /points") &&
-                            ContainsSubstring("poses from topic /odom"));
-
-  // The clean scans, without moving points, have the poses of the log.
-  CHECK_THAT(start({"check", folder / "of_log" / "clean"}).out,
-             ContainsSubstring("poses from VIEWPOINT of the scans") &&
-                 ContainsSubstring("points are in the frame of the sensor"));
-}
-
-TEST_CASE("A truncated log is read up to its end, and the program reports it in one line") {
-  const TemporaryFolder folder;
-  const std::string whole = tiny_log();
-  const std::string log = folder / "cut.mcap";
-  write_text(log, whole.substr(0, 3 * whole.size() / 4));
-  const Outcome outcome = start({"run", log, "--out", folder / "out", "--quiet"});
-  CHECK(outcome.code == 0);
-  CHECK_THAT(outcome.err, ContainsSubstring(log + ": byte ") &&
-                              ContainsSubstring("the log ends early, as after a crash of its "
-                                                "recorder; 9 scans before it are read\n"));
-  CHECK(count_lines(outcome.err) == 1);
-  const auto report = nlohmann::json::parse(read_text(folder / "out" / "report.json"));
-  CHECK(report["scans"] == 9);
-  CHECK(report["log_ends_early"] == true);
-}
 
 TEST_CASE(
     "De-skewing by --deskew restores the scores that a rolling shutter costs, and keeps times of "
@@ -163,7 +98,7 @@ TEST_CASE("Memory for reading does not grow with the log") {
   CHECK(peak_memory(200) < least + 4 * kMegabyte);  // of 96 MB
 }
 
-TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the folder") {
+TEST_CASE("run, check and eval read a log as the folder of its scans, a truncated one to its end") {
   const TemporaryFolder folder;
   const Arguments flags = {"--sensor", "vlp16", "--scans", std::to_string(kLogScans),
                            "--seed",   "5"};
@@ -177,12 +112,36 @@ TEST_CASE("simulate --format mcap: run on the log gives the labels of run on the
   CHECK(simulate(log_folder, {"--format", "mcap"}).out == "12 scans: " + log + "\n");
   CHECK(count_entries(log_folder) == 2);
   const std::string out = folder / "of_log";
-  succeed(start({"run", log, "--out", out}));
+  const Outcome outcome = succeed(start({"run", log, "--out", out, "--write-clean"}));
+  CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
   CHECK(all_labels(out) == all_labels(folder / "of_folder"));
+  const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
+  CHECK(report["scans"] == kLogScans);
+  CHECK(report["log_ends_early"] == false);
   CHECK(start({"eval", log, out}).out == start({"eval", folder / "seq", folder / "of_folder"}).out);
+  CHECK_THAT(start({"check", log}).out, ContainsSubstring("clouds from topic /points"));
+  // The clean scans, without moving points, have the poses of the log.
+  CHECK_THAT(start({"check", out + "/clean"}).out,
+             ContainsSubstring("poses from VIEWPOINT of the scans") &&
+                 ContainsSubstring("points are in the frame of the sensor"));
+
   const std::string first = read_text(log);
   succeed(simulate(log_folder, {"--format", "mcap", "--force"}));
   CHECK(read_text(log) == first);
   succeed(simulate(log_folder, {"--force"}));
   CHECK_FALSE(fs::exists(log));
+
+  // A log of two chunks.
+  succeed(start({"simulate", log_folder, "--format", "mcap", "--sensor", "vlp16", "--scans", "24",
+                 "--force"}));
+  const std::string whole = read_text(log);
+  const std::string cut = folder / "cut.mcap";
+  write_text(cut, whole.substr(0, 3 * whole.size() / 4));
+  const Outcome early = succeed(start({"run", cut, "--out", folder / "early", "--quiet"}));
+  CHECK_THAT(early.err, StartsWith("dynains: warning: " + cut + ": byte ") &&
+                            ContainsSubstring("the log ends early, as after a crash of its "
+                                              "recorder; ") &&
+                            ContainsSubstring(" scans before it are read\n"));
+  CHECK(count_lines(early.err) == 1);
+  CHECK(nlohmann::json::parse(read_text(folder / "early/report.json"))["log_ends_early"] == true);
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +15,7 @@
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
+#include "reliability/tree.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
@@ -25,16 +25,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kDayScans = 12;
-
-/// Path below a folder and content of every file; folders, too.
-std::map<std::string, std::string> content_of(const fs::path& folder) {
-  std::map<std::string, std::string> content;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    content[fs::relative(entry.path(), folder).string()] =
-        entry.is_regular_file() ? read_text(entry.path()) : "";
-  }
-  return content;
-}
 
 /// Three small recordings at different places, and runs over them.
 class Days {
@@ -101,27 +91,27 @@ TEST_CASE("map: diff writes points, and replaces nothing unasked") {
   // Bad input, and nothing is written.
   const auto is_refused = [&](std::vector<std::string> more, const std::string& reason) {
     check_refused(diff(std::move(more)), 2, reason);
-    CHECK(content_of(days.at("changes")).empty());
+    CHECK(read_tree(days.at("changes")).empty());
   };
   is_refused({"--removed", days.at("city/changes.ply")}, "lies in the map");
   is_refused({"--removed", days.at("changes/changes.jpg")}, "expected a name that ends in .ply");
   is_refused({"--removed", days.at("changes/added.ply")}, "--removed");
 
   CHECK(diff({}).code == 0);
-  const auto content = content_of(days.at("changes"));
+  const auto content = read_tree(days.at("changes"));
   CHECK(content.size() == 2);
   CHECK(diff({}).code == 1);
   CHECK(diff({"--force"}).code == 0);
-  CHECK(content_of(days.at("changes")) == content);
+  CHECK(read_tree(days.at("changes")) == content);
 }
 
 TEST_CASE("map: a session twice, another voxel edge and bad names are refused, and all stays") {
   const Days days;
   succeed(days.update(0, "city", "out"));
-  const auto before = content_of(days.at("city"));
+  const auto before = read_tree(days.at("city"));
   const auto is_refused = [&](const Outcome& outcome, const std::string& reason) {
     check_refused(outcome, 2, reason);
-    CHECK(content_of(days.at("city")) == before);
+    CHECK(read_tree(days.at("city")) == before);
   };
   is_refused(days.update(0, "city", "out2"), "a session is added once");
   CHECK_FALSE(fs::exists(days.at("out2")));
@@ -137,11 +127,11 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
              "--session needs --update");
   // The same run again adds no second session.
   CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
-  CHECK(content_of(days.at("city")) == before);
+  CHECK(read_tree(days.at("city")) == before);
   // Removed points come back with the same bytes.
   CHECK(start({"map", days.at("city"), "drop", "day0"}).code == 0);
   CHECK(days.update(0, "city", "out", {"--force"}).code == 0);
-  CHECK(content_of(days.at("city")) == before);
+  CHECK(read_tree(days.at("city")) == before);
 }
 
 TEST_CASE("map: a broken session is named by check with path and position") {
@@ -159,36 +149,11 @@ TEST_CASE("map: a broken session is named by check with path and position") {
   CHECK_FALSE(fs::exists(days.at("x.ply")));
 }
 
-TEST_CASE("map: a run that is killed or interrupted leaves the map as it was") {
-  const Days days;
-  succeed(days.update(0, "city", "out"));
-  const std::string before = days.exported("city", "before.ply");
-  write_tiny_sequence(days.at("long"), 400, {5.0, 0.0, 0.0});
-  const std::vector<std::string> run = {"run",      days.at("long"), "--out", days.at("out2"),
-                                        "--update", days.at("city"), "-q",    "--accept-poses"};
-  for (const int signal : {SIGKILL, SIGTERM}) {
-    Process process(run);
-    const auto is_writing = [&] { return fs::exists(days.at("out2.partial/labels/000020.label")); };
-    for (int i = 0; i < 3000 && !is_writing(); ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    REQUIRE(is_writing());
-    ::kill(process.id(), signal);
-    CHECK(process.wait().code == 128 + signal);
-    CHECK(start({"map", days.at("city"), "check"}).code == 0);
-    CHECK(days.exported("city", "after" + std::to_string(signal) + ".ply") == before);
-    fs::remove_all(days.at("out2.partial"));
-  }
-  for (const auto& entry : fs::directory_iterator(days.at("city"))) {
-    CHECK(entry.path().filename().string().front() != '.');
-  }
-}
-
 TEST_CASE("map: remap --update moves one session to corrected poses, as if it had been added so") {
   const Days days;
   succeed(days.update(0, "city", "out0"));
   succeed(days.update(1, "city", "out1"));
-  const auto before = content_of(days.at("city"));
+  const auto before = read_tree(days.at("city"));
   const auto remap = [&](const std::string& poses, const std::string& city,
                          const Arguments& more = {}) {
     return start(Arguments{"remap", days.at("day1"), days.at("out1"), "--poses", days.at(poses),
@@ -197,7 +162,7 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   };
   // The poses of the run give the files of the run.
   succeed(remap("day1/poses.txt", "city"));
-  CHECK(content_of(days.at("city")) == before);
+  CHECK(read_tree(days.at("city")) == before);
 
   // Whole numbers of metres change no verdict, so that a run over the corrected poses is
   // comparable.
@@ -208,14 +173,14 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
   succeed(remap("corrected.txt", "city"));
   succeed(days.update(0, "expected", "out2"));
   succeed(days.update(1, "expected", "out3", {"--poses", days.at("corrected.txt")}));
-  CHECK(content_of(days.at("city")) == content_of(days.at("expected")));
-  CHECK(content_of(days.at("city")) != before);
+  CHECK(read_tree(days.at("city")) == read_tree(days.at("expected")));
+  CHECK(read_tree(days.at("city")) != before);
   CHECK(read_text(days.at("city/day0.session")) == read_text(days.at("expected/day0.session")));
   CHECK(start({"map", days.at("city"), "check"}).code == 0);
 
-  const auto after = content_of(days.at("city"));
+  const auto after = read_tree(days.at("city"));
   CHECK(remap("corrected.txt", "city", {"--session", "day7"}).code == 2);
-  CHECK(content_of(days.at("city")) == after);
+  CHECK(read_tree(days.at("city")) == after);
 }
 
 TEST_CASE("map: a session of a slightly different frame is aligned, or refused before anything") {
@@ -236,9 +201,9 @@ TEST_CASE("map: a session of a slightly different frame is aligned, or refused b
   CHECK_FALSE(fs::exists(at("city")));
   is_refused(update("day2", {"--align-start", "0 0 0 0 0 0 1"}), "--align-start needs --align");
   succeed(start(update("day1", {"-q"})));
-  const auto before = content_of(at("city"));
+  const auto before = read_tree(at("city"));
   is_refused(update("day2", {"--align", "--align-start", "9 1 0 0 0 0 1"}), "cannot be aligned");
-  CHECK(content_of(at("city")) == before);
+  CHECK(read_tree(at("city")) == before);
 
   // 1.5 m from the truth, which is the identity.
   const std::vector<std::string> align = {"--align", "--align-start", "1.2 -0.9 0.1 0 0 0 1"};

@@ -123,20 +123,6 @@ TEST_CASE("The odometry says about the clouds what a run says") {
   CHECK_THAT(run.err, ContainsSubstring(expected));
 }
 
-TEST_CASE("A gap of more than a second ends the track") {
-  const Unposed recording(20);
-  for (int i = 5; i < 18; ++i) {
-    const std::string name = (i < 10 ? "00000" : "0000") + std::to_string(i) + ".bin";
-    fs::remove(recording.sequence() / "velodyne" / name);
-  }
-  fs::remove_all(recording.sequence() / "labels");
-  const fs::path poses = recording / "poses.txt";
-  const Outcome outcome = start({"odometry", recording.sequence(), "--out", poses, "-q"});
-  CHECK(outcome.code == 3);
-  CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000018: too long after"));
-  CHECK(read_trajectory(poses).poses.size() == 5);
-}
-
 TEST_CASE("A loss of track at the second scan leaves nothing, with the exit code of a later one") {
   const Unposed recording(4, 1);
   const fs::path out = recording / "out";

@@ -124,11 +124,6 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
     succeed(f.remap({"--poses", f.corrected, "-q"}));
     CHECK(read_text(f.map) == expected_map(f));
   }
-  SECTION("the run is complete as before, and --force removes the map with it") {
-    CHECK_THAT(start({"run", f.seq, "--out", f.out}).err, ContainsSubstring("earlier results"));
-    succeed(start({"run", f.seq, "--out", f.out, "--force"}));
-    CHECK_FALSE(fs::exists(f.map));
-  }
   SECTION("a map elsewhere leaves the folder of the run as it is") {
     const std::string before = read_text(f.out + "/report.json");
     const std::string elsewhere = f.folder / "corrected.ply";

@@ -25,29 +25,6 @@ TEST_CASE("Quantiles are measured values") {
   CHECK(statistics({}).max == 0.0);
 }
 
-TEST_CASE("timing.csv has a row for each scan") {
-  TemporaryFolder folder;
-  RunTiming timing;
-  timing.rows.push_back({"000007", 120000, {}, 2.0, dynains::PoseResidual{0.0125, 0.5, {}}});
-  timing.rows[0].stages.ground = 1.25;
-  timing.rows[0].stages.map = 0.5;
-  timing.rows.push_back({"000008", 0, {}, 0.00004, {}});
-  timing.rows[1].time = 1700000000.123456;
-  write_timing(folder / "timing.csv", timing);
-  const std::string none = "0.0000,0.0000,0.0000,0.0000,0.0000,";
-  CHECK(read_text(folder / "timing.csv") ==
-        "scan,points,ingest_ms,ground_ms,window_ms,cluster_ms,evidence_ms,judge_ms,verdict_ms,"
-        "map_ms,total_ms,pose_residual_m,pose_residual_deg,time_s\n"
-        "000007,120000,0.0000,1.2500," +
-            none + "0.5000,2.0000,0.0125,0.5000,0.000000000\n000008,0,0.0000,0.0000," + none +
-            "0.0000,0.0000,,,1700000000.123456001\n");
-
-  timing.rows = {{"a,b\n\"c\"", 1, {}, 0.0, {}}};
-  write_timing(folder / "timing.csv", timing);
-  CHECK(read_text(folder / "timing.csv").find("\n\"a,b\n\"\"c\"\"\",1,0.0000") !=
-        std::string::npos);
-}
-
 TEST_CASE("Progress tells the rate and the time that is left") {
   CHECK(describe_rate(0, 100, 3.0, "scans").empty());
   CHECK(describe_rate(50, 100, 20.0, "scans") == " (2.5 scans/s, 0:20 left)");

@@ -195,26 +195,3 @@ TEST_CASE("A refused pose is named, and final results stay") {
   // Labels, causes and online labels, but no map, no moving points and no temporary files.
   CHECK(count_entries(fixture.folder / "out") == 3);
 }
-
-TEST_CASE("A scan that breaks during the run is reported") {
-  Fixture fixture(6);
-  const ScanRange range{0, 5};
-  write_text(fixture.folder / "seq/velodyne/000003.bin", std::string(17, 'x'));
-  RunResults results(*fixture.sequence, range, fixture.outputs());
-  CHECK_THAT(message_of<IoError>([&] {
-               run_sequence(fixture.remover, *fixture.sequence, range, results, kAlways);
-             }),
-             ContainsSubstring("000003.bin: truncated at byte 17"));
-}
-
-TEST_CASE("Labels that cannot be written stop the run") {
-  Fixture fixture(6);
-  const ScanRange range{0, 5};
-  RunResults results(*fixture.sequence, range, fixture.outputs());
-  fs::create_directory(fixture.folder / "out/labels/000005.label");
-  CHECK_THAT(message_of<IoError>([&] {
-               run_sequence(fixture.remover, *fixture.sequence, range, results, kAlways);
-               results.commit();
-             }),
-             ContainsSubstring("000005.label: cannot be replaced"));
-}

@@ -78,28 +78,6 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
                               ContainsSubstring("000002.label: has 4 bytes, expected"));
 }
 
-TEST_CASE("simulate replaces only its own results, and only by --force") {
-  TemporaryFolder folder;
-  const std::string out = folder / "sim";
-  succeed(simulate(out, {"--scans", "3"}));
-  CHECK(simulate(out, {"--scans", "2"}).code == 1);
-  CHECK(Recording(out).size() == 3);
-  succeed(simulate(out, {"--scans", "2", "--force"}));
-  CHECK(Recording(out).size() == 2);
-
-  // A marker that lists no files, or the marker of a run, does not permit it either.
-  succeed(start({"run", out, "--out", folder / "run"}));
-  for (const std::string& marker : {std::string("{}"), read_text(folder / "run/report.json")}) {
-    write_text(out + "/simulation.json", marker);
-    check_refused(simulate(out, {"--scans", "1", "--force"}), 1,
-                  "simulation.json: was not written by dynains sim");
-    CHECK(Recording(out).size() == 2);
-  }
-  fs::remove(out + "/simulation.json");
-  check_refused(simulate(out, {"--scans", "1", "--force"}), 1, "no simulation.json");
-  CHECK(Recording(out).size() == 2);
-}
-
 TEST_CASE("simulate refuses unknown values") {
   TemporaryFolder folder;
   const std::string out = folder / "sim";

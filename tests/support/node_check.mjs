@@ -20,8 +20,8 @@ export function expect(condition, message) {
   process.exit(1);
 }
 
-/// The indexed reader of @mcap/core (`core`) on a file.
-export async function openMcap(core, file) {
+/// The indexed reader of @mcap/core (`core`) on a file. `decompressHandlers`: by name of compression.
+export async function openMcap(core, file, decompressHandlers = {}) {
   const bytes = fs.readFileSync(file);
   return core.McapIndexedReader.Initialize({
     readable: {
@@ -29,5 +29,6 @@ export async function openMcap(core, file) {
       read: async (offset, length) =>
         new Uint8Array(bytes.subarray(Number(offset), Number(offset + length))),
     },
+    decompressHandlers,
   });
 }
