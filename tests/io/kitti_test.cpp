@@ -10,7 +10,6 @@
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
-#include "support/recordings.hpp"
 
 namespace fs = std::filesystem;
 using namespace dynains;
@@ -85,14 +84,6 @@ TEST_CASE("The pose of the sensor is Tr^-1 P Tr") {
   CHECK(recording.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
   // The sensor moved equally: 2 m along its x, -1 m along its y.
   CHECK(recording.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2.0, -1.0, 0.0)));
-}
-
-TEST_CASE("Without times.txt the time of row n is n / 10 s") {
-  TemporaryFolder folder;
-  make_sequence(folder);
-  const Recording recording(folder.path());
-  CHECK(recording.time(0) == 0.0);
-  CHECK(recording.time(2) == Approx(0.2));
 }
 
 TEST_CASE("Scans find their rows by number, or by order in a clip") {
@@ -217,22 +208,4 @@ TEST_CASE("A scan of any size has the same points after it is written and read")
     read_scan(file, read);
     CHECK(read == xyzi);
   }
-}
-
-TEST_CASE("A writer that fails leaves the old file") {
-  TemporaryFolder folder;
-  make_sequence(folder);
-  const std::vector<float> broken(5);
-  CHECK_THAT(message_of<IoError>([&] { write_scan(folder / "velodyne/000000.bin", broken); }),
-             ContainsSubstring("000000.bin: expected 4 floats"));
-  CHECK(read_text(folder / "velodyne/000000.bin") == bytes(32));
-}
-
-TEST_CASE("A real recording opens") {
-  const auto clip = recording_or_skip("kitti_van");
-  if (!clip) return;
-  const Recording recording(*clip);
-  REQUIRE(recording.size() > 1);
-  const std::size_t last = recording.size() - 1;
-  CHECK(recording.read_labels(last).size() * 4 == recording.read_scan(last).xyzi.size());
 }

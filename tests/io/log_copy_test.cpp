@@ -310,34 +310,6 @@ TEST_CASE("A log that ends early is copied up to its end") {
   CHECK(messages[1].second == "other second");
 }
 
-TEST_CASE("A copy that ends early leaves nothing, and what was there before stays") {
-  const TemporaryFolder folder;
-  write_text(folder / "log.mcap", mcap_file(kChannels, five_messages(), {}));
-  const fs::path target = folder / "out" / "copy.mcap";
-  fs::create_directory(folder / "out");
-  for (const bool is_there : {false, true}) {
-    CAPTURE(is_there);
-    if (is_there) write_text(target, "before");
-    CHECK_THROWS_WITH(copy_log(*open_log(folder / "log.mcap"), target, replacing(kReplaced, 40)),
-                      "ended");
-    CHECK(count_entries(folder / "out") == (is_there ? 1 : 0));
-    if (is_there) CHECK(read_text(target) == "before");
-  }
-}
-
-TEST_CASE("A log of several files becomes one file") {
-  const TemporaryFolder folder;
-  const std::vector<WrittenMessage> all = five_messages();
-  const auto part = [&](std::size_t begin, std::size_t end) {
-    const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
-    return mcap_file(kChannels, {at(begin), at(end)}, {});
-  };
-  const fs::path log = folder / "drive";
-  write_text(log / "drive_0.mcap", part(0, 2));
-  write_text(log / "drive_1.mcap", part(2, 5));
-  for (int times = 0; times < 2; ++times) check_copy(log, folder / "copy.mcap");
-}
-
 #if defined(DYNAINS_HAS_SQLITE3)
 TEST_CASE("A database is copied with its messages, definitions and quality of service") {
   const TemporaryFolder folder;

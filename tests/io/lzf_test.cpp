@@ -19,16 +19,6 @@ std::string decode(const std::vector<int>& bytes, std::size_t size) {
 
 }  // namespace
 
-TEST_CASE("LZF: literal bytes") {
-  CHECK(decode({}, 0).empty());
-  CHECK(decode({0, 'a'}, 1) == "a");
-  CHECK(decode({2, 'a', 'b', 'c', 0, 'd'}, 4) == "abcd");
-  // 31 is the last control byte of literals: 32 bytes follow.
-  std::vector<int> longest(33, 'x');
-  longest[0] = 31;
-  CHECK(decode(longest, 32) == std::string(32, 'x'));
-}
-
 TEST_CASE("LZF: copies of earlier output") {
   // 0x20: length 1 + 2 = 3, distance 0 + 2 + 1 = 3.
   CHECK(decode({2, 'a', 'b', 'c', 0x20, 2}, 6) == "abcabc");
@@ -48,16 +38,4 @@ TEST_CASE("LZF: copies of earlier output") {
   }
   far.insert(far.end(), {0x21, 0});
   CHECK(decode(far, 260) == expected + expected.substr(0, 3));
-}
-
-TEST_CASE("LZF: broken streams are refused") {
-  CHECK(decode({3, 'a', 'b'}, 4) == "refused");       // ends within literal bytes
-  CHECK(decode({1, 'a', 'b'}, 1) == "refused");       // more than the target holds
-  CHECK(decode({1, 'a', 'b'}, 3) == "refused");       // less than the target holds
-  CHECK(decode({0, 'a', 0x20, 1}, 4) == "refused");   // from before the beginning
-  CHECK(decode({0x20, 0}, 3) == "refused");           // from before the beginning
-  CHECK(decode({0, 'a', 0x20, 0}, 3) == "refused");   // copy beyond the end of the target
-  CHECK(decode({0, 'a', 0x20}, 4) == "refused");      // no distance
-  CHECK(decode({0, 'a', 0xE0}, 20) == "refused");     // no extra length
-  CHECK(decode({0, 'a', 0xE0, 5}, 15) == "refused");  // extra length, no distance
 }

@@ -225,49 +225,6 @@ TEST_CASE("A shift gives every scan the pose of a neighbour") {
   CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("no pose for any scan"));
 }
 
-TEST_CASE("If a shift leaves no pose, the message names the range of the poses") {
-  const TemporaryFolder folder;
-  write_text(folder / "pcd/1.pcd", pcd({1, 0, 0}, "1 2 3 1 0 0 0"));
-  RecordingOptions options;
-  options.convention.shift = 1;
-  const std::string scans = (folder / "pcd").string();
-  CHECK_THAT(error_of(folder.path(), options), StartsWith(scans + ": has no pose for any scan"));
-  write_text(folder / "poses.txt", tum(1, 10));
-  options.poses = folder / "poses.txt";
-  CHECK_THAT(error_of(folder.path(), options),
-             StartsWith(options.poses.string() + ": has no pose for any scan"));
-}
-
-TEST_CASE("Scans of a KITTI folder have the poses, times and labels of their numbers") {
-  const TemporaryFolder folder;
-  for (const char* name : {"000002", "000003"}) {
-    write_text(folder / ("velodyne/" + std::string(name) + ".bin"), std::string(32, 'a'));
-    write_text(folder / ("labels/" + std::string(name) + ".label"), std::string(8, 'b'));
-  }
-  write_text(folder / "calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 -0.5 1 0 0 0\n");
-  std::string poses;
-  for (const int i : {0, 1, 2, 3, 4}) {
-    poses += "0.8 0 0.6 " + std::to_string(i) + " 0 1 0 2 -0.6 0 0.8 3\n";
-  }
-  write_text(folder / "poses.txt", poses);
-  write_text(folder / "times.txt", "0\n0.11\n0.21\n0.35\n0.4\n");
-  const Recording recording(folder.path());
-  REQUIRE(recording.size() == 2);
-  CHECK(recording.has_labels());
-  Pose Tr = Pose::Identity();
-  Tr.matrix().topRows<3>() << 0, -1, 0, 0.1, 0, 0, -1, -0.5, 1, 0, 0, 0;
-  Pose P = Pose::Identity();
-  P.matrix().topRows<3>() << 0.8, 0, 0.6, 0, 0, 1, 0, 2, -0.6, 0, 0.8, 3;
-  for (const std::size_t i : {0U, 1U}) {
-    P.translation().x() = static_cast<double>(i + 2);
-    CHECK(recording.name(i) == (i == 0 ? "000002" : "000003"));
-    CHECK(recording.time(i) == (i == 0 ? 0.21 : 0.35));
-    CHECK(recording.T_world_sensor(i).isApprox(Tr.inverse() * P * Tr, 1e-15));
-    CHECK(recording.read_scan(i).xyzi.size() == 8);
-    CHECK(recording.read_labels(i) == std::vector<std::uint32_t>(2, 0x62626262));
-  }
-}
-
 TEST_CASE("calib.txt and times.txt are beside the poses or in the folder") {
   const TemporaryFolder folder;
   const fs::path scans = folder / "velodyne";
