@@ -70,11 +70,6 @@ TEST_CASE("labels do not depend on the type of the cloud") {
              for (const auto& p : points) cloud.push_back(p.cast<double>());
              return cloud;
            }) == expected));
-    CHECK((verdicts_of(scans, [](const Points& points) {
-             std::vector<Eigen::Vector4f, Eigen::aligned_allocator<Eigen::Vector4f>> cloud;
-             for (const auto& p : points) cloud.emplace_back(p.x(), p.y(), p.z(), 7.0F);
-             return cloud;
-           }) == expected));
   }
   SECTION("raw numbers of which the coordinates come last") {
     std::vector<float> floats;
@@ -109,13 +104,6 @@ TEST_CASE("labels do not depend on the type of the cloud") {
              Eigen::Matrix3Xf cloud(3, points.size());
              for (std::size_t i = 0; i < points.size(); ++i) {
                cloud.col(static_cast<Eigen::Index>(i)) = points[i];
-             }
-             return cloud;
-           }) == expected));
-    CHECK((verdicts_of(scans, [](const Points& points) {
-             Eigen::Matrix4Xd cloud(4, points.size());
-             for (std::size_t i = 0; i < points.size(); ++i) {
-               cloud.col(static_cast<Eigen::Index>(i)) << points[i].cast<double>(), 1.0;
              }
              return cloud;
            }) == expected));

@@ -215,16 +215,5 @@ TEST_CASE("reflections under the floor do not pull the ground down near the sens
   CHECK_FALSE(ground_of(config, points)[0]);
 }
 
-TEST_CASE("an empty scan, a single point and equal points are segmented") {
-  CHECK(ground_of(GroundConfig(), PointsView()).empty());
-  PointBuffer one;
-  one.push_back(10.0F, 0.0F, -1.7F);
-  CHECK_FALSE(ground_of(GroundConfig(), one)[0]);
-  PointBuffer equal;
-  for (int i = 0; i < 1000; ++i) equal.push_back(10.0F, 0.5F, -1.7F);
-  const std::vector<bool> ground = ground_of(GroundConfig(), equal);
-  CHECK(std::count(ground.begin(), ground.end(), true) == 1000);
-}
-
 }  // namespace
 }  // namespace dynains::test

@@ -211,61 +211,6 @@ TEST_CASE("a push tells why it begins an epoch") {
   CHECK(push(4, 0.1, 100.0) == EpochReason::kStart);
 }
 
-TEST_CASE("a motion is impossible beyond four times gravity, unless such motions are usual") {
-  detail::MotionPrediction motion;
-  const Eigen::Isometry3d T_step(Eigen::Translation3d(1.0, 0.0, 0.0));
-  motion.begin_scan(1.0);
-  CHECK_FALSE(motion.predict(T_step));
-  motion.end_scan(T_step, {});
-  motion.begin_scan(1.1);
-  motion.end_scan(T_step, {});
-  motion.begin_scan(1.3);  // a lost scan: 40 m/s^2 * 0.2 s * 0.15 s, and 0.1 m
-  REQUIRE(motion.predict(T_step));
-  CHECK(motion.predict(T_step)->translation().x() == Approx(3.0));
-  CHECK_FALSE(motion.is_impossible(1.29));
-  CHECK(motion.is_impossible(1.31));
-  for (int i = 0; i < 30; ++i) motion.end_scan(T_step, 1.0);
-  CHECK_FALSE(motion.is_impossible(4.7));
-  CHECK(motion.is_impossible(5.0));
-  motion.clear();
-  CHECK_FALSE(motion.predict(T_step));
-}
-
-TEST_CASE("a rejected motion that repeats is not the wrong one") {
-  detail::MotionPrediction motion;
-  const auto moved_by = [](double x) {
-    return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
-  };
-  motion.begin_scan(1.0);
-  motion.begin_scan(1.1);
-  motion.end_scan(moved_by(0.0), {});
-  motion.begin_scan(1.2);
-  CHECK_FALSE(motion.repeats_rejected(moved_by(2.0)));
-  motion.reject_scan(moved_by(2.0));
-  motion.begin_scan(1.3);  // 40 m/s^2 * 0.1 s * 0.1 s, and 0.1 m
-  CHECK(motion.repeats_rejected(moved_by(2.49)));
-  CHECK(motion.repeats_rejected(moved_by(1.51)));
-  CHECK_FALSE(motion.repeats_rejected(moved_by(2.51)));
-  CHECK_FALSE(motion.repeats_rejected(moved_by(1.49)));
-  CHECK_FALSE(motion.repeats_rejected(moved_by(-2.0)));  // back from a jump
-  CHECK(motion.predict(moved_by(0.0))->translation().x() == 0.0);
-  motion.end_scan(moved_by(2.0), {});
-  motion.begin_scan(1.4);
-  CHECK_FALSE(motion.repeats_rejected(moved_by(2.0)));
-  CHECK(motion.predict(moved_by(0.0))->translation().x() == Approx(2.0));
-}
-
-TEST_CASE("a motion is scaled along its turn") {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::AngleAxisd(0.3, Eigen::Vector3d(0.6, 0.0, 0.8)).toRotationMatrix();
-  T.translation() = Eigen::Vector3d(1.0, -2.0, 0.5);
-  const Eigen::Isometry3d T_double = detail::scaled_motion(T, 2.0);
-  CHECK((T_double.linear() - (T * T).linear()).norm() < 1e-12);
-  CHECK((T_double.translation() - 2.0 * T.translation()).norm() < 1e-12);
-  const Eigen::Isometry3d T_none = detail::scaled_motion(Eigen::Isometry3d::Identity(), 2.0);
-  CHECK((T_none.matrix() - Eigen::Matrix4d::Identity()).norm() == 0.0);
-}
-
 TEST_CASE("a push gives the residual of its pose") {
   const std::vector<SimulatedScan>& scans = street();
   const auto push_all = [&](const DynaInsRemover::Config& config) {

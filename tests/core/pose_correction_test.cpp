@@ -394,45 +394,6 @@ TEST_CASE("traffic that starts together does not correct an exact pose, large ob
   CHECK(correction_by_traffic(1.9, 1.4) > 0.05);
 }
 
-// A plane needs twelve points. Other scans than the first give every second of so many points.
-TEST_CASE("all points of the first scan make its planes") {
-  const std::size_t points_per_voxel = GENERATE(std::size_t{11}, std::size_t{12});
-  constexpr std::size_t kVoxels = 90;  // along each side
-  GroundSplit split;
-  split.resize(kVoxels * kVoxels * points_per_voxel);
-  Random random(9);
-  for (std::size_t i = 0; i < split.count; ++i) {
-    const std::size_t voxel = i / points_per_voxel;
-    const std::size_t row = voxel / kVoxels, column = voxel % kVoxels;
-    split.points.x[i] = static_cast<float>(row) - 45.0F + random.uniform_float(0.1, 0.9);
-    split.points.y[i] = static_cast<float>(column) - 45.0F + random.uniform_float(0.1, 0.9);
-    split.points.z[i] = -1.6F;
-  }
-  PoseCorrection correction = new_correction();
-  correction.begin_epoch(Eigen::Isometry3d::Identity());
-  correction.insert(Eigen::Isometry3d::Identity(), split, {});
-  const Eigen::Isometry3d T =
-      correction.correct(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 0.1)), split);
-  CHECK(correction.residual().has_value() == (points_per_voxel == 12));
-  CHECK(T.translation().z() == Approx(points_per_voxel == 12 ? 0.0 : 0.1).margin(0.01));
-}
-
-TEST_CASE("an error of one pose alone does not last") {
-  const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 8);
-  PoseCorrection correction = new_correction();
-  correction.begin_epoch(scans.front().T_world_sensor);
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const GroundSplit split = split_of(scans[i]);
-    Eigen::Isometry3d T_pushed = scans[i].T_world_sensor;
-    if (i == 5) T_pushed.translation() += Eigen::Vector3d(0.1, 0.3, 0.0);
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
-    correction.insert(T, split, {});
-    INFO("scan " << i);
-    const double error = (T.translation() - scans[i].T_world_sensor.translation()).norm();
-    CHECK(error < (i == 5 ? 0.035 : 0.002));
-  }
-}
-
 TEST_CASE("a scan of another place is lost, and a scan without points has no residual") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 4);
   const std::vector<SimulatedScan> others = drive(Scene::kVegetation, Sensor::kHdl64, 1);
@@ -533,33 +494,6 @@ TEST_CASE("a block of points makes the planes of its single points") {
   REQUIRE(expected.size() > 1500);
   CHECK(planes_of(7) == expected);
   CHECK(planes_of(VoxelPlanes::Block::kMost) == expected);
-}
-
-TEST_CASE("a full map of planes forgets the oldest voxels") {
-  VoxelPlanes planes;
-  planes.reserve();
-  for (int scan = 0; scan < 400; ++scan) {
-    planes.begin_scan(Pose(Eigen::Translation3d(scan, 50.0, 30.0)));
-    VoxelPlanes::Block block;
-    for (int y = 0; y < 100; ++y) {
-      for (int k = 0; k < 12; ++k) {
-        block.push_back(Eigen::Isometry3d::Identity(), scan + 0.1 + 0.06 * k,
-                        y + 0.1 + 0.06 * (k * 5 % 12), 0.2);
-        if (block.is_full()) planes.add(block);
-      }
-    }
-    planes.add(block);
-    REQUIRE(planes.size() <= VoxelPlanes::kMostVoxels);
-  }
-  VoxelPlanes::Block asked;
-  asked.push_back(Eigen::Isometry3d::Identity(), 0.5, 50.5, 0.7);    // oldest
-  asked.push_back(Eigen::Isometry3d::Identity(), 399.5, 50.5, 0.7);  // newest
-  std::vector<std::size_t> found;
-  planes.find(asked, [&](std::size_t i, const VoxelPlanes::Plane& plane) {
-    found.push_back(i);
-    CHECK(plane.distance(asked.points[i]) == Approx(0.5));
-  });
-  CHECK(found == std::vector<std::size_t>{1});
 }
 
 }  // namespace

@@ -94,28 +94,6 @@ class Credulous : public BeliefUpdater {
   bool is_dynamic() const { return true; }
 };
 
-// Has its own parameters for the paper.
-class PaperBelief : public BeliefUpdater {
- public:
-  struct Config : BeliefUpdater::Config {
-    static Config paper() {
-      Config config;
-      config.tau_p = 0.625;
-      return config;
-    }
-  };
-  using BeliefUpdater::BeliefUpdater;
-};
-struct OwnBelief : DefaultStages {
-  using Belief = PaperBelief;
-};
-
-TEST_CASE("a stage of the user has its own parameters for the paper") {
-  using Remover = BasicDynaInsRemover<OwnBelief>;
-  CHECK(Remover::Config::paper().belief.tau_p == 0.625);
-  CHECK(Remover::Config().belief.tau_p == BeliefUpdater::Config().tau_p);
-}
-
 // Stages that store the sensor model that adapt() gives them.
 class ToldGround : public GroundSegmenter {
  public:

@@ -118,17 +118,6 @@ TEST_CASE("a point on a voxel border belongs to the upper voxel") {
          std::vector<Coordinates>{{-0.5, 0, 0}, {0, 0, 0}, {0.5, 0, 0}, {1, 0, 0}}));
 }
 
-TEST_CASE("resolution 0 keeps every point") {
-  StaticMapAccumulator map = make_map(0.0);
-  Random random(5);
-  const PointBuffer points = grid_points(random, 3000, 3.0);
-  for (int i = 0; i < 3; ++i) map.insert(points, {}, Eigen::Isometry3d::Identity());
-  CHECK(map.size() == 9000);
-  std::size_t visited = 0;
-  map.for_each([&](const Eigen::Vector3d&) { ++visited; });
-  CHECK(visited == 9000);
-}
-
 TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
   StaticMapAccumulator map = make_map(0.0);
   Random random(11);
@@ -236,22 +225,6 @@ TEST_CASE("every stored point is found at its place, for any rounding of floats"
   });
   CHECK(map.size() > 90000);
   CHECK(lost == 0);
-}
-
-TEST_CASE("a cleared map is empty and can be filled again") {
-  StaticMapAccumulator map = make_map(0.25);
-  CHECK(map.empty());
-  Random random(17);
-  const PointBuffer points = grid_points(random, 500, 10.0);
-  map.insert(points, {}, Eigen::Isometry3d::Identity());
-  const std::vector<Coordinates> before = sorted_points(map);
-  CHECK(map.memory_bytes() > before.size() * 3 * sizeof(float));
-  map.clear();
-  CHECK(map.empty());
-  CHECK(map.memory_bytes() == 0);
-  CHECK(sorted_points(map).empty());
-  map.insert(points, {}, Eigen::Isometry3d::Identity());
-  CHECK((sorted_points(map) == before));
 }
 
 }  // namespace
