@@ -95,25 +95,6 @@ TEST_CASE("a Mid-360 looks all around, from 7 degrees down to 52 degrees up") {
   CHECK(*std::min_element(std::begin(sectors), std::end(sectors)) > 1200);
 }
 
-TEST_CASE("rings drawn from the seed have 16 to 128 beams, a raster looks forward") {
-  std::set<std::size_t> counts;
-  for (std::uint64_t seed = 0; seed < 12; ++seed) {
-    Config config = world(Scene::kHall, Sensor::kRings, 1);
-    config.seed = seed;
-    config.dropout = 0;
-    const SimulatedScan scan = Simulator(config).scan(0);
-    counts.insert(scan.labels.size() / 1000);
-  }
-  CHECK(counts.size() > 4);
-  CHECK(*counts.begin() < 40);
-  CHECK(*counts.rbegin() > 60);
-
-  const SimulatedScan raster = Simulator(world(Scene::kHall, Sensor::kRaster, 1)).scan(0);
-  for (std::size_t i = 0; i < raster.labels.size(); ++i) {
-    CHECK_FALSE(std::atan2(std::abs(raster.xyzi[4 * i + 1]), raster.xyzi[4 * i]) > 1.06F);
-  }
-}
-
 TEST_CASE("lost packets take their share of the columns, whole columns each") {
   Config config = world(Scene::kHall, Sensor::kVlp16, 1);
   config.dropout = 0;
@@ -213,67 +194,6 @@ TEST_CASE("de-skewing takes the motion within a scan away as far as it is known"
   };
   CHECK(error(1) < 0.15);   // another side of the pole is seen
   CHECK(error(0.5) > 0.3);  // of up to 2 m
-}
-
-/// Labels and headings of the doors of cars, which are 1.05 m long, over a recording.
-struct Doors {
-  std::set<std::uint32_t> labels;
-  std::map<std::uint32_t, std::pair<double, double>> headings;  // least and largest of an instance
-};
-
-Doors doors_of(const Config& config) {
-  Doors doors;
-  Simulator simulator(config);
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    for (const ObjectState& object : simulator.scan(i).objects) {
-      if (std::abs(object.length - 1.05) > 1e-9) continue;
-      doors.labels.insert(object.label);
-      const Eigen::Isometry3d& T = object.T_world_object;
-      const double heading = std::atan2(T(1, 0), T(0, 0));
-      const auto range = doors.headings.emplace(object.instance, std::pair(heading, heading)).first;
-      range->second = {std::min(range->second.first, heading),
-                       std::max(range->second.second, heading)};
-    }
-  }
-  return doors;
-}
-
-TEST_CASE("doors of parked cars open, and are moving objects while they swing") {
-  Config config = world(Scene::kCarPark, Sensor::kVlp16, 50);
-  config.rate = 5;
-  CHECK(doors_of(config).headings.empty());
-  config.clutter = 1.5;
-  const Doors doors = doors_of(config);
-  REQUIRE(doors.headings.size() >= 2);
-  CHECK(doors.labels == std::set<std::uint32_t>{252});
-  std::size_t wide = 0;
-  for (const auto& door : doors.headings) {
-    const double turn = door.second.second - door.second.first;
-    wide += turn > 0.9 && turn < 1.2;
-  }
-  CHECK(wide > 0);
-  config.labelling = Labelling::kInstant;
-  CHECK(doors_of(config).labels == std::set<std::uint32_t>{10, 252});
-}
-
-TEST_CASE("in long recordings vehicles wait and go, with both truths") {
-  Config config = world(Scene::kMixed, Sensor::kVlp16, 100);
-  config.rate = 2;
-  config.ego_speed = 2;
-  config.labelling = Labelling::kInstant;
-  Simulator simulator(config);
-  std::map<std::uint32_t, std::pair<int, int>> scans;  // standing before the first motion, moving
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    for (const ObjectState& object : simulator.scan(i).objects) {
-      if (object.length < 3) continue;
-      auto& [standing, moving] = scans[object.instance];
-      ++(object.label >= 252 ? moving : standing);
-    }
-  }
-  const auto waits_and_goes = [](const auto& one) {
-    return one.second.first > 16 && one.second.second > 4;  // 8 s, 2 s
-  };
-  CHECK(std::count_if(scans.begin(), scans.end(), waits_and_goes) >= 2);
 }
 
 TEST_CASE("the drift of written poses grows with the way") {

@@ -63,23 +63,6 @@ TEST_CASE("rendering by solid angle gives the result of testing all pairs") {
   }
 }
 
-TEST_CASE("a wall hides everything behind it") {
-  BeamTable beams;
-  beams.fill(sensor_model(Sensor::kHdl64), 1, 0);
-  Renderer renderer;
-  renderer.start(beams, 100, 1);
-  renderer.add(make_primitive(Shape::kBox, kSurface, {20, 0, 0}, {0.5F, 1, 1}), 1, 0);
-  renderer.add(make_primitive(Shape::kBox, kSurface, {10, 0, 0}, {0.5F, 10, 10}), 2, 0);
-  renderer.draw();
-  std::size_t wall = 0;
-  for (const Renderer::Hit& hit : renderer.hits()) {
-    if (hit.drawn == nullptr) continue;
-    CHECK(hit.drawn->label == 2);
-    ++wall;
-  }
-  CHECK(wall > 1000);
-}
-
 TEST_CASE("porous shapes let the expected share of beams through") {
   // A ball of radius 2 and density 0.5 / m, met in the middle over 4 m: exp(-2) = 13.5 % pass.
   const Material leaves{70, 0.3F, 0, 0.5F, 0, 0, 0};

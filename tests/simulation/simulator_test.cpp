@@ -329,38 +329,6 @@ TEST_CASE("a person turns the sensor by up to 40 degrees per second and sways, a
   CHECK(vehicle.bob < 0.005);
 }
 
-TEST_CASE("the ego vehicle stands for the time of halt, in the middle of the sequence") {
-  Config config = small(Scene::kStatic, Sensor::kVlp16, 160, 2);
-  config.halt = 8;
-  Simulator simulator(config);
-  std::size_t standing = 0;
-  for (std::size_t i = 1; i < simulator.size(); ++i) {
-    const Eigen::Vector3d step = simulator.scan(i).T_world_sensor.translation() -
-                                 simulator.scan(i - 1).T_world_sensor.translation();
-    standing += step.head<2>().norm() < 0.005;
-  }
-  CHECK(standing > 25);  // of 80, because it brakes first
-  CHECK(standing < 80);
-  config.halt = 0;
-  Simulator driving(config);
-  CHECK((driving.scan(81).T_world_sensor.translation() -
-         driving.scan(80).T_world_sensor.translation())
-            .norm() > 0.3);
-}
-
-TEST_CASE("open foliage lets more beams pass than solid foliage") {
-  const auto returns = [](Foliage foliage) {
-    Config config = small(Scene::kVegetation, Sensor::kHdl64, 1, 3);
-    config.foliage = foliage;
-    const SimulatedScan scan = Simulator(config).scan(0);
-    return std::count_if(scan.labels.begin(), scan.labels.end(),
-                         [](std::uint32_t label) { return class_of(label) == 70; });
-  };
-  const auto open = returns(Foliage::kOpen);
-  CHECK(open > 2000);
-  CHECK(5 * open < 4 * returns(Foliage::kSolid));
-}
-
 TEST_CASE("direction noise moves points across their beams by its deviation") {
   Config config = small(Scene::kStatic, Sensor::kVlp16, 1, 2);
   const SimulatedScan exact = Simulator(config).scan(0);
@@ -375,27 +343,6 @@ TEST_CASE("direction noise moves points across their beams by its deviation") {
   }
   const double deviation = std::sqrt(sum / static_cast<double>(exact.labels.size()));
   CHECK(deviation * 57.29578 == Approx(0.1).epsilon(0.03));
-}
-
-TEST_CASE("hall and garage have a ceiling over the sensor, a forest has trunks all around") {
-  const auto above = [](Scene scene) {
-    const SimulatedScan scan = Simulator(small(scene, Sensor::kOs0_128, 1, 3)).scan(0);
-    std::size_t sectors[8] = {};
-    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-      const float* p = &scan.xyzi[4 * i];
-      if (p[2] < 0.8F || p[2] > 7 || p[0] * p[0] + p[1] * p[1] > 36) continue;
-      const double turn = (std::atan2(p[1], p[0]) / 3.14160 + 1) / 2;
-      ++sectors[static_cast<std::size_t>(8 * turn)];
-    }
-    return *std::min_element(std::begin(sectors), std::end(sectors));
-  };
-  CHECK(above(Scene::kHall) > 100);
-  CHECK(above(Scene::kGarage) > 100);
-  CHECK(above(Scene::kStatic) < 100);
-
-  const SimulatedScan forest = Simulator(small(Scene::kForest, Sensor::kOs0_128, 1, 3)).scan(0);
-  CHECK(std::count_if(forest.labels.begin(), forest.labels.end(),
-                      [](std::uint32_t label) { return class_of(label) == 71; }) > 1000);
 }
 
 TEST_CASE("the sensor is at its height over the ground") {
