@@ -26,13 +26,6 @@ def test_scores_worked_by_hand():
     assert most["AA"] == pytest.approx(math.sqrt(100 * 50))
 
 
-def test_rows_for_comparison():
-    rows = dynains.evaluate([POINTS], [np.eye(4)], [MOVES], [~MOVES])
-    assert set(rows) == {"identity", "oracle", "estimate"}
-    assert (rows["identity"]["PR"], rows["identity"]["RR"]) == (100, 0)
-    assert rows["oracle"] == pytest.approx(rows["estimate"], nan_ok=True)
-
-
 def test_truth_is_flags_or_labels():
     labels = np.array([40, 50 | 7 << 16, 252 | 3 << 16, 259], np.uint32)
     kept = [True, False, True, False]
@@ -42,15 +35,6 @@ def test_truth_is_flags_or_labels():
     assert score(kept, MOVES.tolist()) == expected
     # Without class 259 the last point is static, and is lost.
     assert score(kept, labels, dynamic_classes="252-258")["PR"] == pytest.approx(100 / 3)
-
-
-def test_nothing_removed_is_the_identity_on_a_street(street):
-    points = [scan.points for scan in street]
-    poses = [scan.T_world_sensor for scan in street]
-    truth = [scan.labels for scan in street]
-    rows = dynains.evaluate(points, poses, truth, [np.ones(len(p), bool) for p in points])
-    assert rows["estimate"] == rows["identity"]
-    assert rows["oracle"]["F1"] > 0.99
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import textwrap
 from pathlib import Path
 
 import dynains
-import numpy as np
 import pytest
 
 FOLDER = Path(dynains.__file__).parent
@@ -145,12 +144,3 @@ def test_every_object_says_what_it_holds(street):
     assert repr(dynains.Simulator("car-park", "vlp16", scans=3, seed=5)) == (
         "<dynains.Simulator: 3 scans of scene car-park, sensor vlp16, seed 5>"
     )
-
-
-def test_the_dynamic_points_of_a_verdict_are_counted(street):
-    remover = dynains.DynaInsRemover()
-    for scan in street:
-        remover.push(scan.points, scan.T_world_sensor, scan.time)
-    verdict = remover.flush()[-1]
-    dynamic = int(np.sum(verdict.labels == dynains.Label.DYNAMIC))
-    assert repr(verdict).endswith(f"{dynamic} dynamic>")

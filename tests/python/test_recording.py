@@ -1,5 +1,4 @@
 import os
-import shutil
 import subprocess
 
 import dynains
@@ -19,21 +18,13 @@ def test_a_recording_is_a_sequence_of_scans(drive, street):
     np.testing.assert_allclose(recording.times, [scan.time for scan in street])
     np.testing.assert_array_equal(recording.poses[3], recording[3].T_world_sensor)
     assert recording.has_labels
+    scan = recording[0]
+    assert np.shares_memory(scan.intensity, scan.points)
+    assert scan.rings is None and scan.times is None
     assert (recording.missing_poses, recording.early_end, recording.frame) == (0, None, "sensor")
     assert recording.path == drive and "poses from poses.txt" in recording.notes
     with pytest.raises(IndexError):
         recording[len(street)]
-
-
-def test_a_recorded_scan_goes_into_the_remover_as_it_is(drive):
-    scan = dynains.Recording(str(drive))[0]
-    frame = dynains.DynaInsRemover().push(scan.points, scan.T_world_sensor, scan.time)
-    assert len(frame.newest.labels) == len(scan.points)
-    assert scan.points.dtype == np.float32 and scan.points.shape[1] == 4
-    assert np.shares_memory(scan.intensity, scan.points)
-    np.testing.assert_array_equal(scan.intensity, scan.points[:, 3])
-    assert scan.rings is None and scan.times is None
-    assert scan.labels is scan.labels
 
 
 def write_pcd(file, points):
@@ -55,27 +46,6 @@ def test_columns_and_poses_of_pcd_files(tmp_path):
     assert scan.times.dtype == np.float64 and scan.times.tolist() == [0, 0.5, 1, 1.5]
     assert scan.intensity is None and scan.labels is None
     assert scan.T_world_sensor[:3, 3].tolist() == [7, 0, 0]
-
-
-@pytest.mark.parametrize(
-    "name, write",
-    [
-        ("npy", lambda file, points: np.save(file, points)),
-        ("xyz", lambda file, points: np.savetxt(file, points)),
-        (
-            "csv",
-            lambda file, points: np.savetxt(file, points, delimiter=",", header="x,y,z", comments=""),
-        ),
-    ],
-)
-def test_other_formats(tmp_path, name, write):
-    points = np.random.default_rng(1).uniform(-20, 20, (50, 3)).astype(np.float32)
-    for i in range(3):
-        write(tmp_path / f"{i}.{name}", points)
-    np.savetxt(tmp_path / "poses.txt", np.tile(np.eye(4)[:3].ravel(), (3, 1)))
-    recording = dynains.Recording(tmp_path, frame="sensor")
-    assert len(recording) == 3
-    np.testing.assert_allclose(recording[2].points[:, :3], points, rtol=1e-6)
 
 
 def test_what_the_files_mean_is_told_by_name(drive):
@@ -162,17 +132,6 @@ def test_a_log_that_is_cut_off(log, tmp_path):
     with pytest.warns(RuntimeWarning, match="scans before it are read"):
         recording = dynains.Recording(tmp_path / "cut.mcap")
     assert 0 < len(recording) < 12 and "cut.mcap" in recording.early_end
-
-
-def test_parts_of_a_log_that_are_missing(log, tmp_path):
-    (tmp_path / "log").mkdir()
-    shutil.copy(log, tmp_path / "log" / "part_0.mcap")
-    (tmp_path / "log" / "metadata.yaml").write_text(
-        "rosbag2_bagfile_information:\n  relative_file_paths:\n"
-        "    - part_0.mcap\n    - part_1.mcap\n"
-    )
-    with pytest.warns(RuntimeWarning, match="part_1.mcap"):
-        dynains.Recording(tmp_path / "log", accept_missing=True, cloud_topic="/points")
 
 
 def test_check_of_a_good_recording(drive):

@@ -34,9 +34,6 @@ def test_every_scan_gets_one_final_verdict(street, verdicts):
         assert verdict.causes.dtype == np.uint8
         assert verdict.time == scan.time
         np.testing.assert_allclose(verdict.T_world_sensor, scan.T_world_sensor, atol=1e-9)
-
-
-def test_something_moves_and_most_does_not(verdicts):
     labels = np.concatenate([verdict.labels for verdict in verdicts])
     assert (labels == Label.DYNAMIC).any()
     assert dynains.is_static(labels).mean() > 0.5
@@ -95,11 +92,6 @@ def test_reset_starts_again(street, verdicts):
     assert frame.newest.scan == 0
 
 
-def test_the_first_pose_has_no_residual(identity):
-    remover = dynains.DynaInsRemover()
-    assert remover.push(np.ones((10, 3)), identity).pose_residual is None
-
-
 def test_a_residual_names_its_scan_and_odd_times_are_doubted(street, identity):
     remover = dynains.DynaInsRemover()
     scans = list(street)
@@ -119,6 +111,7 @@ def test_a_residual_names_its_scan_and_odd_times_are_doubted(street, identity):
     assert window["suspicion"] is None and window["since"] == 0 and window["misfits"] == 0
     shares = [window["not_judged"], window["ground_free"], window["instance_free"]]
     assert all(0 <= share < 1 for share in shares) and 0 <= window["residual"] < 0.05
+    assert frames[0].pose_residual is None
     assert frames[0].began_epoch is not None and frames[-1].began_epoch is None
     for unit, doubt in [(1e3, "too slow"), (1e-3, "too fast")]:
         remover = dynains.DynaInsRemover()
@@ -151,26 +144,11 @@ def test_times_are_optional_and_stages_are_timed(identity):
     assert all(milliseconds >= 0 for milliseconds in frame.times.values())
 
 
-def test_bad_points_get_a_label(identity):
-    nan, far = np.nan, 1e6
-    points = np.array([[nan, 0, 0], [0, 0, 0], [far, 0, 0], [1, 0, 0], [5, 0, 1]], np.float32)
-    labels = dynains.DynaInsRemover(min_range=2.0).push(points, identity).newest.labels
-    assert list(labels[:4]) == [Label.INVALID, Label.INVALID, Label.OUT_OF_RANGE, Label.OUT_OF_RANGE]
-    assert dynains.is_static(labels).tolist() == [False, False, False, False, True]
-
-
-def test_an_empty_scan_is_a_scan(identity):
-    frame = dynains.DynaInsRemover().push(np.empty((0, 3)), identity)
-    assert frame.newest.labels.shape == (0,)
-
-
 @pytest.mark.parametrize(
     "points, error, text",
     [
         (np.zeros((3, 2), np.float32), dynains.CloudError, r"shape \(3, 2\)"),
         (np.zeros(9, np.float32), dynains.CloudError, r"shape \(9,\)"),
-        (np.zeros((9, 2)), dynains.CloudError, r"shape \(9, 2\), expected \(N, 3\), or \(N, 4\)"),
-        (np.zeros((3, 900)), dynains.CloudError, r"shape \(3, 900\), expected \(N, 3\).*transpose"),
         (np.zeros((4, 65)), dynains.CloudError, r"shape \(4, 65\), expected \(N, 3\).*transpose"),
         (np.zeros((2, 3, 3)), dynains.CloudError, r"shape \(2, 3, 3\)"),
         ([[1.0, 2.0, 3.0]], TypeError, "^points are list, expected a NumPy array"),
@@ -201,9 +179,9 @@ def test_bad_poses_are_refused_and_change_nothing(pose, text):
 
 
 def test_a_point_may_have_many_columns(identity):
-    for columns in 3, 4, 10, 64:
-        points = np.ones((4, columns), np.float32)
-        assert dynains.DynaInsRemover().push(points, identity).newest.labels.shape == (4,)
+    for shape in (4, 3), (4, 4), (4, 10), (4, 64), (0, 3):
+        points = np.ones(shape, np.float32)
+        assert dynains.DynaInsRemover().push(points, identity).newest.labels.shape == shape[:1]
 
 
 def test_poses_may_be_lists_but_nothing_else_than_numbers():
@@ -212,13 +190,6 @@ def test_poses_may_be_lists_but_nothing_else_than_numbers():
     for pose in "north", [[1, 0], [0]]:
         with pytest.raises(TypeError, match=r"^a pose is (str|list), expected \(4, 4\) numbers"):
             remover.push(np.ones((5, 3)), pose)
-
-
-def test_time_must_increase(identity):
-    remover = dynains.DynaInsRemover()
-    remover.push(np.ones((5, 3)), identity, 1.0)
-    with pytest.raises(dynains.PoseError, match="greater than"):
-        remover.push(np.ones((5, 3)), identity, 1.0)
 
 
 def test_push_lets_other_threads_run(street):

@@ -10,7 +10,6 @@ import warnings
 from html.parser import HTMLParser
 
 import dynains
-import numpy as np
 import pytest
 
 
@@ -34,21 +33,6 @@ def test_a_run_writes_its_results(drive, finished, street):
         assert file.is_file(), file
     assert len(read_labels(finished.folder)) == len(street) == len(list(finished.labels.iterdir()))
     assert repr(finished) == f"<dynains.RunResult: {len(street)} scans in {finished.folder}>"
-
-
-def test_labels_of_a_run_are_those_of_the_remover(drive, finished):
-    # A run finds the range of the own body.
-    remover = dynains.DynaInsRemover(min_range=finished.report["configuration"]["min_range"])
-    scans = list(dynains.Recording(drive))
-    verdicts = []
-    for scan in scans:
-        frame = remover.push(scan.points, scan.T_world_sensor, scan.time)
-        verdicts += [frame.finished] if frame.finished else []
-    verdicts += remover.flush()
-    for name, verdict in zip(sorted(read_labels(finished.folder)), verdicts):
-        written = np.fromfile(finished.labels / name, np.uint32) & 0xFFFF
-        np.testing.assert_array_equal(written == 251, verdict.labels == dynains.Label.DYNAMIC)
-        np.testing.assert_array_equal(written == 9, dynains.is_static(verdict.labels))
 
 
 def test_arguments_by_name(drive, tmp_path):
@@ -107,14 +91,6 @@ def test_arguments_are_checked_before_the_recording_is_read(tmp_path):
         dynains.run(tmp_path / "nowhere", tmp_path / "out", map="map.txt")
     with pytest.raises(dynains.IoError, match="nowhere"):
         dynains.run(tmp_path / "nowhere", tmp_path / "out")
-
-
-def test_earlier_results_stay_unless_they_are_replaced(drive, finished):
-    before = read_labels(finished.folder)
-    with pytest.raises(dynains.IoError, match="holds earlier results"):
-        dynains.run(drive, finished.folder)
-    dynains.run(drive, finished.folder, view=True, force=True)
-    assert read_labels(finished.folder) == before
 
 
 def test_presets(drive, tmp_path):
@@ -216,13 +192,6 @@ def test_runs_in_threads(drive, finished, tmp_path):
     for i in range(2):
         assert read_labels(tmp_path / str(i)) == read_labels(finished.folder)
     assert_python_has_the_signals_back()
-
-
-def test_a_run_of_one_thread_has_the_same_results(drive, finished, tmp_path):
-    result = dynains.run(drive, tmp_path / "out", one_thread=True)
-    assert read_labels(result.folder) == read_labels(finished.folder)
-    with pytest.raises(dynains.ConfigError, match=r"one_thread = 2: expected true\|false"):
-        dynains.run(drive, tmp_path / "other", one_thread=2)
 
 
 class Frames(HTMLParser):

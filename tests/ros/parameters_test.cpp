@@ -119,13 +119,5 @@ TEST_CASE("floats are declared as they are written") {
   CHECK(static_cast<float>(detail::decimal_value(1.0F / 3.0F)) == 1.0F / 3.0F);
 }
 
-TEST_CASE("presets have names") {
-  CHECK(RemoverConfig::preset("paper").decision == dynains::Decision::kWindow);
-  for (const char* name : {"default", "published", "offline", "odometry"}) {
-    CHECK_NOTHROW(RemoverConfig::preset(name).validate());
-  }
-  CHECK_THROWS_AS(RemoverConfig::preset("Paper"), dynains::ConfigError);
-}
-
 }  // namespace
 }  // namespace dynains_ros

@@ -149,16 +149,6 @@ TEST_CASE("a worker works when it is woken, and ends at once") {
   CHECK(steps == 2);
 }
 
-TEST_CASE("a worker works again after the time that its step asked for") {
-  std::atomic<int> steps{0};
-  const Worker worker([&] {
-    ++steps;
-    return Worker::Wait(1);
-  });
-  while (steps < 3) std::this_thread::yield();
-  SUCCEED();
-}
-
 TEST_CASE("a slow reader gets the newest value, and the sender does not wait") {
   std::atomic<bool> is_stuck{true};
   std::atomic<int> begun{0};

@@ -230,49 +230,6 @@ TEST_CASE("without transforms nothing is cleaned, the node tells why, and goes o
   CHECK(Robot::wait_for([&] { return robot.static_counts().size() == 1; }));
 }
 
-TEST_CASE("a clock that jumps backwards starts the node anew") {
-  start_ros();
-  Robot robot("jump");
-  const std::vector<Scan> drive = scans(8);
-  const auto play = [&](double begin) {
-    for (const Scan& scan : drive) {
-      robot.send_pose(scan, begin + scan.time);
-      robot.send_cloud(scan, begin + scan.time);
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-  };
-  play(100.0);
-  CHECK(Robot::wait_for([&] { return robot.static_counts().size() == 8; }));
-  play(50.0);  // the first two clouds tell of the jump; they and their poses may be lost
-  CHECK(Robot::wait_for([&] { return robot.was_told("resets since the start = 1"); }));
-  CHECK(Robot::wait_for([&] { return robot.static_counts().size() >= 14; }));
-}
-
-TEST_CASE("two components work in one process, one on what the other one publishes") {
-  start_ros();
-  Robot robot("first");
-  robot.add_remover("second", "/first/static");
-  std::atomic<std::int64_t> newest{0};
-  std::atomic<std::size_t> points{0};
-  const auto reader = robot.node().create_subscription<Cloud>(
-      "/second/static", rclcpp::SensorDataQoS(), [&](const Cloud& cloud) {
-        points = cloud.width;
-        newest = rclcpp::Time(cloud.header.stamp).nanoseconds();
-      });
-  REQUIRE(Robot::wait_for([&] { return reader->get_publisher_count() > 0; }));
-  double stamp = 100.0;
-  for (const Scan& scan : scans(6)) {
-    stamp = 100.0 + scan.time;
-    robot.send_pose(scan, stamp);
-    robot.send_cloud(scan, stamp);
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
-  const std::int64_t last = nanoseconds(stamp);
-  CHECK(Robot::wait_for([&] { return robot.static_counts().count(last) > 0 && newest == last; }));
-  CHECK(points > 0);
-  CHECK(points <= robot.static_counts()[last]);
-}
-
 TEST_CASE("parameters have their bounds, and are fixed while the node runs") {
   start_ros();
   const auto start = [](const rclcpp::Parameter& parameter) {
