@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "dynains/city/session_writer.hpp"
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
+#include "reliability/tree.hpp"
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
 #include "support/visibility.hpp"
@@ -92,21 +92,6 @@ std::map<std::uint32_t, std::size_t> label_counts(const City& city,
     });
   }
   return counts;
-}
-
-/// Path and content of every file below a folder.
-std::map<std::string, std::string> files_below(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) {
-      files[entry.path().string()] = "folder";
-      continue;
-    }
-    std::ifstream file(entry.path(), std::ios::binary);
-    files[entry.path().string()] =
-        std::string(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
-  }
-  return files;
 }
 
 void change_byte(const fs::path& path, std::streamoff at) {
@@ -401,7 +386,7 @@ TEST_CASE("a city: a dropped session leaves the bytes of never having had it") {
 TEST_CASE("a city: the same session twice is refused") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", {kDays[0]});
-  const auto before = files_below(city.folder());
+  const auto before = test::read_tree(city.folder());
   CHECK_THROWS_AS(add(city, kDays[0]), UsageError);
   SessionInfo again;
   again.name = "another";
@@ -411,7 +396,7 @@ TEST_CASE("a city: the same session twice is refused") {
   SessionInfo nameless;
   nameless.name = "../monday";
   CHECK_THROWS_AS(SessionWriter(city, nameless, store), ConfigError);
-  CHECK(files_below(city.folder()) == before);
+  CHECK(test::read_tree(city.folder()) == before);
 }
 
 TEST_CASE("a city: another grid or version is refused") {
@@ -480,7 +465,7 @@ TEST_CASE("a city: every damage is named by path and position") {
 TEST_CASE("a city: a session that is not committed changes nothing") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", {kDays[0]});
-  const auto before = files_below(city.folder());
+  const auto before = test::read_tree(city.folder());
   SessionInfo info;
   info.name = "tuesday";
   MemoryStore store;
@@ -497,7 +482,7 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
   }
   City changed = city;
   changed.drop("wednesday");
-  CHECK(files_below(city.folder()) == before);
+  CHECK(test::read_tree(city.folder()) == before);
 
   // As left by a killed process.
   const fs::path stale = city.folder() / ".tuesday.session.0123456789abcdef.tmp";

@@ -107,27 +107,6 @@ TEST_CASE("The best of several guesses counts") {
   CHECK(error_from({Pose::Identity(), motion({3.0, 0.0, 0.0}, 0.0)}) < 0.005);
 }
 
-TEST_CASE("A scan of another place does not fit") {
-  const SurfaceGrid map = map_of(corridor(true, 1, 20000));
-  std::mt19937 random(3);
-  Points scan;
-  for (int i = 0; i < 2000; ++i) {
-    const auto coordinate = [&] { return 0.04 * static_cast<double>(random() % 1000); };
-    scan.emplace_back(coordinate(), coordinate(), coordinate());
-  }
-  const auto found = register_scans(map, scan, {Pose::Identity()});
-  CHECK((found ? found->score : 0.0) < 0.3);
-  CHECK_FALSE(register_scans(SurfaceGrid(), scan, {Pose::Identity()}));
-}
-
-TEST_CASE("What is far is forgotten") {
-  const Points points = corridor(true, 1, 20000);
-  SurfaceGrid map = map_of(points);
-  map.forget_beyond({-20.0, 0.0, 0.0}, 15.0);
-  CHECK(map.find(2, {-15.3, 0.3, -1.5}) != nullptr);
-  CHECK(map.find(2, {15.3, 0.3, -1.5}) == nullptr);
-}
-
 TEST_CASE("An upright pole is a surface; a ring of the sensor is none") {
   SurfaceGrid map;
   for (int i = 0; i < 20; ++i) map.insert({5.0, 0.0, 0.125 * i});
@@ -135,35 +114,6 @@ TEST_CASE("An upright pole is a surface; a ring of the sensor is none") {
   REQUIRE(map.find(2, {5.1, 0.1, 1.1}) != nullptr);
   CHECK(map.find(2, {5.1, 0.1, 1.1})->direction_count == 2);
   CHECK(map.find(2, {0.1, 21.1, 0.0}) == nullptr);
-}
-
-TEST_CASE("Points are moved by the motion between their time and the mean time") {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::vector<float> xyz = {5.0F, 0.0F, 1.0F, 5.0F, 0.0F, 1.0F,
-                                  5.0F, 0.0F, 1.0F, 0.0F, 0.0F, 0.0F};
-  const std::vector<double> offsets = {0.25, 0.1, nan, 0.05};
-  Pose T = Pose::Identity();
-  T.translation().x() = 2.0;
-  T.linear() = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  ScanPreparation preparation(1.0, 100.0);
-  preparation.take({xyz.data(), 4, 3}, offsets);
-  CHECK(preparation.mean_offset() == Approx(0.175));  // of returns with a time
-  const auto point = [&](std::size_t i) {
-    return Eigen::Vector3f(preparation.cloud().data + 3 * i).cast<double>().eval();
-  };
-  for (int turn = 0; turn < 2; ++turn) {  // from the points as they were measured
-    preparation.prepare(T, 0.15);
-    const Eigen::Vector3d after(1.0 + 5.0 * std::cos(0.1), 5.0 * std::sin(0.1), 1.0);
-    CHECK((point(0) - after).norm() < 1e-5);
-    const Eigen::Vector3d before(-1.0 + 5.0 * std::cos(0.1), -5.0 * std::sin(0.1), 1.0);
-    CHECK((point(1) - before).norm() < 1e-5);
-    CHECK(point(2) == Eigen::Vector3d(5.0, 0.0, 1.0));
-    CHECK(point(3).isZero(0.0));
-  }
-  preparation.take({xyz.data(), 4, 3}, {});
-  preparation.prepare(T, 0.1);
-  CHECK(preparation.mean_offset() == 0.0);
-  CHECK(point(0) == Eigen::Vector3d(5.0, 0.0, 1.0));
 }
 
 }  // namespace

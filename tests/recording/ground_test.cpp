@@ -8,29 +8,6 @@
 
 using namespace dynains;
 
-TEST_CASE("the ground of a cell is the mean of its ground points, if there are enough") {
-  for (const int count : {19, 20}) {
-    MemoryStore store;
-    RecordingGround ground(store, 0);
-    Pose T_world_sensor = Pose::Identity();
-    T_world_sensor.translation() = Eigen::Vector3d(1000.0, -2000.0, 500.0);
-    for (int i = 0; i < count; ++i) {
-      PointBuffer points;
-      points.push_back(0.1F, 0.1F, i % 2 == 0 ? -2.02F : -1.98F);
-      points.push_back(0.1F, 0.1F, 3.0F);
-      const std::vector<PointLabel> labels = {PointLabel::kGround, PointLabel::kStatic};
-      ground.add(points, labels, T_world_sensor);
-    }
-    const Eigen::Vector3d above(1000.2, -1999.8, 498.5);
-    const std::optional<double> rise = ground.rise(above);
-    REQUIRE(rise.has_value() == (count == 20));
-    CHECK(ground.is_level(above) == (count == 20));
-    if (rise) CHECK(*rise == Approx(0.5).margin(1e-4));
-    CHECK_FALSE(ground.rise({1000.5, -1999.8, 498.5}));
-    CHECK_FALSE(ground.rise({1100.2, -1999.8, 498.5}));
-  }
-}
-
 TEST_CASE("ground is level if none within two cells is lower, across tiles and their storage") {
   for (const int cells : {1, 2, 3}) {
     for (const bool is_tested_first : {false, true}) {

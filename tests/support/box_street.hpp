@@ -2,13 +2,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "dynains/points.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::test {
 
@@ -23,20 +22,6 @@ struct BoxScan {
   std::vector<std::uint32_t> labels;
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
 };
-
-/// Distance (m) along a ray to a box, infinite if it misses.
-inline double distance_to(const StreetBox& box, const Eigen::Vector3d& origin,
-                          const Eigen::Vector3d& direction) {
-  double enter = 0.0;
-  double leave = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis) {
-    const double a = (box.lowest[axis] - origin[axis]) / direction[axis];
-    const double b = (box.highest[axis] - origin[axis]) / direction[axis];
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
-  }
-  return enter <= leave ? enter : std::numeric_limits<double>::infinity();
-}
 
 /// One scan at (x, y), 1.7 m above the ground, of the boxes and two walls at y = -12 and 12.
 inline BoxScan scan_boxes(std::vector<StreetBox> boxes, double x, double y) {
@@ -55,7 +40,7 @@ inline BoxScan scan_boxes(std::vector<StreetBox> boxes, double x, double y) {
       double range = direction.z() < 0.0 ? -origin.z() / direction.z() : 1e9;
       std::uint32_t label = 40;
       for (const StreetBox& box : boxes) {
-        const double to_box = distance_to(box, origin, direction);
+        const double to_box = distance_to(box.lowest, box.highest, origin, direction);
         if (to_box >= range) continue;
         range = to_box;
         label = box.label;

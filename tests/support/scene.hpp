@@ -16,6 +16,20 @@ namespace dynains::test {
 inline constexpr int kGroundObject = -1;
 inline constexpr double kSensorHeight = 1.723;  // m, the default of GroundSegmenter::Config
 
+/// Distance (m) along a ray to the box between two corners, infinite if it misses.
+inline double distance_to(const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+                          const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+  double enter = 0.0;
+  double leave = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const double a = (low[i] - origin[i]) / direction[i];
+    const double b = (high[i] - origin[i]) / direction[i];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter < leave ? enter : std::numeric_limits<double>::infinity();
+}
+
 /// Axis-aligned box: its place at time 0 and its velocity (m, m/s).
 struct Box {
   Eigen::Vector3d low, high;
@@ -76,16 +90,8 @@ struct Scene {
 
   static double distance(const Box& box, const Eigen::Vector3d& origin,
                          const Eigen::Vector3d& direction, double time) {
-    double enter = 0.0;
-    double leave = kNever;
-    for (int i = 0; i < 3; ++i) {
-      const double shift = box.velocity[i] * time - origin[i];
-      const double a = (box.low[i] + shift) / direction[i];
-      const double b = (box.high[i] + shift) / direction[i];
-      enter = std::max(enter, std::min(a, b));
-      leave = std::min(leave, std::max(a, b));
-    }
-    return enter < leave ? enter : kNever;
+    const Eigen::Vector3d from = origin - box.velocity * time;
+    return distance_to(box.low, box.high, from, direction);
   }
 };
 
