@@ -94,17 +94,17 @@ class Pipeline final : private NewestVerdictMaker {
   using Belief = typename Stages::Belief;
   using Map = typename Stages::Map;
 
-  static_assert(kIsStage<Ground, IsGround>,
+  static_assert(kIsStage<Ground, GroundInterface>,
                 "Stages::Ground needs Config and segment(PointsView, numbers, GroundSplit&)");
-  static_assert(kIsStage<Clusterer, IsClusterer>,
+  static_assert(kIsStage<Clusterer, ClustererInterface>,
                 "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
-  static_assert(kIsStage<Descriptor, IsDescriptor>,
+  static_assert(kIsStage<Descriptor, DescriptorInterface>,
                 "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), "
                 "heights(k), cluster_heights(k) and proposes_dynamic()");
-  static_assert(kIsStage<Belief, IsBelief>,
+  static_assert(kIsStage<Belief, BeliefInterface>,
                 "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
                 "is_dynamic()");
-  static_assert(kIsStage<Map, IsMap>,
+  static_assert(kIsStage<Map, MapInterface>,
                 "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
   explicit Pipeline(const Config& config)

@@ -18,19 +18,19 @@ namespace dynains::detail {
 
 // Required members of stages, for Offers.
 template <class Stage>
-using IsConfigurable =
+using ConfigInterface =
     std::void_t<typename Stage::Config, decltype(Stage(std::declval<typename Stage::Config>())),
                 decltype(std::declval<typename Stage::Config>().validate())>;
 template <class Stage>
-using IsGround = decltype(std::declval<Stage&>().segment(PointsView(), Span<const std::uint32_t>(),
-                                                         std::declval<GroundSplit&>()));
+using GroundInterface = decltype(std::declval<Stage&>().segment(
+    PointsView(), Span<const std::uint32_t>(), std::declval<GroundSplit&>()));
 template <class Stage>
-using IsClusterer = std::enable_if_t<
+using ClustererInterface = std::enable_if_t<
     std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
                           Span<const std::uint32_t>> &&
     std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>;
 template <class Stage>
-using IsDescriptor =
+using DescriptorInterface =
     std::void_t<decltype(std::declval<Stage&>().describe(std::declval<const ClusterView&>())),
                 decltype(std::declval<Stage&>().describe_rest()),
                 decltype(std::declval<Stage&>().heights(std::size_t{})),
@@ -38,20 +38,20 @@ using IsDescriptor =
                 std::enable_if_t<std::is_convertible_v<
                     decltype(std::declval<Stage&>().proposes_dynamic()), bool>>>;
 template <class Stage>
-using IsBelief = std::void_t<
+using BeliefInterface = std::void_t<
     decltype(std::declval<Stage&>().reset()),
     decltype(std::declval<Stage&>().update(Span<const float>(), Span<const float>())),
     std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().posterior()), double> &&
                      std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>;
 template <class Stage>
-using IsMap =
+using MapInterface =
     std::void_t<decltype(std::declval<Stage&>().insert(PointsView(), Span<const std::uint8_t>(),
                                                        std::declval<const Pose&>())),
                 decltype(std::declval<Stage&>().clear())>;
 /// Whether a class is a stage with the members of `Interface`.
 template <class Stage, template <class> class Interface>
 inline constexpr bool kIsStage =
-    Offers<IsConfigurable, Stage>::value&& Offers<Interface, Stage>::value;
+    std::conjunction_v<Offers<ConfigInterface, Stage>, Offers<Interface, Stage>>;
 
 // Optional members of stages, for Offers.
 template <class Stage>
