@@ -1,0 +1,114 @@
+// The whole pipeline: cost of a frame as a function of points, of K and of the length of the run.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "dynains/compiled_remover.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::bench {
+namespace {
+
+// Scans of about 110,000 points on a long lane between pillars with one van, at 10 Hz and 10 m/s.
+const std::vector<test::Scan>& street_scans() {
+  static const std::vector<test::Scan> scans = [] {
+    test::Scene scene;
+    for (int i = -5; i < 12; ++i) {
+      for (const double y : {-14.0, -9.0, 9.0, 14.0}) {
+        scene.boxes.push_back({{8.0 * i - 1.0, y - 1.5, 0.0}, {8.0 * i + 1.5, y + 1.0, 4.0}});
+      }
+    }
+    scene.boxes.push_back(test::van(12.0, 3.5, {-6.0, 0.0, 0.0}));
+    return test::drive(scene, 16, 10.0);
+  }();
+  return scans;
+}
+
+// Value below which a `share` of the values lies.
+double quantile(std::vector<double> values, double share) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+std::vector<test::Scan> every(const std::vector<test::Scan>& scans, std::size_t step) {
+  std::vector<test::Scan> result;
+  for (const test::Scan& scan : scans) {
+    result.push_back({scan.T_world_sensor, scan.time, {}, {}});
+    for (std::size_t i = 0; i < scan.points.size(); i += step) {
+      result.back().points.push_back(scan.points[i]);
+    }
+  }
+  return result;
+}
+
+// Back and forth on one lane, so that the map stops growing.
+void push_lap(DynaInsRemover& remover, const std::vector<test::Scan>& scans, double& time,
+              std::vector<double>& milliseconds) {
+  for (std::size_t i = 0; i < 2 * scans.size(); ++i) {
+    const test::Scan& scan = scans[i < scans.size() ? i : 2 * scans.size() - 1 - i];
+    time += 0.1;
+    milliseconds.push_back(remover.push(scan.points, scan.T_world_sensor, time).times.total());
+  }
+}
+
+void report(benchmark::State& state, const std::vector<double>& milliseconds) {
+  state.counters["median_ms"] = quantile(milliseconds, 0.5);
+  state.counters["p99_ms"] = quantile(milliseconds, 0.99);
+  state.counters["worst_ms"] = quantile(milliseconds, 1.0);
+}
+
+// Arguments: window K, and n to use every n-th point.
+void BM_Frame(benchmark::State& state) {
+  auto config = DynaInsRemover::Config::paper();
+  config.window = static_cast<int>(state.range(0));
+  const auto scans = every(street_scans(), static_cast<std::size_t>(state.range(1)));
+  DynaInsRemover remover(config);
+  double time = 0.0;
+  std::vector<double> milliseconds;
+  for (auto _ : state) push_lap(remover, scans, time, milliseconds);
+  report(state, milliseconds);
+  state.counters["points"] = static_cast<double>(scans.front().points.size());
+}
+BENCHMARK(BM_Frame)
+    ->Unit(benchmark::kMillisecond)
+    ->ArgNames({"K", "step"})
+    ->Args({2, 1})
+    ->Args({4, 1})
+    ->Args({8, 1})
+    ->Args({4, 2})
+    ->Args({4, 4});
+
+// The default configuration, with all additions to the paper.
+void BM_DefaultFrame(benchmark::State& state) {
+  DynaInsRemover remover;
+  double time = 0.0;
+  std::vector<double> milliseconds;
+  for (auto _ : state) push_lap(remover, street_scans(), time, milliseconds);
+  report(state, milliseconds);
+}
+BENCHMARK(BM_DefaultFrame)->Unit(benchmark::kMillisecond);
+
+// Median times of a lap near frame 100 and of a lap near frame 10,000 of one run, with a quarter of
+// the points.
+void BM_LongRun(benchmark::State& state) {
+  const auto scans = every(street_scans(), 4);
+  for (auto _ : state) {
+    DynaInsRemover remover(DynaInsRemover::Config::paper());
+    double time = 0.0;
+    std::vector<double> lap;
+    double early = 0.0;
+    while (time < 1000.0) {
+      lap.clear();
+      push_lap(remover, scans, time, lap);
+      if (time < 13.0) early = quantile(lap, 0.5);
+    }
+    state.counters["frame_100_ms"] = early;
+    state.counters["frame_10000_ms"] = quantile(lap, 0.5);
+  }
+}
+BENCHMARK(BM_LongRun)->Unit(benchmark::kSecond)->Iterations(1);
+
+}  // namespace
+}  // namespace dynains::bench
