@@ -45,7 +45,7 @@ Pose pose_of(const PoseRows& rows);
 
 /// The folder of a city with an exclusive lock. Waits up to ten minutes, since others hold it while
 /// they write a session. Throws UsageError, IoError.
-Folder lock_city(const std::filesystem::path& folder);
+Folder lock_city(const std::filesystem::path& path);
 
 /// Throw IoError with path and byte.
 SessionInfo read_session(const std::filesystem::path& path);
