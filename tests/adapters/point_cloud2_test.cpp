@@ -1,7 +1,5 @@
 #include "dynains/adapters/point_cloud2.hpp"
 
-#include <limits>
-
 #include "adapters/message.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

@@ -6,7 +6,6 @@
 //
 // SEQUENCE has the layout of KITTI: velodyne/NNNNNN.bin, poses.txt, calib.txt with a row "Tr:".
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <dynains/dyna_ins_remover.hpp>

@@ -1,6 +1,5 @@
 // Labels do not depend on the type of the cloud.
 #include <Eigen/Core>
-#include <string>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"

@@ -2,8 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>

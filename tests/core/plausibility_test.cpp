@@ -1,7 +1,6 @@
 // Both sides of each bound of plausibility, and its result on simulated drives.
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "dynains/pipeline/plausibility_check.hpp"

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
 

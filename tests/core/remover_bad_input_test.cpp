@@ -1,10 +1,7 @@
 // Any input gives an exception or a label, and the remover continues to work.
-#include <algorithm>
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <stdexcept>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <limits>
 #include <new>
-#include <optional>
 #include <vector>
 
 #include "support/catch.hpp"

@@ -1,7 +1,6 @@
 // The commands for evaluation, from the command line to the files that they write.
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>

@@ -1,5 +1,4 @@
 // Logs of ROS: any bytes give scans with poses and a copy, or an IoError that names the log.
-#include <cmath>
 #include <filesystem>
 #include <string>
 

@@ -1,9 +1,7 @@
 // Trajectories and folders of scans: any contents and any file names give valid poses and points,
 // or an IoError that names the place.
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "dynains/errors.hpp"

@@ -1,7 +1,6 @@
 #include "dynains/io/kitti.hpp"
 
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>

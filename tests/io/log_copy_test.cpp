@@ -1,7 +1,6 @@
 // Copies of logs with other clouds, by their readers and byte by byte.
 #include "io/logs/log_copy.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>

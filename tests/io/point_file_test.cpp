@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <random>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"

@@ -1,6 +1,5 @@
 #include "dynains/io/trajectory.hpp"
 
-#include <cmath>
 #include <string>
 
 #include "dynains/errors.hpp"

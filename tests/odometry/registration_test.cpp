@@ -1,6 +1,5 @@
 // Registration of known motions, and motions that nothing determines.
 #include <Eigen/Geometry>
-#include <limits>
 #include <random>
 #include <vector>
 

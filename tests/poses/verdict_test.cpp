@@ -1,6 +1,5 @@
 // Verdicts on right and wrong poses of written recordings.
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 #include <random>
 #include <stdexcept>

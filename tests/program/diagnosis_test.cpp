@@ -1,7 +1,6 @@
 // Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
 #include "dynains/poses/diagnosis.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>

@@ -1,6 +1,4 @@
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <functional>

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <cmath>
 #include <csignal>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>

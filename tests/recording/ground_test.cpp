@@ -1,7 +1,5 @@
 #include "dynains/recording/ground.hpp"
 
-#include <cstddef>
-#include <optional>
 #include <vector>
 
 #include "support/catch.hpp"

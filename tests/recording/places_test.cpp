@@ -1,10 +1,8 @@
 #include "dynains/recording/places.hpp"
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <utility>
 #include <vector>
 
 #include "support/catch.hpp"

@@ -1,7 +1,6 @@
 // The second pass of a run over first verdicts.
 #include "dynains/recording/second_pass.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>

@@ -3,7 +3,6 @@
 // bytes of an undisturbed run.
 #include <algorithm>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -1,6 +1,5 @@
 // Faulty poses and times: the results are defined, for both presets.
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <string>
-#include <vector>
 
 #include "tree.hpp"
 

@@ -1,7 +1,5 @@
 #include "ros_common/messages.hpp"
 
-#include <vector>
-
 #include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
 #include "dynains/map/static_map_accumulator.hpp"

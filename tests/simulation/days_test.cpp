@@ -1,5 +1,4 @@
 // One place on several days.
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>

@@ -1,7 +1,6 @@
 // Runs a remover over scans and keeps the verdicts.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

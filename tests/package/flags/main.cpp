@@ -4,8 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
