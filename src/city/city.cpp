@@ -12,6 +12,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "io/failure.hpp"
+#include "io/text.hpp"
 #include "session_file.hpp"
 
 namespace dynains {
@@ -26,18 +27,11 @@ void refuse_earlier_version(const fs::path& folder) {
        "again");
 }
 
-std::string number_text(double value) {
-  std::string text = std::to_string(value);
-  text.erase(text.find_last_not_of('0') + 1);
-  if (text.back() == '.') text.pop_back();
-  return text;
-}
-
 void refuse_other_grid(const fs::path& city, const SessionGrid& its, const SessionGrid& asked) {
   const auto refuse = [&](const char* field, double is, double is_asked) {
     if (is == is_asked) return;
-    throw ConfigError(city.string() + ": its sessions have " + field + " = " + number_text(is) +
-                      " m; expected the same, not " + number_text(is_asked));
+    throw ConfigError(city.string() + ": its sessions have " + field + " = " + text::to_text(is) +
+                      " m; expected the same, not " + text::to_text(is_asked));
   };
   refuse("map_voxel", its.map_voxel, asked.map_voxel);
   refuse("tile", its.tile, asked.tile);

@@ -5,10 +5,10 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <sstream>
 #include <string>
 
 #include "dynains/errors.hpp"
+#include "io/text.hpp"
 #include "poses/given_motion.hpp"
 #include "poses/scan_registration.hpp"
 
@@ -23,11 +23,8 @@ constexpr double kInlier = 0.15;    // m
 constexpr double kDegree = M_PI / 180.0;
 
 std::string rounded(double value, int digits) {
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
+  const double scale = std::pow(10.0, digits);
+  return text::to_text(std::round(scale * value) / scale);
 }
 
 [[noreturn]] void refuse(const City& city, const std::string& reason) {
