@@ -14,7 +14,6 @@
 
 #include "detail/cell_groups.hpp"
 #include "detail/located_points.hpp"
-#include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"

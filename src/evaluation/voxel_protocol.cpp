@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "detail/located_points.hpp"
-#include "detail/nearest.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
 #include "detail/scan_voxels.hpp"

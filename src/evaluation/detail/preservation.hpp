@@ -10,6 +10,12 @@
 
 namespace dynains::evaluation::detail {
 
+/// Whether a squared distance (m^2) is less than the best one by more than rounding. The two points
+/// of a voxel with two points are equally near to its centroid: without a margin, rounding would
+/// choose the class, and another world frame would change the score. 1e-8 m^2 is 50 nm at 0.1 m;
+/// rounding of coordinates of 5e6 m (UTM) is 1 nm.
+constexpr bool is_nearer(double squared, double best) { return squared + 1e-8 < best; }
+
 /// Whether the estimate's point nearest to `raw` is nearer than edge * sqrt(3) / 2 and has the same
 /// class. `key`: voxel of `raw` in `grid`; `point_at(number)`: the estimate's point in voxel
 /// `number` of `index`, a std::optional<VoxelPoint>.

@@ -10,7 +10,7 @@
 
 #include "dynains/evaluation/truth.hpp"
 #include "evaluation/detail/located_points.hpp"
-#include "evaluation/detail/nearest.hpp"
+#include "evaluation/detail/preservation.hpp"
 #include "evaluation/detail/voxel_index.hpp"
 
 namespace dynains::evaluation::detail {
