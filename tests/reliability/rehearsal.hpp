@@ -3,19 +3,134 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <regex>
 #include <string>
 #include <vector>
 
 #include "dynains/io/kitti.hpp"
-#include "results.hpp"
-#include "shim/preload.hpp"
-#include "small_recording.hpp"
+#include "io/files.hpp"
+#include "program/start.hpp"
+#include "program/tiny_sequence.hpp"
+#include "shim/log.hpp"
 #include "support/catch.hpp"
+#include "tree.hpp"
 
 namespace dynains::test {
+
+// Starts the program with the shim preloaded.
+
+/// Sets variables that processes inherit if they start during its life.
+class Environment {
+ public:
+  explicit Environment(std::map<std::string, std::string> variables)
+      : variables_(std::move(variables)) {
+    for (const auto& [name, value] : variables_) ::setenv(name.c_str(), value.c_str(), 1);
+  }
+  ~Environment() {
+    for (const auto& variable : variables_) ::unsetenv(variable.first.c_str());
+  }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  std::map<std::string, std::string> variables_;
+};
+
+/// Runs `dynains ARGUMENTS`. SIGALRM ends a program that hangs (exit code 142).
+inline Outcome start_or_stop(const std::vector<std::string>& arguments) {
+  return start(arguments, [] { ::alarm(20); });
+}
+
+struct Recorded {
+  Outcome outcome;
+  std::vector<shim::Entry> events;
+};
+
+/// Runs `dynains ARGUMENTS` and records its changes below `root`. `fault` as in shim.cpp; empty:
+/// none.
+inline Recorded start_with_shim(const std::vector<std::string>& arguments, const std::string& root,
+                                const std::string& fault = {}) {
+  const TemporaryFolder folder;
+  const std::string log = folder / "log";
+  write_text(log, {});
+  const Environment environment({{"LD_PRELOAD", DYNAINS_SHIM},
+                                 {"DYNAINS_SHIM_ROOT", root},
+                                 {"DYNAINS_SHIM_LOG", log},
+                                 {"DYNAINS_SHIM_FAULT", fault},
+                                 // A sanitizer's runtime may come after the shim.
+                                 {"ASAN_OPTIONS", "verify_asan_link_order=0"}});
+  const Outcome outcome = start_or_stop(arguments);
+  return {outcome, shim::parse_log(read_text(log))};
+}
+
+// The completeness that folders of results declare, and checks of it.
+
+inline bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+enum class Claim { kNone, kUnfinished, kComplete, kUnreadable };
+
+/// Value of "complete" in report.json or simulation.json; kNone: neither file exists.
+inline Claim claim_of(const Tree& results) {
+  for (const char* marker : {"report.json", "simulation.json"}) {
+    const auto file = results.find(marker);
+    if (file == results.end()) continue;
+    const auto json = nlohmann::json::parse(file->second.bytes.text(), nullptr, false);
+    if (!json.is_object() || json.value("program", "") != "dynains") return Claim::kUnreadable;
+    return json.value("complete", false) ? Claim::kComplete : Claim::kUnfinished;
+  }
+  return Claim::kNone;
+}
+
+/// The tree without measured times and memory.
+inline Tree without_measurements(Tree tree) {
+  for (auto& [name, item] : tree) {
+    if (ends_with(name, "report.json")) {
+      auto json = nlohmann::json::parse(item.bytes.text(), nullptr, false);
+      if (!json.is_object()) continue;
+      for (const char* field : {"milliseconds", "flush_milliseconds", "wall_milliseconds",
+                                "share_outside_pipeline", "peak_memory_bytes"}) {
+        json.erase(field);
+      }
+      item.bytes = json.dump();
+    }
+    if (ends_with(name, "timing.csv")) {
+      item.bytes = std::regex_replace(item.bytes.text(), std::regex("[0-9]+\\.[0-9]{4}"), "time");
+    }
+  }
+  return tree;
+}
+
+// A recording that the program processes in milliseconds.
+
+/// Every twelfth point of the tiny sequence, about 440 per scan, with ground truth for the box.
+/// Times differ from the defaults of a recording without times.
+inline void write_small_recording(const std::filesystem::path& folder, std::size_t scans) {
+  write_tiny_sequence(folder, scans);
+  std::filesystem::create_directories(folder / "labels");
+  std::vector<double> times;
+  for (std::size_t i = 0; i < scans; ++i) {
+    const std::vector<float> all = tiny_scan(i);
+    std::vector<float> scan;
+    std::vector<std::uint32_t> labels;
+    const std::size_t box = all.size() / 4 - 192;
+    for (std::size_t k = i; k < all.size() / 4; k += 12) {
+      scan.insert(scan.end(), all.data() + 4 * k, all.data() + 4 * k + 4);
+      labels.push_back(k < box ? 9 : 251);
+    }
+    write_scan(folder / "velodyne" / (scan_name(i) + ".bin"), scan);
+    write_labels(folder / "labels" / (scan_name(i) + ".label"), labels);
+    times.push_back(0.2 * static_cast<double>(i));
+  }
+  write_times(folder / "times.txt", times);
+}
 
 /// The number in an environment variable.
 inline std::size_t number_in(const char* variable, std::size_t otherwise) {

@@ -13,15 +13,12 @@ namespace dynains::shim {
 enum class Event : std::uint8_t {
   kOpen,        ///< path is now descriptor; number: flags of open(2)
   kWrite,       ///< bytes at offset `number` of descriptor
-  kTruncate,    ///< descriptor has `number` bytes now
   kRename,      ///< path to second
   kExchange,    ///< path and second
-  kLink,        ///< second is one more name of path
-  kSymlink,     ///< path is a link that holds second
   kMakeFolder,  ///< path
   kRemove,      ///< path, a file or an empty folder
   kSync,        ///< descriptor
-  kSyncAll,     ///< file system of descriptor; all file systems if it is -1
+  kSyncAll,     ///< file system of descriptor
   kFault,       ///< a call on path was made to fail
 };
 
@@ -31,7 +28,7 @@ struct Entry {
   int descriptor = -1;
   std::int64_t number = 0;
   std::string path;
-  std::string second;  ///< path, target of a link, or the bytes written
+  std::string second;  ///< path, or the bytes written
 };
 
 /// Fixed part of an entry in the log; path and second follow.
