@@ -31,16 +31,6 @@ fs::path file_of(const char* name, Bytes bytes) {
   return path;
 }
 
-/// Runs `read` on the file. An Error is permitted if it names the file.
-template <class Error, class Read>
-void expect_value_or(const fs::path& path, Read&& read) {
-  try {
-    read(path);
-  } catch (const Error& error) {
-    require(std::string(error.what()).rfind(path.string(), 0) == 0, "the error names the file");
-  }
-}
-
 std::size_t column_size(std::size_t column, std::size_t points) {
   return column == 0 ? points : column;
 }

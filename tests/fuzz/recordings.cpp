@@ -15,16 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs `read`. An IoError is permitted if it names the place.
-template <class Read>
-void expect_value_or_place(const fs::path& place, Read&& read) {
-  try {
-    read();
-  } catch (const IoError& error) {
-    require(std::string(error.what()).rfind(place.string(), 0) == 0, "the error names the place");
-  }
-}
-
 void require_rigid(const Eigen::Isometry3d& pose) {
   require(pose.matrix().allFinite(), "poses are finite");
   const Eigen::Matrix3d R = pose.linear();
@@ -88,7 +78,7 @@ void read_whole(const fs::path& folder, const RecordingOptions& options) {
     require_rigid(recording.T_world_sensor(i));
     require(std::isfinite(recording.time(i)), "times are finite");
     require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
-    expect_value_or_place(folder, [&] {
+    expect_value_or<IoError>(folder, [&](const fs::path&) {
       recording.point_count(i);
       const RecordedScan scan = recording.read_scan(i);
       require(scan.xyzi.size() % 4 == 0, "points have four numbers");
@@ -96,7 +86,7 @@ void read_whole(const fs::path& folder, const RecordingOptions& options) {
       require(scan.time.empty() || scan.time.size() == scan.size(), "a time for each point");
     });
     if (!recording.has_labels()) continue;
-    expect_value_or_place(folder, [&] { recording.read_labels(i); });
+    expect_value_or<IoError>(folder, [&](const fs::path&) { recording.read_labels(i); });
   }
 }
 
@@ -122,7 +112,7 @@ void run_trajectory(Bytes bytes) {
   static const test::TemporaryFolder folder;
   const fs::path path = folder / "trajectory.txt";
   test::write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  expect_value_or_place(path, [&] {
+  expect_value_or<IoError>(path, [&](const fs::path&) {
     const Trajectory trajectory = read_trajectory(path);
     for (const Pose& pose : trajectory.poses) require_rigid(pose);
     const std::vector<double>& times = trajectory.times;
@@ -156,7 +146,7 @@ void run_recording(Bytes bytes) {
   options.convention.shift = (choice & 16U) != 0 ? 1 : 0;
   if ((choice & 32U) != 0) options.poses = folder / kNames[3];
   if ((choice & 64U) != 0) options.times = folder / kNames[5];
-  expect_value_or_place(folder, [&] { read_whole(folder, options); });
+  expect_value_or<IoError>(folder, [&](const fs::path&) { read_whole(folder, options); });
 }
 
 std::vector<std::string> trajectory_seeds() {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -23,6 +25,16 @@ const Target& target(const std::string& name);
 
 /// Throws std::logic_error, which no target catches, unless `condition` holds.
 void require(bool condition, const char* what);
+
+/// Runs `read` on a file or folder. An Error is permitted if it names the place.
+template <class Error, class Read>
+void expect_value_or(const std::filesystem::path& place, Read&& read) {
+  try {
+    read(place);
+  } catch (const Error& error) {
+    require(std::string(error.what()).rfind(place.string(), 0) == 0, "the error names the place");
+  }
+}
 
 // One function for each target, and one for its seeds.
 void run_scan(Bytes bytes);

@@ -99,22 +99,6 @@ EditMessage replacing(std::uint64_t replaced, std::uint64_t end = 0) {
   };
 }
 
-using Message = std::pair<std::string, std::string>;  // topic, type and time; bytes
-
-std::vector<Message> messages_of(const fs::path& path) {
-  const auto log = open_log(path);
-  CHECK_FALSE(log->early_end());
-  std::vector<Message> messages;
-  std::vector<std::uint8_t> bytes;
-  for (const LogMessage& message : log->messages()) {
-    log->read(message, bytes);
-    const LogTopic& topic = log->topics()[message.topic];
-    messages.emplace_back(topic.name + ' ' + topic.type + ' ' + std::to_string(message.time),
-                          std::string(bytes.begin(), bytes.end()));
-  }
-  return messages;
-}
-
 const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
                                            {"/other", "any/msg/Thing", "json"}};
 constexpr std::uint64_t kReplaced = 30;

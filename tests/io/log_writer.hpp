@@ -4,9 +4,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "io/logs/log_file.hpp"
 #include "ros_writer.hpp"
 
 namespace dynains::test {
@@ -181,6 +185,23 @@ inline std::string bag_file(const std::vector<LogChannel>& channels,
              std::string(200, ' '));
   file += chunks;
   return parts.is_closed ? file + definitions + infos : file;
+}
+
+using Message = std::pair<std::string, std::string>;  // topic, type and time; bytes
+
+/// All messages of a whole log.
+inline std::vector<Message> messages_of(const std::filesystem::path& path) {
+  const auto log = open_log(path);
+  if (log->early_end()) throw std::runtime_error(*log->early_end());
+  std::vector<Message> messages;
+  std::vector<std::uint8_t> bytes;
+  for (const LogMessage& message : log->messages()) {
+    log->read(message, bytes);
+    const LogTopic& topic = log->topics()[message.topic];
+    messages.emplace_back(topic.name + ' ' + topic.type + ' ' + std::to_string(message.time),
+                          std::string(bytes.begin(), bytes.end()));
+  }
+  return messages;
 }
 
 }  // namespace dynains::test

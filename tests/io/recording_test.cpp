@@ -232,11 +232,12 @@ TEST_CASE("calib.txt and times.txt are beside the poses or in the folder") {
     write_text(scans / (std::string(name) + ".bin"), std::string(32, 'a'));
   }
   write_text(folder / "calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 -0.5 1 0 0 0\n");
-  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 2\n");
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 2\n");
   write_text(folder / "times.txt", "0\n0.25\n");
   const Recording whole(folder.path());
-  // A motion of the camera along its z axis is a motion of the sensor along its x axis.
-  REQUIRE(whole.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2, 0, 0), 1e-12));
+  // Tr^-1 P Tr. Axes of the camera: z forward, x right, y down; of the sensor: x forward, y left.
+  CHECK(whole.T_world_sensor(0).isApprox(Eigen::Isometry3d::Identity(), 1e-15));
+  REQUIRE(whole.T_world_sensor(1).translation().isApprox(Eigen::Vector3d(2, -1, 0), 1e-12));
 
   const Recording inner(scans);
   CHECK(inner.has_calibration());
@@ -364,14 +365,12 @@ TEST_CASE("Values that are not finite are read, and labels of a column are read"
 
 TEST_CASE("Two scans with one name are refused") {
   const TemporaryFolder folder;
-  const std::string pcd =
-      "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
-      "VIEWPOINT 1 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3\n";
-  for (const char* const name : {"a.pcd", "a.PCD", "b.pcd"}) write_text(folder / name, pcd);
-  const std::string error = message_of<IoError>([&] { Recording(folder.path()); });
-  CHECK(error.find("expected scans of different names, found ") != std::string::npos);
-  CHECK(error.find("a.pcd") != std::string::npos);
-  CHECK(error.find("a.PCD") != std::string::npos);
+  for (const char* const name : {"a.pcd", "a.PCD", "b.pcd"}) {
+    write_text(folder / name, pcd({1, 2, 3}, "1 0 0 1 0 0 0"));
+  }
+  CHECK_THAT(error_of(folder.path()),
+             ContainsSubstring("expected scans of different names, found ") &&
+                 ContainsSubstring("a.pcd") && ContainsSubstring("a.PCD"));
 }
 
 namespace {

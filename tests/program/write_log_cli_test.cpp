@@ -64,20 +64,6 @@ std::string tiny_log() {
                    messages, {});
 }
 
-using Message = std::pair<std::string, std::string>;  // topic and time; bytes
-
-std::vector<Message> messages_of(const fs::path& path) {
-  const auto log = open_log(path);
-  std::vector<Message> messages;
-  std::vector<std::uint8_t> bytes;
-  for (const LogMessage& message : log->messages()) {
-    log->read(message, bytes);
-    messages.emplace_back(log->topics()[message.topic].name + ' ' + std::to_string(message.time),
-                          std::string(bytes.begin(), bytes.end()));
-  }
-  return messages;
-}
-
 /// By point of scan i: whether the run calls it moving.
 std::vector<bool> moving_in(const fs::path& out, std::size_t i) {
   std::vector<bool> moving;
