@@ -62,34 +62,48 @@ City city_of(const fs::path& folder, const std::vector<Session>& sessions) {
   return city;
 }
 
-/// Everything that the map tells, as bytes.
-std::string map_bytes(const City& city, std::uint32_t last = TileHistory::kNever) {
+/// Calls visit(name of the session, point) for each point that stands after session `last`.
+template <class Visit>
+void for_each_point(const City& city, std::uint32_t last, const Visit& visit) {
   const CityMap map(city);
-  std::string bytes;
   for (const TileIndex& tile : map.tiles()) {
     const TileHistory history = map.history(tile, last);
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      const SessionPoint& point = history.points(session)[i];
-      bytes += map.sessions()[session].name;
-      const float coordinates[] = {point.x, point.y, point.z};
-      bytes.append(reinterpret_cast<const char*>(coordinates), sizeof(coordinates));
-      bytes += std::to_string(point.scan) + ' ' + std::to_string(point.label) +
-               (point.is_ground != 0 ? 'g' : 'o');
+      visit(map.sessions()[session].name, history.points(session)[i]);
     });
   }
+}
+
+/// Everything that the map tells, as bytes.
+std::string map_bytes(const City& city) {
+  std::string bytes;
+  for_each_point(city, TileHistory::kNever, [&](const auto& name, const SessionPoint& point) {
+    const float coordinates[] = {point.x, point.y, point.z};
+    bytes += name;
+    bytes.append(reinterpret_cast<const char*>(coordinates), sizeof(coordinates));
+    bytes += std::to_string(point.scan) + ' ' + std::to_string(point.label) +
+             (point.is_ground != 0 ? 'g' : 'o');
+  });
   return bytes;
 }
 
 /// Number of points of the map by label.
 std::map<std::uint32_t, std::size_t> label_counts(const City& city,
                                                   std::uint32_t last = TileHistory::kNever) {
+  std::map<std::uint32_t, std::size_t> counts;
+  for_each_point(city, last, [&](const auto&, const auto& point) { ++counts[point.label]; });
+  return counts;
+}
+
+/// Number of points that came or left between two sessions, by label.
+std::map<std::uint32_t, std::size_t> change_counts(
+    const City& city, std::uint32_t before, std::uint32_t after,
+    std::vector<CityPoint> CityChanges::*kind = &CityChanges::added) {
   const CityMap map(city);
   std::map<std::uint32_t, std::size_t> counts;
   for (const TileIndex& tile : map.tiles()) {
-    const TileHistory history = map.history(tile, last);
-    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      ++counts[history.points(session)[i].label];
-    });
+    const CityChanges changes = map.changes(tile, before, after);
+    for (const CityPoint& p : changes.*kind) ++counts[p.point.label];
   }
   return counts;
 }
@@ -212,23 +226,15 @@ TEST_CASE("a city: an object of which a part is seen through leaves as a whole")
 TEST_CASE("a city: changes are objects that came or left") {
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city", kDays);
-  const CityMap map(city);
-  const auto labels = [&](std::uint32_t a, std::uint32_t b, auto member) {
-    std::map<std::uint32_t, std::size_t> counts;
-    for (const TileIndex& tile : map.tiles()) {
-      const CityChanges changes = map.changes(tile, a, b);
-      for (const CityPoint& p : changes.*member) ++counts[p.point.label];
-    }
-    return counts;
-  };
-  auto removed = labels(0, 1, &CityChanges::removed);
+  auto removed = change_counts(city, 0, 1, &CityChanges::removed);
   CHECK(removed.size() == 1);
   CHECK(removed[kParked] > 100);
-  auto added = labels(0, 2, &CityChanges::added);
+  auto added = change_counts(city, 0, 2);
   CHECK(added.size() == 1);
   CHECK(added[kContainer] > 100);
-  CHECK(labels(1, 2, &CityChanges::added).empty());
-  CHECK(labels(1, 2, &CityChanges::removed).empty());
+  CHECK(change_counts(city, 1, 2).empty());
+  CHECK(change_counts(city, 1, 2, &CityChanges::removed).empty());
+  const CityMap map(city);
   CHECK_THROWS_AS(map.changes(map.tiles().front(), 1, 1), ConfigError);
 }
 
@@ -242,13 +248,7 @@ TEST_CASE("a city: an object has come if a session before its own saw its place 
   const test::TemporaryFolder folder;
   const City city = city_of(folder.path() / "city",
                             {{"monday", 0.0, {wall}}, {"tuesday", 86400.0, tuesday}, kDays[2]});
-  const CityMap map(city);
-  std::size_t added = 0;
-  for (const TileIndex& tile : map.tiles()) {
-    for (const CityPoint& p : map.changes(tile, 0, 2).added) {
-      added += p.point.label == kContainer ? 1 : 0;
-    }
-  }
+  const std::size_t added = change_counts(city, 0, 2)[kContainer];
   CHECK(label_counts(city)[kContainer] > 100);
   CHECK((added > 100) == is_seen_on_tuesday);
   CHECK((added == 0) != is_seen_on_tuesday);

@@ -73,6 +73,14 @@ Eigen::Isometry3d displacement(std::mt19937& random, double way, double angle,
   return Eigen::Translation3d(position + offset) * rotation * Eigen::Translation3d(-position);
 }
 
+/// A map of the first day.
+struct FirstDay {
+  FirstDay() { add(city, "first", first_day()); }
+
+  test::TemporaryFolder folder;
+  City city = City::open_or_make(folder / "city", {});
+};
+
 /// Largest distance (m) of a sensor from its place.
 double largest_error(const Eigen::Isometry3d& T_world_aligned, const Scans& scans) {
   double most = 0.0;
@@ -86,9 +94,7 @@ double largest_error(const Eigen::Isometry3d& T_world_aligned, const Scans& scan
 }  // namespace
 
 TEST_CASE("alignment: displacements up to 2 m and 5 degrees are found to 5 cm") {
-  const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
-  add(city, "first", first_day());
+  const FirstDay map;
   const Scans scans = second_day();
   std::mt19937 random(7);
   std::uniform_real_distribution<double> part(0.0, 1.0);
@@ -99,7 +105,7 @@ TEST_CASE("alignment: displacements up to 2 m and 5 degrees are found to 5 cm") 
     CAPTURE(trial, way, angle);
     const Eigen::Isometry3d T =
         displacement(random, way, angle, scans.front().T_world_sensor.translation());
-    const SessionAlignment alignment = align(city, scans, T);
+    const SessionAlignment alignment = align(map.city, scans, T);
     CHECK(largest_error(alignment.T_city_session * T, scans) < 0.05);
     CHECK(alignment.residual < 0.1);
     CHECK(alignment.fitting > 0.7);
@@ -126,9 +132,7 @@ TEST_CASE("alignment: a start leads to a map far away, and the same input to the
 }
 
 TEST_CASE("alignment: a session of another place is refused") {
-  const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
-  add(city, "first", first_day());
+  const FirstDay map;
   const Eigen::Isometry3d kIdentity = Eigen::Isometry3d::Identity();
   std::vector<test::StreetBox> other = {
       {{-20, 3, 0}, {-16, 9, 5}, 50}, {{1, 5, 0}, {4, 7, 4}, 50}, {{-6, -9, 0}, {2, -5, 6}, 50}};
@@ -136,12 +140,12 @@ TEST_CASE("alignment: a session of another place is refused") {
   for (double x = -7.0; x <= 8.0; x += 2.5) {
     elsewhere.push_back(test::scan_boxes(other, x, 4.0));
   }
-  CHECK_THROWS_WITH(align(city, elsewhere, kIdentity), ContainsSubstring("cannot be aligned"));
+  CHECK_THROWS_WITH(align(map.city, elsewhere, kIdentity), ContainsSubstring("cannot be aligned"));
   Eigen::Isometry3d far = kIdentity;
   far.translation().x() = 5.5;
-  CHECK_THROWS_AS(align(city, second_day(), far), ConfigError);
+  CHECK_THROWS_AS(align(map.city, second_day(), far), ConfigError);
   far.translation().x() = 4000.0;
-  CHECK_THROWS_WITH(align(city, second_day(), far), ContainsSubstring("no points"));
+  CHECK_THROWS_WITH(align(map.city, second_day(), far), ContainsSubstring("no points"));
 }
 
 TEST_CASE("alignment: a street that looks alike along its way is refused") {

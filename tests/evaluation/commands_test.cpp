@@ -1,6 +1,7 @@
 // The commands for evaluation, from the command line to the files that they write.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -10,19 +11,98 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/simulation/write_sequence.hpp"
+#include "io/files.hpp"
 #include "program/command.hpp"
 #include "program/variants.hpp"
 #include "run/labelled_sequence.hpp"
-#include "sequences.hpp"
+#include "scenes.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::program {
 
 using namespace evaluation::testing;
+using simulation::scan_name;
+using test::read_text;
+using test::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// Flat ground, a wall and a box of a car (instance 3) that moves `speed` m per scan along y.
+OwnedScan street_scan(std::size_t number, double speed) {
+  OwnedScan scan;
+  for (int ring = 0; ring < 12; ++ring) {
+    for (int step = 0; step < 240; ++step) {
+      const double angle = step * 2 * 3.14159265358979 / 240;
+      const double range = 4.0 + 1.5 * ring;
+      scan.add(static_cast<float>(range * std::cos(angle)),
+               static_cast<float>(range * std::sin(angle)), -1.7F, kRoad);
+    }
+  }
+  for (int column = 0; column < 120; ++column) {
+    for (int row = 0; row < 12; ++row) {
+      scan.add(-10.0F, -9.0F + 0.15F * static_cast<float>(column),
+               -1.4F + 0.25F * static_cast<float>(row), 50);
+    }
+  }
+  const auto y = static_cast<float>(-4.0 + speed * static_cast<double>(number));
+  for (int column = 0; column < 60; ++column) {
+    for (int row = 0; row < 8; ++row) {
+      scan.add(9.0F, y + 0.05F * static_cast<float>(column),
+               -1.3F + 0.15F * static_cast<float>(row), kMovingCar | 3U << 16U);
+    }
+  }
+  scan.time = 0.1 * static_cast<double>(number);
+  return scan;
+}
+
+/// Writes the scans as a sequence; returns them.
+std::vector<OwnedScan> write_street(const std::filesystem::path& folder, std::size_t scans,
+                                    double speed = 1.0) {
+  std::filesystem::create_directories(folder / "velodyne");
+  std::filesystem::create_directories(folder / "labels");
+  std::vector<OwnedScan> result;
+  std::vector<Pose> poses;
+  std::vector<double> times;
+  for (std::size_t number = 0; number < scans; ++number) {
+    result.push_back(street_scan(number, speed));
+    const OwnedScan& scan = result.back();
+    std::vector<float> xyzi;
+    for (std::size_t i = 0; i < scan.truth.size(); ++i) {
+      xyzi.insert(xyzi.end(), {scan.xyz[3 * i], scan.xyz[3 * i + 1], scan.xyz[3 * i + 2], 0.5F});
+    }
+    write_scan(folder / "velodyne" / (scan_name(number) + ".bin"), xyzi);
+    write_labels(folder / "labels" / (scan_name(number) + ".label"), scan.truth);
+    poses.push_back(scan.T_world_sensor);
+    times.push_back(scan.time);
+  }
+  write_poses(folder / "poses.txt", poses);
+  write_times(folder / "times.txt", times);
+  return result;
+}
+
+/// Labels of a run that is right except for the first `missed` moving points of each scan: final
+/// labels, or the verdicts without latency ("online").
+void write_run(const std::filesystem::path& out, const std::vector<OwnedScan>& scans,
+               std::size_t missed, const std::string& kind = "labels") {
+  std::filesystem::create_directories(out / kind);
+  for (std::size_t number = 0; number < scans.size(); ++number) {
+    std::vector<std::uint32_t> labels;
+    std::size_t moving = 0;
+    for (const std::uint32_t truth : scans[number].truth) {
+      const bool found = evaluation::semantic_class(truth) == kMovingCar && moving++ >= missed;
+      labels.push_back(found ? 251 : 9);
+    }
+    write_labels(out / kind / (scan_name(number) + ".label"), labels);
+  }
+}
 
 /// Standard output of `dynains <arguments>`. Exceptions of the command are passed on.
 std::string call(std::vector<std::string> arguments) {
@@ -43,13 +123,9 @@ std::string call(std::vector<std::string> arguments) {
 }
 
 std::string message_of(const std::vector<std::string>& arguments) {
-  try {
-    call(arguments);
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return {};
+  return test::message_of<std::exception>([&] { call(arguments); });
 }
+const std::string kNoMessage = "(nothing was thrown)";
 
 /// A street of three scans with a correct run, whose score is written to `json`.
 struct JudgedStreet {
@@ -71,11 +147,9 @@ struct JudgedStreet {
 }  // namespace
 
 TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
-  const TemporaryFolder folder;
-  const std::string sequence = (folder.path() / "street").string();
-  const auto scans = write_street(sequence, 2);
-  const fs::path run = folder.path() / "run";
-  write_run(run, scans, 0);
+  const JudgedStreet street;
+  const std::string sequence = street.sequence.string();
+  const fs::path run = street.run;
   const auto report = [&](const std::string& text) { test::write_text(run / "report.json", text); };
   const std::string unfinished = R"({"program": "dynains", "complete": false})";
 
@@ -89,14 +163,19 @@ TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
                     ContainsSubstring("run/report.json: /complete: expected true, found false") &&
                         ContainsSubstring("--unfinished"));
   CHECK_NOTHROW(call({"eval", sequence, run.string(), "--unfinished"}));
+  report(R"({"program": "dynains", "complete": "no"})");
+  CHECK(has(message_of({"eval", sequence, run.string()}), "expected true or false, found string"));
+  report("{");
+  CHECK(has(message_of({"eval", sequence, run.string()}), "json:1: column 2: expected JSON"));
+  report(unfinished);
 
   PointFileWriter map(run / "map.ply");
   map.add({});
   map.commit();
   CHECK_THROWS_WITH(call({"eval", sequence, "--map", (run / "map.ply").string()}),
                     ContainsSubstring("/complete: expected true"));
-  fs::rename(run / "map.ply", folder.path() / "map.ply");
-  CHECK_NOTHROW(call({"eval", sequence, "--map", (folder.path() / "map.ply").string()}));
+  fs::rename(run / "map.ply", street.folder.path() / "map.ply");
+  CHECK_NOTHROW(call({"eval", sequence, "--map", (street.folder.path() / "map.ply").string()}));
 }
 
 TEST_CASE("eval scores a run beside identity and oracle") {
@@ -164,7 +243,7 @@ TEST_CASE("eval --online scores the verdicts without latency, and only these") {
     call(street.eval(more));
     return nlohmann::json::parse(read_text(street.json))["rows"][2]["points"]["da"].get<double>();
   };
-  CHECK(!message_of(street.eval({"--online"})).empty());
+  CHECK(message_of(street.eval({"--online"})) != kNoMessage);
   write_run(street.run, street.scans, 120, "online");  // of 480 points
   CHECK(accuracy({}) == 100.0);
   CHECK(accuracy({"--online"}) == 75.0);
@@ -276,7 +355,7 @@ TEST_CASE("eval names the problem of its input, and then writes nothing") {
   CHECK(has(message_of(good), "no ground truth"));
   CHECK(!fs::exists(json));
   fs::rename(sequence / "labels_aside", sequence / "labels");
-  CHECK(message_of(good).empty());
+  CHECK(message_of(good) == kNoMessage);
   CHECK(fs::exists(json));
 }
 

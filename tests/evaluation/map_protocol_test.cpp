@@ -75,7 +75,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
     for (const OwnedScan& scan : scans) {
       for (std::size_t i = 0; i < scan.truth.size(); ++i) {
         if ((scan.in_map[i] & 1U) == 0) continue;
-        const double shift = random.chance(0.5) ? 0.06 : 0.0;
+        const double shift = chance(random, 0.5) ? 0.06 : 0.0;
         map.push_back(scan.T_world_sensor * scan.view().point(i) +
                       shift * Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1),
                                               random.uniform(-1, 1)));

@@ -3,11 +3,11 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <random>
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/truth.hpp"
+#include "support/random.hpp"
 
 namespace dynains::evaluation::testing {
 
@@ -49,19 +49,11 @@ inline ScanSource source_of(const std::vector<OwnedScan>& scans) {
   };
 }
 
-/// Random numbers that do not depend on the standard library.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  /// In [min, max).
-  double uniform(double min, double max) {
-    return min + (max - min) * static_cast<double>(engine_() >> 11U) * 0x1p-53;
-  }
-  bool chance(double probability) { return uniform(0, 1) < probability; }
+using test::Random;
 
- private:
-  std::mt19937_64 engine_;
-};
+inline bool chance(Random& random, double probability) {
+  return random.uniform(0, 1) < probability;
+}
 
 /// Scans of a small box of points. Truths, ignored points and two estimates mix in most voxels of
 /// 0.2 m. The sensor turns and moves. Some points are no returns or not finite.
@@ -75,16 +67,16 @@ inline std::vector<OwnedScan> mixed_scans(std::uint64_t seed, std::size_t scans,
                           Eigen::AngleAxisd(random.uniform(-0.2, 0.2), Eigen::Vector3d::UnitZ());
     scan.time = 0.1 * static_cast<double>(s);
     for (std::size_t i = 0; i < points_per_scan; ++i) {
-      const bool moving = random.chance(0.4);
-      const std::uint32_t label = random.chance(0.1) ? 0 : moving ? kMovingCar : kRoad;
+      const bool moving = chance(random, 0.4);
+      const std::uint32_t label = chance(random, 0.1) ? 0 : moving ? kMovingCar : kRoad;
       // Estimate 0 is mostly right, estimate 1 nearly random.
       const unsigned held =
-          (random.chance(moving ? 0.2 : 0.8) ? 1U : 0U) | (random.chance(0.5) ? 2U : 0U);
+          (chance(random, moving ? 0.2 : 0.8) ? 1U : 0U) | (chance(random, 0.5) ? 2U : 0U);
       auto x = static_cast<float>(random.uniform(0.5, 3.0));
       const auto y = static_cast<float>(random.uniform(-1.5, 1.5));
       const auto z = static_cast<float>(random.uniform(-0.3, 0.6));
-      if (random.chance(0.01)) x = std::numeric_limits<float>::quiet_NaN();
-      if (random.chance(0.01)) {
+      if (chance(random, 0.01)) x = std::numeric_limits<float>::quiet_NaN();
+      if (chance(random, 0.01)) {
         scan.add(0, 0, 0, label, held);
       } else {
         scan.add(x, y, z, label, held);

@@ -1,7 +1,6 @@
 // Recordings without poses: dynains odometry, dynains run --odometry and what they say.
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,11 +52,6 @@ class Unposed {
   std::optional<Recording> exact_;
 };
 
-std::size_t count_files(const fs::path& folder) {
-  return static_cast<std::size_t>(
-      std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
-}
-
 TEST_CASE("Without poses, commands propose the odometry, and it finds the poses") {
   const Unposed recording;
   for (const char* command : {"check", "run"}) {
@@ -86,7 +80,7 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
   const fs::path out = recording / "out";
   succeed(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}));
   CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
-  CHECK(count_files(out / "labels") == 12);
+  CHECK(count_entries(out / "labels") == 12);
   CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--force", "-q"}).code ==
         0);
   CHECK(start({"view", out}).code == 0);
@@ -103,7 +97,7 @@ TEST_CASE("After a loss of track, the scans before it have results") {
   const Outcome outcome = start({"run", recording.sequence(), "--odometry", "--out", out, "-q"});
   CHECK(outcome.code == 3);
   CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000008"));
-  CHECK(count_files(out / "labels") == 8);
+  CHECK(count_entries(out / "labels") == 8);
 }
 
 TEST_CASE("The odometry says about the clouds what a run says") {

@@ -70,6 +70,10 @@ TEST_CASE("A failed write to standard output is an error, a closed pipe is none"
   CHECK(code_of(program + " > /dev/full") == 1);
   CHECK(code_of(program + " > /dev/null") == 0);
   CHECK(code_of("(sleep 0.2; " + program + ") | true") == 0);
+  for (const Arguments& arguments : {Arguments{"--help"}, {"--version"}, {"run", "--help"}}) {
+    const auto to_full = [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); };
+    check_refused(start(arguments, to_full), 1, "error: standard output: cannot be written\n");
+  }
 }
 
 TEST_CASE("An error of the file system is one line that begins with the path") {
@@ -77,19 +81,6 @@ TEST_CASE("An error of the file system is one line that begins with the path") {
   const Outcome outcome = start({"run", folder.path(), "--out", ""});
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, StartsWith("dynains: error: \"\": "));
-}
-
-TEST_CASE("Help that cannot be written is an error") {
-  const auto to_full = [] {
-    const int full = ::open("/dev/full", O_WRONLY);
-    ::dup2(full, STDOUT_FILENO);
-  };
-  for (const char* const flag : {"--help", "--version"}) {
-    const Outcome outcome = start({flag}, to_full);
-    CHECK(outcome.code == 1);
-    CHECK(outcome.err == "dynains: error: standard output: cannot be written\n");
-  }
-  CHECK(start({"run", "--help"}, to_full).code == 1);
 }
 
 TEST_CASE("A NUL byte in a config file is named with its line") {

@@ -22,38 +22,11 @@ class Recorder {
  public:
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
-    measure_from(0.0F, count, first, x, label);
+    measure(0, count, first, x, label);
   }
-  /// Measures `count` places in a row along y, from place `first` on, `x` m in front of a sensor at
-  /// x = `sensor_x` m.
-  void measure_from(float sensor_x, int count, int first, float x,
-                    PointLabel label = PointLabel::kStatic) {
-    PointBuffer points;
-    for (int i = 0; i < count; ++i) {
-      points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
-      points.push_back(x + 0.2F, 0.4F * static_cast<float>(first + i) + 0.3F, 0.3F);
-    }
-    const std::vector<PointLabel> labels(points.size(), label);
-    const std::vector<Cause> causes(points.size(), Cause::kUnknown);
-    const Eigen::Vector3d at(static_cast<double>(sensor_x), 0.0, 0.0);
-    places.add(points, labels, causes, Pose(Eigen::Translation3d(at)), time_, scan_);
-  }
-  /// The first pass judges the points of places in each of these scans, 1 s apart, and those of as
-  /// many places beside them.
-  void judge(std::uint32_t first, const std::vector<PointLabel>& verdicts, int count = 6,
-             const std::vector<PointLabel>& beside = {}) {
-    for (std::size_t i = 0; i < verdicts.size(); ++i, ++first) {
-      judge_places(first, verdicts[i], count, 0);
-      if (!beside.empty()) judge_places(first, beside[i], count, count);
-    }
-  }
-  /// The first pass judges the points of `count` places, from place `first` on, in one scan.
-  void judge_places(std::uint32_t scan, PointLabel verdict, int count, int first) {
-    scan_ = scan;
-    time_ = scan;
-    measure(count, first, 10.1F, verdict);
-    scan_ = 0;
-    time_ = 0.0;
+  /// The first pass judges the points of six places in each of these scans, 1 s apart.
+  void judge(std::uint32_t scan, const std::vector<PointLabel>& verdicts) {
+    for (const PointLabel verdict : verdicts) measure(scan++, 6, 0, 10.1F, verdict);
   }
   void look(BeamResult seen, int times = 1) {
     look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
@@ -92,6 +65,17 @@ class Recorder {
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
 
  private:
+  void measure(std::uint32_t scan, int count, int first, float x, PointLabel label) {
+    PointBuffer points;
+    for (int i = 0; i < count; ++i) {
+      points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
+      points.push_back(x + 0.2F, 0.4F * static_cast<float>(first + i) + 0.3F, 0.3F);
+    }
+    const std::vector<PointLabel> labels(points.size(), label);
+    const std::vector<Cause> causes(points.size(), Cause::kUnknown);
+    places.add(points, labels, causes, Pose::Identity(), scan, scan);
+  }
+
   std::uint32_t scan_ = 0;
   double time_ = 0.0;  // s
   detail::Visibility visibility_;

@@ -137,16 +137,17 @@ Counts sum(const std::vector<Counts>& counts) {
   return all;
 }
 
-/// A car that is parked during the first drive, and gone in the second one.
-Recorded with_parked_car(double y = 4.0) {
+/// A drive there and one back; a car is parked during the first one, the second one, or both.
+Recorded there_and_back(bool is_parked_first, bool is_parked_then, double y = 4.0) {
   Recorded recording;
-  std::vector<StreetBox> boxes = street();
-  boxes.push_back(car_at(4.0, y));
-  recording.drive(boxes, -15.0, 15.0);
-  boxes.pop_back();
-  recording.drive(boxes, 15.0, -15.0);
+  std::vector<StreetBox> with_car = street();
+  with_car.push_back(car_at(4.0, y));
+  recording.drive(is_parked_first ? with_car : street(), -15.0, 15.0);
+  recording.drive(is_parked_then ? with_car : street(), 15.0, -15.0);
   return recording;
 }
+
+Recorded with_parked_car(double y = 4.0) { return there_and_back(true, false, y); }
 
 /// Some scans take parts of a car for ground: kFlat up to 9 cm, kHigh from 45 to 70 cm. If
 /// `is_alone`, no other scan judges the high ones.
@@ -188,11 +189,7 @@ TEST_CASE("a car that leaves after a minute leaves all scans, and nothing else d
 }
 
 TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
-  Recorded recording;
-  std::vector<StreetBox> boxes = street();
-  boxes.push_back(car_at(4.0));
-  recording.drive(boxes, -15.0, 15.0);
-  recording.drive(boxes, 15.0, -15.0);
+  const Recorded recording = there_and_back(true, true);
   for (const std::uint32_t label : {kCar, kHouse, kTree}) {
     const Counts all = sum(count(recording, label));
     CHECK(all.kept > 0);
@@ -201,11 +198,7 @@ TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
 }
 
 TEST_CASE("a car that parks and stays is static if what stands at last is, and since it stands") {
-  Recorded recording;
-  std::vector<StreetBox> boxes = street();
-  recording.drive(boxes, -15.0, 15.0);
-  boxes.push_back(car_at(4.0));
-  recording.drive(boxes, 15.0, -15.0);
+  const Recorded recording = there_and_back(false, true);
   const Counts always = sum(count(recording, kCar));
   CHECK(always.removed > 9 * always.kept);
   const Counts last = sum(count(recording, kCar, true, removes_nothing, last_policy()));
@@ -253,12 +246,8 @@ TEST_CASE("a second pass that was interrupted changes nothing") {
 }
 
 TEST_CASE("what the first pass removed for a while comes back if what stands at last is static") {
-  Recorded recording;
-  std::vector<StreetBox> boxes = street();
-  recording.drive(boxes, -15.0, 15.0);
-  const std::size_t turn = recording.scans.size();
-  boxes.push_back(car_at(4.0));
-  recording.drive(boxes, 15.0, -15.0);
+  const Recorded recording = there_and_back(false, true);
+  const std::size_t turn = recording.scans.size() / 2;
   const auto removes = [turn](std::size_t scan, std::uint32_t label) {
     const bool is_one = scan >= turn + 12 && scan < turn + 15 && label == kCar;
     return is_one ? Cause::kWithInstance : Cause::kUnknown;
@@ -300,12 +289,8 @@ TEST_CASE(
     CHECK(flat.removed == 0);
     CHECK(sum(count(left, kRoad)).removed == 0);
     // The second pass keeps every point of a car that is parked during the whole recording.
-    Recorded recording;
-    std::vector<StreetBox> boxes = street();
-    boxes.push_back(car_at(4.0));
-    recording.drive(boxes, -15.0, 15.0);
-    recording.drive(boxes, 15.0, -15.0);
-    const Counts stays = sum(count(with_ground_on_car(recording, is_alone), kHigh));
+    const Recorded parked = with_ground_on_car(there_and_back(true, true), is_alone);
+    const Counts stays = sum(count(parked, kHigh));
     CHECK(stays.kept > 0);
     CHECK(stays.removed == 0);
   }
