@@ -17,21 +17,18 @@ namespace {
 template <class Point>
 std::vector<Verdict> verdicts_of(const std::vector<Scan>& scans) {
   DynaInsRemover remover(DynaInsRemover::Config::paper());
-  std::vector<Verdict> result;
-  for (const Scan& scan : scans) {
+  const auto to_pcl = [](const std::vector<Eigen::Vector3f>& points) {
     pcl::PointCloud<Point> cloud;
-    for (const auto& p : scan.points) {
+    for (const auto& p : points) {
       Point point;
       point.x = p.x();
       point.y = p.y();
       point.z = p.z();
       cloud.push_back(point);
     }
-    const FrameResult frame = remover.push(cloud, scan.T_world_sensor, scan.time);
-    if (frame.finished) result.emplace_back(*frame.finished);
-  }
-  remover.flush([&](const ScanVerdict& verdict) { result.emplace_back(verdict); });
-  return result;
+    return cloud;
+  };
+  return run(remover, scans, to_pcl).final;
 }
 
 TEST_CASE("PCL clouds of any point type get the labels of their points") {

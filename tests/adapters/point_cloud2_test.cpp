@@ -19,36 +19,18 @@ std::vector<Eigen::Vector3f> points_of(const PointCloud2View& view) {
 }
 
 TEST_CASE("a message gives its points, in any layout") {
-  Layout layout;
-  SECTION("as most drivers lay it out") {}
-  SECTION("odd offsets, not aligned, another order") {
-    layout.z = 3;
-    layout.x = 9;
-    layout.y = 17;
-    layout.point_step = 21;
+  // Offsets of x, y and z, type, bytes of a point, rows, bytes after each row, other byte order.
+  for (const Layout& layout : {
+           Layout(),                        // as most drivers lay it out
+           Layout{9, 17, 3, kFloat32, 21},  // not aligned, another order
+           Layout{0, 8, 16, kFloat64, 26}, Layout{0, 4, 8, kFloat32, 16, 1, 0, true},
+           Layout{2, 10, 18, kFloat64, 30, 1, 0, true}, Layout{0, 4, 8, kFloat32, 16, 2},
+           Layout{0, 4, 8, kFloat32, 16, 3, 5},
+           Layout{0, 4, 8, kFloat32, 12},  // coordinates and nothing else
+       }) {
+    CAPTURE(layout.x, int(layout.type), layout.point_step, layout.height, layout.swapped);
+    CHECK(points_of(PointCloud2View(make_message<LookAlike>(kPoints, layout))) == kPoints);
   }
-  SECTION("doubles") {
-    layout.type = kFloat64;
-    layout.y = 8;
-    layout.z = 16;
-    layout.point_step = 26;
-  }
-  SECTION("the other byte order") { layout.swapped = true; }
-  SECTION("doubles in the other byte order") {
-    layout.swapped = true;
-    layout.type = kFloat64;
-    layout.x = 2;
-    layout.y = 10;
-    layout.z = 18;
-    layout.point_step = 30;
-  }
-  SECTION("rows") { layout.height = 2; }
-  SECTION("padded rows") {
-    layout.height = 3;
-    layout.padding = 5;
-  }
-  SECTION("a point is its coordinates and nothing else") { layout.point_step = 12; }
-  CHECK(points_of(PointCloud2View(make_message<LookAlike>(kPoints, layout))) == kPoints);
 }
 
 TEST_CASE("a message may mix floats and doubles") {
@@ -60,22 +42,16 @@ TEST_CASE("a message may mix floats and doubles") {
 }
 
 TEST_CASE("values that drivers often leave out are not needed") {
-  SECTION("row_step of a single row") {
-    LookAlike message = make_message<LookAlike>(kPoints);
-    message.row_step = 0;
-    CHECK(points_of(PointCloud2View(message)) == kPoints);
-  }
-  SECTION("the padding of the last row") {
-    LookAlike message = make_message<LookAlike>(kPoints, {0, 4, 8, kFloat32, 16, 2, 7});
-    message.data.resize(message.data.size() - 7);
-    CHECK(points_of(PointCloud2View(message)) == kPoints);
-  }
-  SECTION("everything, in a message without points") {
-    CHECK(PointCloud2View(LookAlike()).size() == 0);
-    LookAlike message;
-    message.height = 64;  // an organized scan without columns
-    CHECK(PointCloud2View(message).size() == 0);
-  }
+  LookAlike row = make_message<LookAlike>(kPoints);
+  row.row_step = 0;  // of a single row
+  CHECK(points_of(PointCloud2View(row)) == kPoints);
+  LookAlike unpadded = make_message<LookAlike>(kPoints, {0, 4, 8, kFloat32, 16, 2, 7});
+  unpadded.data.resize(unpadded.data.size() - 7);  // the last row
+  CHECK(points_of(PointCloud2View(unpadded)) == kPoints);
+  LookAlike empty;
+  CHECK(PointCloud2View(empty).size() == 0);
+  empty.height = 64;  // an organized scan without columns
+  CHECK(PointCloud2View(empty).size() == 0);
 }
 
 std::string refusal(const LookAlike& message) {
@@ -88,46 +64,35 @@ std::string refusal(const LookAlike& message) {
 }
 
 TEST_CASE("a message that cannot be read is refused with the reason") {
-  LookAlike message = make_message<LookAlike>(kPoints);
-  SECTION("a coordinate is missing") {
-    message.fields[3].name = "Y";
-    CHECK(refusal(message) == "PointCloud2: no field 'y', only: z, ring, x, Y");
+  const auto refusal_of = [](auto&& change) {
+    LookAlike message = make_message<LookAlike>(kPoints);
+    change(message);
+    return refusal(message);
+  };
+  CHECK(refusal_of([](LookAlike& m) { m.fields[3].name = "Y"; }) ==
+        "PointCloud2: no field 'y', only: z, ring, x, Y");
+  CHECK(refusal_of([](LookAlike& m) { m.fields[2].datatype = kUint16; }) ==
+        "PointCloud2: field 'x' has datatype 4, expected 7 (FLOAT32) or 8 (FLOAT64)");
+  CHECK(refusal_of([](LookAlike& m) { m.fields[0].offset = 13; }) ==
+        "PointCloud2: field 'z' ends at byte 17 of a point of 16 bytes");
+  CHECK(refusal_of([](LookAlike& m) { m.fields[0].offset = 12; }) == "accepted");
+  // The sum of offset and size has more than 32 bits.
+  CHECK_THAT(refusal_of([](LookAlike& m) { m.fields[0].offset = 0xffffffff; }),
+             ContainsSubstring("ends at byte 4294967299"));
+  CHECK(refusal_of([](LookAlike& m) { m.data.pop_back(); }) ==
+        "PointCloud2: data has 95 bytes, 6 x 1 points of 16 bytes need more");
+  for (const std::uint32_t width : {1U, 2U}) {  // numbers that no data can back
+    CHECK_THAT(refusal_of([&](LookAlike& m) {
+                 m.height = m.row_step = m.point_step = 0xffffffff;
+                 m.width = width;
+               }),
+               ContainsSubstring(width == 1 ? "data has 96 bytes" : "must fit 32 bits"));
   }
-  SECTION("a coordinate is an integer") {
-    message.fields[2].datatype = kUint16;
-    CHECK(refusal(message) ==
-          "PointCloud2: field 'x' has datatype 4, expected 7 (FLOAT32) or 8 (FLOAT64)");
-  }
-  SECTION("a coordinate lies over the end of the point by one byte") {
-    message.fields[0].offset = 13;
-    CHECK(refusal(message) == "PointCloud2: field 'z' ends at byte 17 of a point of 16 bytes");
-    message.fields[0].offset = 12;
-    CHECK(refusal(message) == "accepted");
-  }
-  SECTION("offsets whose sum with the size has more than 32 bits") {
-    message.fields[0].offset = 0xffffffff;
-    CHECK_THAT(refusal(message), ContainsSubstring("ends at byte 4294967299"));
-  }
-  SECTION("one byte of data is missing") {
-    message.data.pop_back();
-    CHECK(refusal(message) == "PointCloud2: data has 95 bytes, 6 x 1 points of 16 bytes need more");
-  }
-  SECTION("numbers that no data can back") {
-    message.height = 0xffffffff;
-    message.width = 1;
-    message.row_step = 0xffffffff;
-    message.point_step = 0xffffffff;
-    CHECK_THAT(refusal(message), ContainsSubstring("data has 96 bytes"));
-    message.width = 2;
-    CHECK_THAT(refusal(message), ContainsSubstring("must fit 32 bits"));
-  }
-  SECTION("rows that overlap") {
-    message.height = 2;
-    message.width = 3;
-    message.row_step = 47;
-    CHECK(refusal(message) ==
-          "PointCloud2: row_step = 47 must be at least width * point_step = 48");
-  }
+  CHECK(refusal_of([](LookAlike& m) {  // rows that overlap
+          m.height = 2;
+          m.width = 3;
+          m.row_step = 47;
+        }) == "PointCloud2: row_step = 47 must be at least width * point_step = 48");
 }
 
 TEST_CASE("labels of messages are those of the points in them") {
@@ -136,14 +101,12 @@ TEST_CASE("labels of messages are those of the points in them") {
   CHECK(share(scans, expected, PointLabel::kDynamic).labelled > 0);
 
   DynaInsRemover remover(DynaInsRemover::Config::paper());
-  std::vector<Verdict> found;
-  for (const Scan& scan : scans) {
-    const auto message = make_message<LookAlike>(scan.points, {2, 6, 10, kFloat32, 19});
-    const auto frame = remover.push(PointCloud2View(message), scan.T_world_sensor, scan.time);
-    if (frame.finished) found.emplace_back(*frame.finished);
-  }
-  remover.flush([&](const ScanVerdict& verdict) { found.emplace_back(verdict); });
-  CHECK((found == expected));
+  LookAlike message;
+  const auto to_message = [&](const std::vector<Eigen::Vector3f>& points) {
+    message = make_message<LookAlike>(points, {2, 6, 10, kFloat32, 19});
+    return PointCloud2View(message);
+  };
+  CHECK((run(remover, scans, to_message).final == expected));
 }
 
 TEST_CASE("the static points of a message keep every byte, and the others are apart") {

@@ -52,45 +52,43 @@ TEST_CASE("clouds that only wait are not cleaned, and not wrong yet") {
 }
 
 TEST_CASE("a report tells what is wrong") {
-  LoopCounts counts = ten_clouds();
-  LoopState state;
-  Level level = Level::kWarn;
-  std::string message;
-  SECTION("no cloud") {
-    counts = LoopCounts();
-    message = "no cloud arrives";
-  }
-  SECTION("some clouds are left out") {
-    counts.dropped[static_cast<std::size_t>(Drop::kOverflow)] = 2;
-    counts.dropped[static_cast<std::size_t>(Drop::kNoTransform)] = 3;
-    counts.last_reason = "no frame 'odom'";
-    message = "clouds are left out: 2 queue full, 3 no transform (no frame 'odom')";
-  }
-  SECTION("all clouds are left out") {
-    counts.taken = 0;
-    counts.dropped[static_cast<std::size_t>(Drop::kInvalid)] = 10;
-    level = Level::kError;
-    message = "no cloud is taken: 10 refused";
-  }
-  SECTION("implausible scans, and what else there is") {
-    state.suspicion = dynains::Suspicion::kPoses;
-    counts.misfits = 1;
-    level = Level::kError;
-    message =
-        "scans do not fit to each other: check the transforms; "
-        "poses that do not fit to their scans: 1";
-  }
-  SECTION("doubtful stamps") {
-    state.time_doubt = dynains::TimeDoubt::kTooFast;
-    message = "stamps are less than 1 ms apart";
-  }
-  SECTION("messages that nobody took") {
-    counts.failures = 2;
-    message = "messages that could not be published: 2";
-  }
-  const Diagnosis diagnosis = diagnose(counts, {}, state, 1.0);
-  CHECK(diagnosis.level == level);
-  CHECK(diagnosis.message == message);
+  const auto check = [](auto&& change, Level level, const std::string& message) {
+    LoopCounts counts = ten_clouds();
+    LoopState state;
+    change(counts, state);
+    const Diagnosis diagnosis = diagnose(counts, {}, state, 1.0);
+    CHECK(diagnosis.level == level);
+    CHECK(diagnosis.message == message);
+  };
+  check([](auto& counts, auto&) { counts = LoopCounts(); }, Level::kWarn, "no cloud arrives");
+  const auto drop = [](LoopCounts& counts, Drop why, std::size_t count) {
+    counts.dropped[static_cast<std::size_t>(why)] = count;
+  };
+  check(
+      [&](auto& counts, auto&) {
+        drop(counts, Drop::kOverflow, 2);
+        drop(counts, Drop::kNoTransform, 3);
+        counts.last_reason = "no frame 'odom'";
+      },
+      Level::kWarn, "clouds are left out: 2 queue full, 3 no transform (no frame 'odom')");
+  check(
+      [&](auto& counts, auto&) {
+        counts.taken = 0;
+        drop(counts, Drop::kInvalid, 10);
+      },
+      Level::kError, "no cloud is taken: 10 refused");
+  check(
+      [](auto& counts, auto& state) {
+        state.suspicion = dynains::Suspicion::kPoses;
+        counts.misfits = 1;
+      },
+      Level::kError,
+      "scans do not fit to each other: check the transforms; "
+      "poses that do not fit to their scans: 1");
+  check([](auto&, auto& state) { state.time_doubt = dynains::TimeDoubt::kTooFast; }, Level::kWarn,
+        "stamps are less than 1 ms apart");
+  check([](auto& counts, auto&) { counts.failures = 2; }, Level::kWarn,
+        "messages that could not be published: 2");
 }
 
 }  // namespace

@@ -39,16 +39,24 @@ struct Run {
   std::vector<Verdict> final;   // in the order of their calls
 };
 
-template <class Stages>
-Run run(BasicDynaInsRemover<Stages>& remover, const std::vector<Scan>& scans) {
+/// Runs over the scans, each converted to another type of cloud.
+template <class Stages, class Convert>
+Run run(BasicDynaInsRemover<Stages>& remover, const std::vector<Scan>& scans, Convert&& convert) {
   Run result;
   for (const Scan& scan : scans) {
-    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    const auto& cloud = convert(scan.points);  // outlives the call of push
+    const FrameResult frame = remover.push(cloud, scan.T_world_sensor, scan.time);
     result.newest.emplace_back(frame.newest);
     if (frame.finished) result.final.emplace_back(*frame.finished);
   }
   remover.flush([&](const ScanVerdict& verdict) { result.final.emplace_back(verdict); });
   return result;
+}
+
+template <class Stages>
+Run run(BasicDynaInsRemover<Stages>& remover, const std::vector<Scan>& scans) {
+  return run(
+      remover, scans, [](const auto& points) -> const auto& { return points; });
 }
 
 inline Run run(const DynaInsRemover::Config& config, const std::vector<Scan>& scans) {
