@@ -98,7 +98,7 @@ TEST_CASE("paper: similar, proposed, reverted by belief, by votes") {
   CHECK(outvoted.share(Cause::kReverted) > 0.5);
 }
 
-TEST_CASE("paper: seen by too few scans") {
+TEST_CASE("paper: an object in one scan only is static, seen by too few scans") {
   std::vector<Scan> scans = drive(yard(), 9, 0.0);
   scans[4] = yard_with(van(12.0, 3.0)).scan(sensor_at(0.0), scans[4].time);
   const Run result = run_paper(scans);
@@ -151,25 +151,6 @@ TEST_CASE("evidence: a moved object was seen free, a static one was seen occupie
   CHECK(moving[Cause::kUnderInstance] > 0);
 }
 
-TEST_CASE("evidence: a single scan gives no evidence") {
-  const std::vector<Scan> scans = drive(oncoming(), 1, 0.0);
-  const Causes all(scans, run(Config(), scans).final);
-  CHECK(all[Cause::kNoEvidence] > 5000);
-  CHECK(all[Cause::kNoEvidence] + all[Cause::kGround] + all[Cause::kNotJudged] == all.total);
-}
-
-TEST_CASE("evidence: seen free, but below the thresholds") {
-  const std::vector<Scan> scans = drive(oncoming(), 16, 0.0);
-  Config config;
-  config.evidence.use_tracks = false;
-  config.evidence.tau_free = 0.999999;
-  config.evidence.tau_contested = 0.999999;
-  config.evidence.test_ground = false;  // the free ground has thresholds of its own
-  const Causes moving(scans, run(config, scans).final, kAddedBox);
-  CHECK(moving.share(Cause::kTooLittleFree) > 0.7);
-  CHECK(moving[Cause::kFreeSpace] == 0);
-}
-
 // As fast as the sensor and scanned from behind, so that no earlier scan covers its place.
 TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen") {
   const std::vector<Scan> scans = drive(yard_with(van(9.0, 0.0, {10.0, 0.0, 0.0})), 16, 10.0);
@@ -184,17 +165,6 @@ TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen
   config.evidence.presume_dynamic = false;
   const Causes silent(scans[5], run(config, scans).newest[5], kAddedBox);
   CHECK(silent.share(Cause::kNoEvidence) > 0.8);
-}
-
-// The vehicle in earlier scans has been seen through since. In the newest scan, too few of its
-// samples were seen free, because supervoxels are so small.
-TEST_CASE("evidence: a vehicle whose sides overlap from scan to scan is removed along its track") {
-  const std::vector<Scan> scans = drive(yard_with(van(9.0, 2.0, {4.0, 0.0, 0.0})), 6, 4.0);
-  Config config;
-  config.evidence.supervoxel = 0.4;
-  CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox).share(Cause::kAlongTrack) > 0.8);
-  config.evidence.use_tracks = false;
-  CHECK(Causes(scans[5], run(config, scans).newest[5], kAddedBox)[Cause::kAlongTrack] == 0);
 }
 
 }  // namespace

@@ -69,19 +69,6 @@ TEST_CASE("S_k of every comparable cluster holds exactly the points of Eq. 4, in
   }
 }
 
-TEST_CASE("a cluster without points in the newest or the oldest scan is not compared") {
-  PolarBuffer window;
-  for (int i = 0; i < 6; ++i) add(window, 10.0, 0.0, 0.0);
-  const std::vector<std::uint32_t> scan_begin = {0, 2, 4, 6};
-  // Cluster 0: all scans. 1: oldest and middle. 2: newest alone.
-  const std::vector<std::uint32_t> cluster_of = {0, 1, 0, 1, 0, 2};
-  ClusterSet clusters;
-  clusters.build(window.view(), scan_begin, cluster_of, 3);
-  CHECK(clusters.comparable(0));
-  CHECK_FALSE(clusters.comparable(1));
-  CHECK_FALSE(clusters.comparable(2));
-}
-
 TEST_CASE("a cluster of the newest scan and any other is compared on demand") {
   PolarBuffer window;
   for (int i = 0; i < 8; ++i) add(window, 10.0, 0.0, 0.0);

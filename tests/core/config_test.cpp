@@ -178,39 +178,34 @@ TEST_CASE("a value out of bounds is refused by field, value and bound") {
 }
 
 TEST_CASE("parameters that contradict each other are refused by name") {
-  Config config = Config::paper();
-  SECTION("range") {
-    config.min_range = config.max_range = 50.0;
-    CHECK_THAT(error_of(config),
-               ContainsSubstring("min_range = 50") && ContainsSubstring("max_range = 50"));
-    config.max_range = 50.1;
-    CHECK(error_of(config).empty());
+  const auto error = [](auto&& change) {
+    Config config = Config::paper();
+    change(config);
+    return error_of(config);
+  };
+  CHECK_THAT(error([](Config& c) { c.min_range = c.max_range = 50.0; }),
+             ContainsSubstring("min_range = 50") && ContainsSubstring("max_range = 50"));
+  const auto just_apart = [](Config& c) {
+    c.min_range = 50.0;
+    c.max_range = 50.1;
+  };
+  CHECK(error(just_apart).empty());
+  CHECK_THAT(error([](Config& c) { c.votes = 5; }),
+             ContainsSubstring("votes = 5") && ContainsSubstring("window = 4"));
+  CHECK(error([](Config& c) { c.votes = 4; }).empty());
+  CHECK_THAT(
+      error([](Config& c) { c.ground.ground_min_range = c.ground.ground_max_range = 40.0; }),
+      ContainsSubstring("ground_min_range = 40") && ContainsSubstring("ground_max_range = 40"));
+  CHECK_THAT(error([](Config& c) { c.map.map_voxel = 0.004; }),
+             ContainsSubstring("map_voxel = 0.004"));
+  for (const double voxel : {0.005, 0.0}) {
+    CHECK(error([&](Config& c) { c.map.map_voxel = voxel; }).empty());
   }
-  SECTION("votes") {
-    config.votes = 5;
-    CHECK_THAT(error_of(config), ContainsSubstring("votes = 5") && ContainsSubstring("window = 4"));
-    config.votes = 4;
-    CHECK(error_of(config).empty());
-  }
-  SECTION("ground rings") {
-    config.ground.ground_min_range = config.ground.ground_max_range = 40.0;
-    CHECK_THAT(error_of(config), ContainsSubstring("ground_min_range = 40") &&
-                                     ContainsSubstring("ground_max_range = 40"));
-  }
-  SECTION("map resolution") {
-    config.map.map_voxel = 0.004;
-    CHECK_THAT(error_of(config), ContainsSubstring("map_voxel = 0.004"));
-    config.map.map_voxel = 0.005;
-    CHECK(error_of(config).empty());
-    config.map.map_voxel = 0.0;
-    CHECK(error_of(config).empty());
-  }
-  SECTION("more voxels than memory can hold") {
-    config.clusterer.voxel_azimuth = 0.05;
-    config.clusterer.voxel_elevation = 0.1;
-    config.clusterer.voxel_range = 0.05;
-    CHECK_THAT(error_of(config), ContainsSubstring("voxel_range") && ContainsSubstring("cells"));
-  }
+  const auto too_fine = [](Config& c) {  // more voxels than memory can hold
+    c.clusterer.voxel_azimuth = c.clusterer.voxel_range = 0.05;
+    c.clusterer.voxel_elevation = 0.1;
+  };
+  CHECK_THAT(error(too_fine), ContainsSubstring("voxel_range") && ContainsSubstring("cells"));
 }
 
 }  // namespace

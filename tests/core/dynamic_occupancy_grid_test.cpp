@@ -34,6 +34,11 @@ struct SparseScan {
   }
 
   void say(Cause cause, float belief = 0.5F) { verdicts.assign(counted.size(), {cause, belief}); }
+  Verdict judge(std::uint64_t scan, DynamicOccupancyGrid& grid,
+                const Eigen::Isometry3d& T_origin_sensor = Eigen::Isometry3d::Identity()) {
+    grid.judge(scan, samples, T_origin_sensor, counted, verdicts);
+    return verdicts[0];
+  }
 };
 
 constexpr float kBelief = 0.625F;
@@ -48,18 +53,16 @@ FreeSpaceConfig three_quarters() {
 Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_quarters(),
                        std::uint64_t later = 1, Cause cause_of_moved = Cause::kFreeSpace) {
   DynamicOccupancyGrid grid(config);
-  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> place(1, {10.1F, 5.2F, 0.3F});
   std::uint64_t scan = 0;
   for (int i = 0; i < moved + stayed; ++i) {
     SparseScan one(place);
     one.say(i < moved ? cause_of_moved : Cause::kOccupied);
-    grid.judge(scan++, one.samples, T, one.counted, one.verdicts);
+    one.judge(scan++, grid);
   }
   SparseScan last(place);
   last.say(Cause::kOccupied, kBelief);
-  grid.judge(scan - 1 + later, last.samples, T, last.counted, last.verdicts);
-  return last.verdicts[0];
+  return last.judge(scan - 1 + later, grid);
 }
 
 TEST_CASE(
@@ -84,14 +87,11 @@ TEST_CASE("presumed instances are not counted, and a ratio of 1 turns the grid o
 
 TEST_CASE("a later verdict on a scan replaces the earlier one in the count") {
   DynamicOccupancyGrid grid(three_quarters());
-  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   const std::vector<Eigen::Vector3f> place(1, {-3.0F, 4.0F, 1.0F});
   std::vector<SparseScan> scans(5, SparseScan(place));
   const auto judge = [&](std::uint64_t scan, Cause cause) {
-    SparseScan& one = scans[scan];
-    one.say(cause);
-    grid.judge(scan, one.samples, T, one.counted, one.verdicts);
-    return one.verdicts[0].cause;
+    scans[scan].say(cause);
+    return scans[scan].judge(scan, grid).cause;
   };
   for (std::uint64_t scan = 0; scan < 4; ++scan) judge(scan, Cause::kFreeSpace);
   // After repeated verdicts, the scan counts once: 4 of 5.
@@ -119,8 +119,8 @@ TEST_CASE("cells lie in the world frame: their counts do not depend on the pose 
     const std::vector<Eigen::Vector3f> seen(1, T_origin_sensor.inverse().cast<float>() * place);
     SparseScan one(seen);
     one.say(scan < 9 ? Cause::kFreeSpace : Cause::kOccupied);
-    grid.judge(scan, one.samples, T_origin_sensor, one.counted, one.verdicts);
-    if (scan == 9) CHECK(one.verdicts[0].cause == Cause::kDynamicOccupancy);
+    const Verdict verdict = one.judge(scan, grid, T_origin_sensor);
+    if (scan == 9) CHECK(verdict.cause == Cause::kDynamicOccupancy);
   }
 }
 
@@ -157,7 +157,7 @@ TEST_CASE("the grid equals a slow reference count") {
       ++(is_dynamic(one.verdicts[s].cause) ? counts.moved : counts.stayed);
     }
     const std::vector<Verdict> said = one.verdicts;
-    grid.judge(scan, one.samples, Eigen::Isometry3d::Identity(), one.counted, one.verdicts);
+    one.judge(scan, grid);
     for (std::size_t s = 0; s < said.size(); ++s) {
       if (is_dynamic(said[s].cause)) {
         REQUIRE(one.verdicts[s] == said[s]);
@@ -184,7 +184,7 @@ TEST_CASE("a quarter of the samples of a supervoxel must lie in dynamic cells") 
   for (; scan < 20; ++scan) {
     SparseScan one(passed);
     one.say(Cause::kFreeSpace);
-    grid.judge(scan, one.samples, T, one.counted, one.verdicts);
+    one.judge(scan, grid);
   }
   // Four by four samples, 0.3 m apart. The two by two samples of a corner are in the cell.
   const auto cause_of = [&](int inside, int outside) {

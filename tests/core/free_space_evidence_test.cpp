@@ -237,34 +237,27 @@ TEST_CASE("returns of a moved object do not contest a later object in its place"
   }
 }
 
-// An object stands beside a hedge in one scan and is merged with it. The only reference is two
-// scans back.
-TEST_CASE("the part of a removed instance that was not seen free still contests later ones") {
-  FreeSpaceConfig config = every_scan_a_reference();
-  config.lookback_scans = 2;
-  config.lookahead_scans = 0;
-  config.dynamic_grid_ratio = 1.0;
-  config.track_ratio = 0.0;
-  const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
-  const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
-  Watch watch(config);
-  for (int i = 0; i < 6; ++i) watch.see(hedge);
-  watch.see(both(hedge, passing));
-  CHECK(watch.causes(6) == Causes{Cause::kFreeSpace, Cause::kWithInstance});
-  watch.see(hedge).see(hedge);
-  CHECK(watch.causes(8) == Causes{Cause::kOccupied});
-}
-
-TEST_CASE("a hedge that stands in the scans beside stays when an object was merged with it") {
+// An object stands beside a hedge in one scan and is merged with it. The scans beside tell that the
+// hedge stands; without them, a part of the removed instance that was not seen free still contests.
+TEST_CASE("a hedge stays when an object was merged with it, or contests later instances") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookahead_scans = 0;
   config.dynamic_grid_ratio = 1.0;
   const PointBuffer hedge = panel(10.0F, -3.0F, 1.4F, -1.5F, 0.5F);
   const PointBuffer passing = panel(10.0F, 1.4F, 3.0F, -1.5F, 0.5F);
-  Watch watch(config);
-  for (int i = 0; i < 6; ++i) watch.see(hedge);
-  watch.see(both(hedge, passing));
-  CHECK(watch.causes(6) == Causes{Cause::kFreeSpace, Cause::kOccupied});
+  for (const bool by_tracks : {true, false}) {
+    if (!by_tracks) {
+      config.lookback_scans = 2;
+      config.track_ratio = 0.0;
+    }
+    Watch watch(config);
+    for (int i = 0; i < 6; ++i) watch.see(hedge);
+    watch.see(both(hedge, passing));
+    CHECK(watch.causes(6) ==
+          Causes{Cause::kFreeSpace, by_tracks ? Cause::kOccupied : Cause::kWithInstance});
+    watch.see(hedge).see(hedge);
+    CHECK(watch.causes(8) == Causes{Cause::kOccupied});
+  }
 }
 
 TEST_CASE("returns of a static object contest, even if it was presumed to move") {

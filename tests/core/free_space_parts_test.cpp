@@ -366,16 +366,20 @@ TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter
   }
 }
 
+// Adds a point 20 m away; deg.
+void add_beam(double azimuth, double elevation, PointBuffer& points) {
+  const double around = azimuth * M_PI / 180.0, up = elevation * M_PI / 180.0;
+  points.push_back(static_cast<float>(20.0 * std::cos(up) * std::cos(around)),
+                   static_cast<float>(20.0 * std::cos(up) * std::sin(around)),
+                   static_cast<float>(20.0 * std::sin(up)));
+}
+
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {
   // 40 beams 0.5 deg apart, a point every 0.3 deg, at 20 m.
   PointBuffer points;
   for (int beam = 0; beam < 40; ++beam) {
-    const double elevation = (-15.0 + 0.5 * beam) * M_PI / 180.0;
     for (int column = 0; column < 1200; ++column) {
-      const double azimuth = (0.3 * column - 180.0) * M_PI / 180.0;
-      points.push_back(static_cast<float>(20.0 * std::cos(elevation) * std::cos(azimuth)),
-                       static_cast<float>(20.0 * std::cos(elevation) * std::sin(azimuth)),
-                       static_cast<float>(20.0 * std::sin(elevation)));
+      add_beam(0.3 * column - 180.0, -15.0 + 0.5 * beam, points);
     }
   }
   const SensorModel sensor = estimate_sensor_model(points);
@@ -396,11 +400,7 @@ TEST_CASE("dense and wide gaps of unevenly spaced beams are distinguished") {
   for (int beam = 0; beam < 25; ++beam) {
     for (int column = 0; column < 1800; ++column) {
       for (const double again : {0.0, 0.002}) {
-        const double azimuth = (0.2 * column - 180.0 + again) * M_PI / 180.0;
-        const double up = elevation * M_PI / 180.0;
-        points.push_back(static_cast<float>(20.0 * std::cos(up) * std::cos(azimuth)),
-                         static_cast<float>(20.0 * std::cos(up) * std::sin(azimuth)),
-                         static_cast<float>(20.0 * std::sin(up)));
+        add_beam(0.2 * column - 180.0 + again, elevation, points);
       }
     }
     elevation += beam < 10 ? 0.3 : beam < 18 ? 0.6 : 1.2;

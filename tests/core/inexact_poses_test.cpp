@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/registration/pose_correction.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/random.hpp"
@@ -209,37 +208,6 @@ TEST_CASE("a push tells why it begins an epoch") {
   CHECK(push(3, 0.1, 100.0) == EpochReason::kJump);
   remover.flush([](const ScanVerdict&) {});
   CHECK(push(4, 0.1, 100.0) == EpochReason::kStart);
-}
-
-TEST_CASE("a push gives the residual of its pose") {
-  const std::vector<SimulatedScan>& scans = street();
-  const auto push_all = [&](const DynaInsRemover::Config& config) {
-    DynaInsRemover remover(config);
-    std::vector<std::optional<PoseResidual>> residuals;
-    for (std::size_t i = 0; i < 6; ++i) {
-      Eigen::Isometry3d T = scans[i].T_world_sensor;
-      if (i == 4) T.translation() += Eigen::Vector3d(0.0, 0.2, 0.0);
-      const RawPoints<float> points{scans[i].xyzi.data(), scans[i].labels.size(), 4};
-      const FrameResult frame = remover.push(points, T, scans[i].time);
-      CHECK((frame.newest.T_world_sensor.matrix() - T.matrix()).norm() < 1e-9);
-      residuals.push_back(frame.pose_residual);
-    }
-    return residuals;
-  };
-  const auto residuals = push_all({});
-  CHECK_FALSE(residuals[0]);
-  for (std::size_t i = 1; i < residuals.size(); ++i) {
-    REQUIRE(residuals[i]);
-    CHECK(residuals[i]->translation == Approx(i < 4 ? 0.0 : 0.2).margin(0.04));
-    const Eigen::Isometry3d T_motion =
-        scans[i - 1].T_world_sensor.inverse() * scans[i].T_world_sensor;
-    const Eigen::Vector3d aligned = residuals[i]->T_previous_newest.translation();
-    CHECK((aligned - T_motion.translation()).norm() < 0.04);
-  }
-  DynaInsRemover::Config unchecked;
-  unchecked.evidence.pose_tolerance = 0.0;
-  CHECK_FALSE(push_all(unchecked)[4]);
-  CHECK_FALSE(push_all(DynaInsRemover::Config::paper())[4]);
 }
 
 }  // namespace

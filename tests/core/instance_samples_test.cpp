@@ -213,26 +213,6 @@ TEST_CASE("the number of samples in each part of a supervoxel is proportional to
   CHECK(halves[0] < 2667 + 170);
 }
 
-TEST_CASE("a point and its samples lie in the same supervoxel of the same instance") {
-  // One row of points along x, 0.1 m apart, in two instances; supervoxels are
-  // [-0.9, 0), [0, 0.9), [0.9, 1.8).
-  PointBuffer points;
-  std::vector<std::uint32_t> instance_of;
-  for (int i = -5; i < 15; ++i) {
-    points.push_back(0.1F * static_cast<float>(i) + 0.05F, 5.0F, 0.1F);
-    instance_of.push_back(i < 9 ? 0U : 1U);
-  }
-  InstanceSampler sampler(0.9, 80.0, 64);
-  InstanceSamples samples;
-  sampler.sample(points, instance_of, 2, samples);
-  REQUIRE(samples.supervoxel_count() == 3);
-  CHECK(samples.supervoxel_begin == std::vector<std::uint32_t>{0, 2, 3});
-  const std::vector<std::uint32_t> supervoxels = supervoxel_of(samples, points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    CHECK(supervoxels[i] == (points.x[i] < 0.0F ? 0U : points.x[i] < 0.9F ? 1U : 2U));
-  }
-}
-
 TEST_CASE("a point in another supervoxel than its predecessor is a change") {
   Random random(5);
   InstanceSampler sampler(0.5, 80.0, 1);

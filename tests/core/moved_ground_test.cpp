@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "dynains/evidence/ground_samples.hpp"
@@ -137,17 +138,23 @@ GroundSamples samples_of(const FreeSpaceConfig& config, const PointBuffer& groun
   return samples;
 }
 
-// Indices of the ground points that are removed with the box. There are no references.
-std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
-  MovedGround moved(config);
-  const RemovedBox box;
+// Indices of the ground points that are removed with the box, all for this cause.
+std::set<std::uint32_t> removed_with_box(MovedGround&& moved, const PointBuffer& ground,
+                                         const GroundSamples& samples, Cause cause,
+                                         const RemovedBox& box = RemovedBox()) {
   moved.add(box.points, box.group_of, box.groups);
   std::set<std::uint32_t> found;
-  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, samples_of(config, ground))) {
-    CHECK(point.verdict.cause == Cause::kUnderInstance);
+  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, samples)) {
+    CHECK(point.verdict.cause == cause);
     CHECK(found.insert(point.point).second);
   }
   return found;
+}
+
+// The same without references.
+std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
+  return removed_with_box(MovedGround(config), ground, samples_of(config, ground),
+                          Cause::kUnderInstance);
 }
 
 TEST_CASE("under a removed box, what rises above the street is removed, and the street stays") {
@@ -185,9 +192,8 @@ TEST_CASE("an object on the ground may begin higher above it where beams are far
     SensorModel sensor = SensorModel::typical();
     sensor.elevation_gap_wide = gap;
     moved.adapt(sensor);
-    const RemovedBox box(0.85F);
-    moved.add(box.points, box.group_of, box.groups);
-    const auto found = moved.find(ground, samples_of(config, ground));
+    const auto found = removed_with_box(std::move(moved), ground, samples_of(config, ground),
+                                        Cause::kUnderInstance, RemovedBox(0.85F));
     CAPTURE(gap);
     CHECK(found.empty() == (gap < 2.5));
   }
@@ -199,9 +205,6 @@ using Reference = std::function<BeamResult(float x)>;
 // Indices of the ground points beside a removed box that are removed by the results of references.
 std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
                                          const std::vector<Reference>& references) {
-  MovedGround moved{FreeSpaceConfig()};
-  const RemovedBox box;
-  moved.add(box.points, box.group_of, box.groups);
   GroundSamples samples = samples_of(FreeSpaceConfig(), ground);
   for (const Reference& reference : references) {
     std::vector<BeamResult> seen;
@@ -210,12 +213,7 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
     }
     samples.add(visibility_of(seen));
   }
-  std::set<std::uint32_t> found;
-  for (const EvidenceVerdict::GroundPoint& point : moved.find(ground, samples)) {
-    CHECK(point.verdict.cause == Cause::kFreeSpace);
-    CHECK(found.insert(point.point).second);
-  }
-  return found;
+  return removed_with_box(MovedGround(FreeSpaceConfig()), ground, samples, Cause::kFreeSpace);
 }
 
 TEST_CASE("ground is removed if it is free in two references and hit in few") {

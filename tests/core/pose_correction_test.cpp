@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -77,23 +78,34 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+// Residuals of all scans but the first, whose exact poses must stay.
+std::vector<PoseResidual> residuals_of_exact(PoseCorrection correction,
+                                             const std::vector<SimulatedScan>& scans,
+                                             const std::function<void(GroundSplit&)>& spoil) {
+  std::vector<PoseResidual> residuals;
+  correction.begin_epoch(scans.front().T_world_sensor);
+  for (const SimulatedScan& scan : scans) {
+    GroundSplit split = split_of(scan);
+    spoil(split);
+    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
+    CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
+    correction.insert(T, split, {});
+    if (correction.residual()) residuals.push_back(*correction.residual());
+  }
+  CHECK(residuals.size() == scans.size() - 1);
+  return residuals;
+}
+
 TEST_CASE("exact poses stay, with residuals below 1 cm and 0.02 deg") {
   const auto [scene, sensor] = GENERATE(
       table<Scene, Sensor>({{Scene::kUrban, Sensor::kHdl64}, {Scene::kCrowd, Sensor::kOs1_64}}));
   const std::vector<SimulatedScan> scans = drive(scene, sensor, 15);
-  PoseCorrection correction = new_correction();
-  correction.begin_epoch(scans.front().T_world_sensor);
   std::vector<double> translations, rotations;
-  for (const SimulatedScan& scan : scans) {
-    const GroundSplit split = split_of(scan);
-    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
-    CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
-    correction.insert(T, split, {});
-    if (!correction.residual()) continue;
-    translations.push_back(correction.residual()->translation);
-    rotations.push_back(correction.residual()->rotation);
+  for (const PoseResidual& residual :
+       residuals_of_exact(new_correction(), scans, [](GroundSplit&) {})) {
+    translations.push_back(residual.translation);
+    rotations.push_back(residual.rotation);
   }
-  REQUIRE(translations.size() == scans.size() - 1);
   CHECK(median(translations) < 0.01);
   CHECK(median(rotations) < 0.02);
   CHECK(*std::max_element(translations.begin(), translations.end()) < 0.03);
@@ -137,23 +149,14 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
                     SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
                     SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
   static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 30);
-  PoseCorrection correction(0.003, kLongestObject, kHighestObject);
-  correction.begin_epoch(scans.front().T_world_sensor);
-  std::size_t residuals = 0;
-  for (const SimulatedScan& scan : scans) {
-    GroundSplit split = split_of(scan);
+  residuals_of_exact({0.003, kLongestObject, kHighestObject}, scans, [&](GroundSplit& split) {
     for (std::size_t i = 0; i < split.count; ++i) {
       const Eigen::Vector3f p = fault({split.points.x[i], split.points.y[i], split.points.z[i]});
       split.points.x[i] = p.x();
       split.points.y[i] = p.y();
       split.points.z[i] = p.z();
     }
-    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
-    CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
-    correction.insert(T, split, {});
-    residuals += correction.residual() ? 1 : 0;
-  }
-  CHECK(residuals == scans.size() - 1);
+  });
 }
 
 // The errors allowed are those along the street, the direction with the least information.
@@ -279,24 +282,21 @@ TEST_CASE("a lasting offset is one residual, and later poses are corrected by it
   }
 }
 
-// A scan between two long walls along x at the position `x`, `y` (m), 20,000 points. With
-// `vehicle`, 2,000 more are the rear of a vehicle that is 8 m ahead of the sensor.
-GroundSplit corridor(std::uint64_t seed, float x, float y, bool vehicle) {
+// A scan between two long walls along x at the position `x` (m), 20,000 points. With `vehicle`,
+// 2,000 more are the rear of a vehicle that is 8 m ahead of the sensor.
+GroundSplit corridor(std::uint64_t seed, float x, bool vehicle) {
   Random random(seed);
   GroundSplit split;
   split.resize(vehicle ? 22000 : 20000);
   for (std::size_t i = 0; i < 20000; ++i) {
     const int side = static_cast<int>(random.index(3));
     split.points.x[i] = random.uniform_float(-30.0, 30.0) - x;
-    split.points.y[i] = (side == 0   ? random.uniform_float(-4.0, 4.0)
-                         : side == 1 ? -4.0F
-                                     : 4.0F) -
-                        y;
+    split.points.y[i] = side == 0 ? random.uniform_float(-4.0, 4.0) : side == 1 ? -4.0F : 4.0F;
     split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
   }
   for (std::size_t i = 20000; i < split.count; ++i) {
     split.points.x[i] = 8.0F + 0.01F * static_cast<float>(random.normal());
-    split.points.y[i] = random.uniform_float(-0.9, 0.9) - y;
+    split.points.y[i] = random.uniform_float(-0.9, 0.9);
     split.points.z[i] = random.uniform_float(-1.5, 0.0);
   }
   return split;
@@ -308,7 +308,7 @@ TEST_CASE("between two long walls, errors across them are corrected, those along
   correction.begin_epoch(Eigen::Isometry3d::Identity());
   for (int scan = 0; scan < 12; ++scan) {
     const float x = 0.5F * static_cast<float>(scan);
-    const GroundSplit split = corridor(7 + static_cast<std::uint64_t>(scan), x, 0.0F, false);
+    const GroundSplit split = corridor(7 + static_cast<std::uint64_t>(scan), x, false);
     const double pushed_x = static_cast<double>(x) + 0.04 * scan;
     const Eigen::Isometry3d T_pushed =
         Eigen::Translation3d(pushed_x, 0.03 * scan, 0.0) *
@@ -334,7 +334,7 @@ TEST_CASE("one object alone does not decide about a direction") {
   for (int scan = 0; scan < 20; ++scan) {
     // The vehicle ahead drives as fast as the sensor, 2 cm per scan.
     const float x = 0.02F * static_cast<float>(scan);
-    const GroundSplit split = corridor(40 + static_cast<std::uint64_t>(scan), x, 0.0F, true);
+    const GroundSplit split = corridor(40 + static_cast<std::uint64_t>(scan), x, true);
     const Eigen::Isometry3d T_pushed(
         Eigen::Translation3d(static_cast<double>(x), scan < 5 ? 0.0 : 0.1, 0.0));
     const Eigen::Isometry3d T = correction.correct(T_pushed, split);
@@ -342,25 +342,6 @@ TEST_CASE("one object alone does not decide about a direction") {
     CHECK(T.translation().x() == Approx(static_cast<double>(x)).margin(0.01));
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
     correction.insert(T, split, {});
-  }
-}
-
-// An upright surface across the corridor: its centre, half its width, its top (m) and its points.
-struct Surface {
-  float x, y;
-  double half_width, top;
-  std::size_t count;
-};
-
-// Adds a surface that begins 1.5 m below the sensor.
-void add_surface(std::uint64_t seed, const Surface& surface, GroundSplit& split) {
-  Random random(seed);
-  const std::size_t begin = split.count;
-  split.resize(begin + surface.count);
-  for (std::size_t i = begin; i < split.count; ++i) {
-    split.points.x[i] = surface.x + 0.01F * static_cast<float>(random.normal());
-    split.points.y[i] = surface.y + random.uniform_float(-surface.half_width, surface.half_width);
-    split.points.z[i] = random.uniform_float(-1.5, surface.top);
   }
 }
 
@@ -373,12 +354,19 @@ double correction_by_traffic(double longest_object, double highest_object) {
   correction.begin_epoch(T_exact);
   double largest = 0.0;
   for (int scan = 0; scan < 8; ++scan) {
-    GroundSplit split = corridor(70 + static_cast<std::uint64_t>(scan), 0.0F, 0.0F, false);
+    GroundSplit split = corridor(70 + static_cast<std::uint64_t>(scan), 0.0F, false);
     std::vector<std::uint32_t> instance_of(split.count, kNoCluster);
     std::uint32_t instance = 0;
     for (const auto& place : kPlaces) {
       const float x = place[0] + 0.05F * static_cast<float>(scan);
-      add_surface(900 + instance, {x, place[1], 0.9, 0.0, 500}, split);
+      Random random(900 + instance);
+      const std::size_t begin = split.count;
+      split.resize(begin + 500);
+      for (std::size_t i = begin; i < split.count; ++i) {  // its rear
+        split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
+        split.points.y[i] = place[1] + random.uniform_float(-0.9, 0.9);
+        split.points.z[i] = random.uniform_float(-1.5, 0.0);
+      }
       instance_of.resize(split.count, instance++);
     }
     const Pose T = correction.correct(T_exact, split, {instance_of, instance});

@@ -1,11 +1,10 @@
 // A recorded clip, if the machine has it.
 #include <vector>
 
-#include "dynains/compiled_remover.hpp"
-#include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/recording.hpp"
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
+#include "support/simulated_runs.hpp"
 
 namespace dynains::test {
 namespace {
@@ -16,35 +15,15 @@ TEST_CASE("the paper's configuration removes a recorded oncoming van: F1 of 0.96
   const Recording recording(*folder);
   REQUIRE(recording.size() > 10);
 
-  std::vector<std::vector<std::uint8_t>> in_map(recording.size());
-  const auto keep = [&](const ScanVerdict& verdict) {
-    std::vector<std::uint8_t>& flags = in_map.at(verdict.scan);
-    for (const PointLabel label : verdict.labels) flags.push_back(is_static(label) ? 1 : 0);
-  };
-  DynaInsRemover remover(DynaInsRemover::Config::paper());
+  std::vector<simulation::SimulatedScan> scans(recording.size());
   for (std::size_t i = 0; i < recording.size(); ++i) {
-    const std::vector<float> xyzi = recording.read_scan(i).xyzi;
-    const FrameResult frame = remover.push(RawPoints{xyzi.data(), xyzi.size() / 4, std::size_t{4}},
-                                           recording.T_world_sensor(i), recording.time(i));
-    if (frame.finished) keep(*frame.finished);
+    scans[i].xyzi = recording.read_scan(i).xyzi;
+    scans[i].labels = recording.read_labels(i);
+    scans[i].T_world_sensor = recording.T_world_sensor(i);
+    scans[i].time = recording.time(i);
   }
-  remover.flush(keep);
-
-  std::vector<float> xyzi;
-  std::vector<std::uint32_t> truth;
-  const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
-    if (i == recording.size()) return false;
-    xyzi = recording.read_scan(i).xyzi;
-    truth = recording.read_labels(i);
-    scan.xyz = xyzi.data();
-    scan.stride = 4;
-    scan.T_world_sensor = recording.T_world_sensor(i);
-    scan.time = recording.time(i);
-    scan.truth = truth;
-    scan.in_map = in_map[i];
-    return true;
-  };
-  const evaluation::Evaluation result = evaluation::evaluate(source, {"paper"}, {});
+  const StaticPoints in_map = static_points(scans, DynaInsRemover::Config::paper()).final;
+  const evaluation::Evaluation result = evaluate(scans, in_map, {"paper"}, {});
   REQUIRE(result.rows.size() == 3);
   CHECK(result.rows[0].voxels.f1() < 0.01);
   CHECK(result.rows[1].voxels.f1() > 0.99);

@@ -280,69 +280,6 @@ TEST_CASE("a cloud that throws is not taken, and the state does not change") {
   CHECK((result.final == expected.final));
 }
 
-// Throws std::bad_alloc once.
-class ForgetfulClusterer : public CurvedVoxelClusterer {
- public:
-  struct Config : CurvedVoxelClusterer::Config {
-    int failing_call = 0;
-
-    static Config paper() {
-      Config config;
-      static_cast<CurvedVoxelClusterer::Config&>(config) = CurvedVoxelClusterer::Config::paper();
-      return config;
-    }
-  };
-  explicit ForgetfulClusterer(const Config& config)
-      : CurvedVoxelClusterer(config), calls_left_(config.failing_call) {}
-
-  Span<const std::uint32_t> cluster(PolarView points) {
-    if (calls_left_-- == 0) throw std::bad_alloc();
-    return CurvedVoxelClusterer::cluster(points);
-  }
-
- private:
-  int calls_left_;
-};
-
-struct ForgetfulStages : DefaultStages {
-  using Clusterer = ForgetfulClusterer;
-};
-
-TEST_CASE("a scan on which a stage throws is dropped, and a new window begins") {
-  using Remover = BasicDynaInsRemover<ForgetfulStages>;
-  const bool is_paper = GENERATE(true, false);
-  const int failing = GENERATE(0, 3, 35);
-  const int threads = GENERATE(1, 2);
-  CAPTURE(is_paper, failing, threads);
-  Remover::Config config = is_paper ? Remover::Config::paper() : Remover::Config();
-  config.clusterer.failing_call = failing;
-  config.threads = threads;
-  Remover remover(config);
-  static const std::vector<Scan> scans = drive(oncoming(), 48, 0.0);
-  std::vector<std::size_t> finished;  // number of points of each scan, in the order of verdicts
-  std::vector<std::size_t> expected;
-  const auto take = [&](const ScanVerdict& verdict) {
-    CHECK(verdict.scan == finished.size());
-    CHECK(verdict.beliefs.size() == verdict.labels.size());
-    finished.push_back(verdict.labels.size());
-  };
-  bool failed = false;
-  for (const Scan& scan : scans) {
-    try {
-      const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-      expected.push_back(scan.points.size());
-      if (frame.finished) take(*frame.finished);
-    } catch (const std::bad_alloc&) {
-      CHECK(!failed);
-      failed = true;
-    }
-  }
-  remover.flush(take);
-  CHECK(failed);
-  CHECK(expected.size() + 1 == scans.size());
-  CHECK(finished == expected);
-}
-
 // Throws at the first sensor that it gets.
 class FaintingClusterer : public CurvedVoxelClusterer {
  public:

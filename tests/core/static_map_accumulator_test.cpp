@@ -108,18 +108,7 @@ TEST_CASE("the map holds the first measured point of every voxel, exactly, and n
   }
 }
 
-TEST_CASE("a point on a voxel border belongs to the upper voxel") {
-  StaticMapAccumulator map = make_map(0.5);
-  PointBuffer points;
-  for (const float x : {0.0F, 0.499F, 0.5F, -0.5F, -0.001F, 1.0F}) points.push_back(x, 0.0F, 0.0F);
-  map.insert(points, {}, Eigen::Isometry3d::Identity());
-  // [0, 0.5) [0.5, 1) [-0.5, 0) [1, 1.5)
-  CHECK((sorted_points(map) ==
-         std::vector<Coordinates>{{-0.5, 0, 0}, {0, 0, 0}, {0.5, 0, 0}, {1, 0, 0}}));
-}
-
 TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
-  StaticMapAccumulator map = make_map(0.0);
   Random random(11);
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();

@@ -16,23 +16,23 @@ namespace dynains::test {
 namespace {
 
 // Fails in chosen calls.
-class FaintingGround : public GroundSegmenter {
+class FailingClusterer : public CurvedVoxelClusterer {
  public:
-  struct Config : GroundConfig {
+  struct Config : CurvedVoxelClusterer::Config {
     int failing_call = -1;
 
     static Config paper() {
       Config config;
-      static_cast<GroundConfig&>(config) = GroundConfig::paper();
+      static_cast<CurvedVoxelClusterer::Config&>(config) = CurvedVoxelClusterer::Config::paper();
       return config;
     }
   };
-  explicit FaintingGround(const Config& config)
-      : GroundSegmenter(config), calls_left_(config.failing_call) {}
+  explicit FailingClusterer(const Config& config)
+      : CurvedVoxelClusterer(config), calls_left_(config.failing_call) {}
 
-  void segment(PointsView points, Span<const std::uint32_t> numbers, GroundSplit& out) {
+  Span<const std::uint32_t> cluster(PolarView points) {
     if (calls_left_-- == 0) throw std::bad_alloc();
-    GroundSegmenter::segment(points, numbers, out);
+    return CurvedVoxelClusterer::cluster(points);
   }
 
  private:
@@ -56,12 +56,12 @@ class FaintingMap : public StaticMapAccumulator {
   int inserts_left_;
 };
 
-struct FaintingGroundAndMap : DefaultStages {
-  using Ground = FaintingGround;
+struct FaintingStages : DefaultStages {
+  using Clusterer = FailingClusterer;
   using Map = FaintingMap;
 };
 
-using FaintingRemover = BasicDynaInsRemover<FaintingGroundAndMap>;
+using FaintingRemover = BasicDynaInsRemover<FaintingStages>;
 using FaintingConfig = FaintingRemover::Config;
 
 struct Answers {
@@ -188,14 +188,23 @@ TEST_CASE("two threads give the same answers where the first scans do not tell t
   check_equal(with_lookahead(5), scans);
 }
 
-TEST_CASE("after a scan that is refused or fails, two threads give the answers of one thread") {
-  std::vector<Scan> scans = one_passing_van();
-  scans[15].T_world_sensor.translation().x() = std::numeric_limits<double>::quiet_NaN();
-  for (FaintingConfig config : {FaintingConfig::paper(), with_lookahead(8)}) {
-    config.ground.failing_call = 20;
-    const Answers one = check_equal(config, scans);
-    CHECK(one.failures == 2);
-    CHECK(one.verdicts.final.size() == scans.size() - 2);
+TEST_CASE(
+    "a scan that is refused or fails is dropped, and a new window begins, by two threads, too") {
+  for (FaintingConfig config : {FaintingConfig::paper(), FaintingConfig(), with_lookahead(8)}) {
+    for (const int failing : {0, 3, 33}) {
+      std::vector<Scan> scans = one_passing_van();
+      scans[15].T_world_sensor.translation().x() = std::numeric_limits<double>::quiet_NaN();
+      config.clusterer.failing_call = failing;
+      const Answers one = check_equal(config, scans);
+      CHECK(one.failures == 2);
+      scans.erase(scans.begin() + 15);
+      scans.erase(scans.begin() + failing);
+      REQUIRE(one.verdicts.final.size() == scans.size());
+      for (std::size_t i = 0; i < scans.size(); ++i) {
+        CHECK(one.verdicts.final[i].scan == i);
+        CHECK(one.verdicts.final[i].beliefs.size() == scans[i].points.size());
+      }
+    }
   }
 }
 

@@ -48,10 +48,19 @@ inline StaticByVerdict static_points(
   return result;
 }
 
-/// Scores within 50 m. Bit k of `in_map` tells the static points of estimate k, which has name k.
+/// Settings for scores within 50 m.
+inline evaluation::EvaluationConfig within_50_m() {
+  evaluation::EvaluationConfig config;
+  config.max_range = 50.0;
+  config.analyses_errors = false;
+  return config;
+}
+
+/// Bit k of `in_map` tells the static points of estimate k, which has name k.
 inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedScan>& scans,
                                        const StaticPoints& in_map,
-                                       const std::vector<std::string>& names) {
+                                       const std::vector<std::string>& names,
+                                       const evaluation::EvaluationConfig& config = within_50_m()) {
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     if (i == scans.size()) return false;
     scan.xyz = scans[i].xyzi.data();
@@ -62,9 +71,6 @@ inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedSc
     scan.in_map = in_map[i];
     return true;
   };
-  evaluation::EvaluationConfig config;
-  config.max_range = 50.0;
-  config.analyses_errors = false;
   return evaluation::evaluate(source, names, {}, config);
 }
 
