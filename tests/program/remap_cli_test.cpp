@@ -168,10 +168,12 @@ TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
                                                    report["labels"]["ground"].get<std::size_t>());
 }
 
-TEST_CASE("remap takes a run over some of the scans") {
+TEST_CASE("remap takes a run over some of the scans, from --start to --end") {
   const RemapFixture f({"--start", "3", "--end", "8"});
   const Outcome outcome = succeed(f.remap({"--poses", f.corrected}));
   CHECK_THAT(outcome.out, ContainsSubstring("6 scans"));
+  CHECK(fs::exists(f.out + "/labels/000003.label"));
+  CHECK(fs::exists(f.out + "/labels/000008.label"));
 }
 
 TEST_CASE("remap of points in the frame of the world leads through the poses of the run") {

@@ -136,15 +136,6 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CHECK(count_lines(timing) == 13);
 }
 
-TEST_CASE("Flags --start and --end are scan numbers, both included") {
-  const Fixture fixture;
-  succeed(fixture.run({"--start", "3", "--end", "7"}));
-  CHECK(fixture.labels() == 5);
-  CHECK(fs::exists(fixture.out + "/labels/000003.label"));
-  CHECK(fs::exists(fixture.out + "/labels/000007.label"));
-  CHECK(fixture.report()["scans"] == 5);
-}
-
 TEST_CASE("A map of LAS holds classes and attributes of its points") {
   const Fixture fixture;
   const std::string map = fixture.folder / "map.las";
