@@ -11,6 +11,7 @@
 #include <functional>
 #include <vector>
 
+#include "dynains/median.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/random.hpp"
@@ -71,11 +72,6 @@ Eigen::Isometry3d perturbation(const Eigen::Vector3d& metres, const Eigen::Vecto
 
 double degrees(const Eigen::Isometry3d& T) {
   return Eigen::AngleAxisd(T.linear()).angle() / kDegrees;
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
 }
 
 // Residuals of all scans but the first, whose exact poses must stay.

@@ -415,16 +415,6 @@ TEST_CASE("a longer pause than max_gap or a farther jump than max_speed allows b
   CHECK((labels(0.125, 8.0) != second_half));
 }
 
-TEST_CASE("a scan without a time is 0.1 s after the previous one") {
-  const std::vector<Eigen::Vector3f> points = {{10.0F, 0.0F, 1.0F}};
-  DynaInsRemover remover;
-  const auto T = Eigen::Isometry3d::Identity();
-  CHECK(remover.push(points, T).newest.time == 0.0);
-  CHECK(remover.push(points, T).newest.time == Approx(0.1));
-  CHECK(remover.push(points, T, 5.0).newest.time == 5.0);
-  CHECK(remover.push(points, T).newest.time == Approx(5.1));
-}
-
 TEST_CASE("flush in the middle finishes all open scans, and the next scan starts a new window") {
   const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   const std::vector<Scan> first(scans.begin(), scans.begin() + 4);

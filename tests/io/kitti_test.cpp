@@ -74,25 +74,19 @@ TEST_CASE("Scans find their rows by number, or by order in a clip") {
   write_text(folder / "velodyne/000002.bin", bytes(16));
   write_text(folder / "velodyne/000003.bin", bytes(16));
   const auto row = [](int x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; };
-  SECTION("rows of the whole recording") {
-    write_text(folder / "poses.txt", row(10) + row(11) + row(12) + row(13) + row(14));
+  const auto check = [&](double first, double second, double time) {
     const Recording recording(folder.path());
-    CHECK(recording.T_world_sensor(0).translation().x() == 12.0);
-    CHECK(recording.T_world_sensor(1).translation().x() == 13.0);
-    CHECK(recording.time(1) == Approx(0.3));
-  }
-  SECTION("rows of the clip") {
-    write_text(folder / "poses.txt", row(10) + row(11));
-    const Recording recording(folder.path());
-    CHECK(recording.T_world_sensor(0).translation().x() == 10.0);
-    CHECK(recording.T_world_sensor(1).translation().x() == 11.0);
-    CHECK(recording.time(1) == Approx(0.1));
-  }
-  SECTION("neither") {
-    write_text(folder / "poses.txt", row(10) + row(11) + row(12));
-    CHECK_THAT(open_error(folder),
-               ContainsSubstring("poses.txt:4:") && ContainsSubstring("at least 4, found 3"));
-  }
+    CHECK(recording.T_world_sensor(0).translation().x() == first);
+    CHECK(recording.T_world_sensor(1).translation().x() == second);
+    CHECK(recording.time(1) == Approx(time));
+  };
+  write_text(folder / "poses.txt", row(10) + row(11) + row(12) + row(13) + row(14));
+  check(12.0, 13.0, 0.3);
+  write_text(folder / "poses.txt", row(10) + row(11));  // of the clip
+  check(10.0, 11.0, 0.1);
+  write_text(folder / "poses.txt", row(10) + row(11) + row(12));
+  CHECK_THAT(open_error(folder),
+             ContainsSubstring("poses.txt:4:") && ContainsSubstring("at least 4, found 3"));
 }
 
 TEST_CASE("Rounded rotations are accepted and made exact") {

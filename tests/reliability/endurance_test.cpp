@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
+#include "dynains/median.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/runs.hpp"
@@ -51,12 +52,6 @@ double resident_megabytes() {
   double resident = 0.0;
   statm >> size >> resident;
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
 }
 
 TEST_CASE("a long run needs constant memory and time, and old scans have no influence",
