@@ -145,22 +145,20 @@ TEST_CASE("NumPy: malformed arrays are refused with the reason") {
 }
 
 TEST_CASE("LAS: versions and point formats with scale, offset, time and extra bytes") {
-  LasParts parts;
-  SECTION("1.2, format 0") { parts = {2, 0, "", 20, 1}; }
-  SECTION("1.2, format 1") { parts = {2, 1, "", 31, 1}; }
-  SECTION("1.3, format 3") { parts = {3, 3, "", 37, 1}; }
-  SECTION("1.4, format 6") { parts = {4, 6, "", 40, 1}; }
-  SECTION("1.4, format 7 with extra bytes") {
-    parts = {4, 7, extra_bytes("ring", 3) + extra_bytes("label", 1), 39, 1};
+  for (const LasParts& parts :
+       {LasParts{2, 0, "", 20, 1}, LasParts{2, 1, "", 31, 1}, LasParts{3, 3, "", 37, 1},
+        LasParts{4, 6, "", 40, 1},
+        LasParts{4, 7, extra_bytes("ring", 3) + extra_bytes("label", 1), 39, 1}}) {
+    CAPTURE(int(parts.format));
+    const PointFile points = read("a.las", las_file(parts, las_points(parts, 9)));
+    REQUIRE(points.positions.size() == 1);
+    CHECK(points.positions[0].isApprox(Position(101.5, 199.99, 20000300.0), 1e-12));
+    if (parts.point_size > 22) CHECK(points.intensity[0] == 700.0F);
+    CHECK(points.time == (parts.format == 0 ? std::vector<double>{} : std::vector<double>{1234.5}));
+    if (parts.extra_bytes.empty()) continue;
+    CHECK(points.ring == std::vector<std::uint16_t>{17});
+    CHECK(points.label == std::vector<std::uint32_t>{9});
   }
-  const PointFile points = read("a.las", las_file(parts, las_points(parts, 9)));
-  REQUIRE(points.positions.size() == 1);
-  CHECK(points.positions[0].isApprox(Position(101.5, 199.99, 20000300.0), 1e-12));
-  if (parts.point_size > 22) CHECK(points.intensity[0] == 700.0F);
-  CHECK(points.time == (parts.format == 0 ? std::vector<double>{} : std::vector<double>{1234.5}));
-  if (parts.extra_bytes.empty()) return;
-  CHECK(points.ring == std::vector<std::uint16_t>{17});
-  CHECK(points.label == std::vector<std::uint32_t>{9});
 }
 
 TEST_CASE("LAS: malformed files are refused with position and reason") {
