@@ -14,10 +14,12 @@
 #include <map>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
+#include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
@@ -208,9 +210,7 @@ double error_of(const Recording& recording, const Poses& truth) {
         std::hypot(E.translation().norm(), 10.0 * std::abs(Eigen::AngleAxisd(E.linear()).angle())));
   }
   if (errors.empty()) return 1e9;
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2),
-                   errors.end());
-  return errors[errors.size() / 2];
+  return median(std::move(errors));
 }
 
 bool is_right(const fs::path& folder, const Kind& kind, const Poses& truth, std::string& told) {
