@@ -42,7 +42,7 @@ class FileBuffer : public std::streambuf {
     if (::fsync(descriptor_) != 0 && errno != EINVAL) error_ = errno;
   }
 
-  /// Some file systems report a failed write only to close(). The lock stays with descriptor_.
+  /// Some file systems report a failed write only to close(). descriptor_ stays open.
   void check_close() {
     const int copy = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
     if (copy >= 0 && ::close(copy) != 0 && error_ == 0) error_ = errno;

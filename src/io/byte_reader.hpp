@@ -34,8 +34,8 @@ class ByteReader {
   std::string read_block(std::uint64_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
 
-  /// Numbers of the last line. They throw IoError with `what` was expected, or the name of the
-  /// value.
+  /// The number that `token` of the last line is. Throws IoError that expects `what`, or a number
+  /// for `name`.
   std::uint64_t whole_number(std::string_view token, const std::string& what) const;
   double number(std::string_view token, const std::string& name) const;
   /// Throws IoError unless the rest of the file can hold `count` of `what`, at least `each` bytes
