@@ -5,51 +5,73 @@
 
 namespace dynains::simulation {
 
+/// Classes of SemanticKITTI.
 namespace semantic {
-inline constexpr std::uint16_t kOutlier = 1, kCar = 10, kBicycle = 11, kBus = 13, kTruck = 18,
-                               kPerson = 30, kBicyclist = 31, kParking = 44, kSidewalk = 48,
-                               kBuilding = 50, kFence = 51, kOtherStructure = 52, kVegetation = 70,
-                               kTrunk = 71, kTerrain = 72, kPole = 80, kSign = 81,
-                               kOtherObject = 99, kMovingCar = 252, kMovingBicyclist = 253,
-                               kMovingPerson = 254, kMovingBus = 257, kMovingTruck = 258;
+enum Class : std::uint16_t {
+  kOutlier = 1,
+  kCar = 10,
+  kBicycle = 11,
+  kBus = 13,
+  kTruck = 18,
+  kPerson = 30,
+  kBicyclist = 31,
+  kParking = 44,
+  kSidewalk = 48,
+  kBuilding = 50,
+  kFence = 51,
+  kOtherStructure = 52,
+  kVegetation = 70,
+  kTrunk = 71,
+  kTerrain = 72,
+  kPole = 80,
+  kSign = 81,
+  kOtherObject = 99,
+  kMovingCar = 252,
+  kMovingBicyclist = 253,
+  kMovingPerson = 254,
+  kMovingBus = 257,
+  kMovingTruck = 258
+};
 }  // namespace semantic
 
-namespace materials {
-//                                     label                 refl   loss  density clump rough window
-inline constexpr Material kFacade{semantic::kBuilding, 0.35F, 0.02F, 0, 0, 0.01F, 3.0F};
-inline constexpr Material kWall{semantic::kBuilding, 0.4F, 0.02F, 0, 0, 0.01F, 0};
-inline constexpr Material kRoof{semantic::kBuilding, 0.25F, 0.05F, 0, 0, 0.02F, 0};
-inline constexpr Material kConcrete{semantic::kOtherStructure, 0.4F, 0.02F, 0, 0, 0.01F, 0};
-inline constexpr Material kTreeTrunk{semantic::kTrunk, 0.3F, 0.03F, 0, 0, 0.015F, 0};
-inline constexpr Material kLeaves{semantic::kVegetation, 0.35F, 0.10F, 1.6F, 0.45F, 0, 0};
-inline constexpr Material kThinLeaves{semantic::kVegetation, 0.35F, 0.15F, 0.6F, 0.6F, 0, 0};
-inline constexpr Material kBush{semantic::kVegetation, 0.35F, 0.08F, 5.0F, 0.2F, 0, 0};
-inline constexpr Material kHedge{semantic::kVegetation, 0.35F, 0.06F, 9.0F, 0.15F, 0, 0};
-inline constexpr Material kLeafClump{semantic::kVegetation, 0.35F, 0.10F, 3.0F, 0.12F, 0, 0};
-inline constexpr Material kBareTwigs{semantic::kVegetation, 0.25F, 0.15F, 0.5F, 0.15F, 0, 0};
-inline constexpr Material kOpenHedge{semantic::kVegetation, 0.35F, 0.08F, 3.5F, 0.15F, 0, 0};
-inline constexpr Material kGlassPane{semantic::kBuilding, 0.1F, 0.3F, 12.0F, 0, 0, 0};
-inline constexpr Material kWireFence{semantic::kFence, 0.3F, 0.10F, 5.0F, 0, 0, 0};
-inline constexpr Material kWoodFence{semantic::kFence, 0.4F, 0.03F, 0, 0, 0.01F, 0};
-inline constexpr Material kGuardRail{semantic::kFence, 0.6F, 0.05F, 0, 0, 0, 0};
-inline constexpr Material kSteelPole{semantic::kPole, 0.5F, 0.02F, 0, 0, 0, 0};
-inline constexpr Material kSignPlate{semantic::kSign, 0.95F, 0.0F, 0, 0, 0, 0};
-inline constexpr Material kStreetFurniture{semantic::kOtherObject, 0.4F, 0.02F, 0, 0, 0, 0};
-inline constexpr Material kBrightPaint{semantic::kCar, 0.6F, 0.06F, 0, 0, 0, 0};
-inline constexpr Material kDarkPaint{semantic::kCar, 0.12F, 0.14F, 0, 0, 0, 0};
-inline constexpr Material kGlass{semantic::kCar, 0.1F, 0.5F, 0, 0, 0.01F, 0};
-inline constexpr Material kTyre{semantic::kCar, 0.08F, 0.15F, 0, 0, 0, 0};
-inline constexpr Material kPlate{semantic::kCar, 0.95F, 0, 0, 0, 0, 0};
-inline constexpr Material kBrightCloth{semantic::kPerson, 0.5F, 0.01F, 0, 0, 0.01F, 0};
-inline constexpr Material kDarkCloth{semantic::kPerson, 0.2F, 0.05F, 0, 0, 0.01F, 0};
-inline constexpr Material kSkin{semantic::kPerson, 0.4F, 0.02F, 0, 0, 0.005F, 0};
-inline constexpr Material kMetal{semantic::kBicycle, 0.3F, 0.2F, 3.0F, 0, 0, 0};
-inline constexpr Material kBicycleFrame{semantic::kBicycle, 0.3F, 0.05F, 0, 0, 0, 0};
-inline constexpr Material kRailing{semantic::kFence, 0.5F, 0.03F, 0, 0, 0, 0};
-inline constexpr Material kWire{semantic::kOtherObject, 0.3F, 0.1F, 0, 0, 0, 0};
-inline constexpr Material kMesh{semantic::kOtherObject, 0.4F, 0.1F, 4.0F, 0, 0, 0};
-inline constexpr Material kPram{semantic::kPerson, 0.25F, 0.05F, 0, 0, 0.01F, 0};
-inline constexpr Material kEgoRoof{semantic::kOutlier, 0.3F, 0.1F, 0, 0, 0, 0};
-}  // namespace materials
+/// All surfaces of the simulated world.
+struct Materials {
+  //                  label                 refl   loss  density clump rough window
+  Material facade{semantic::kBuilding, 0.35F, 0.02F, 0, 0, 0.01F, 3.0F};
+  Material wall{semantic::kBuilding, 0.4F, 0.02F, 0, 0, 0.01F, 0};
+  Material roof{semantic::kBuilding, 0.25F, 0.05F, 0, 0, 0.02F, 0};
+  Material concrete{semantic::kOtherStructure, 0.4F, 0.02F, 0, 0, 0.01F, 0};
+  Material tree_trunk{semantic::kTrunk, 0.3F, 0.03F, 0, 0, 0.015F, 0};
+  Material leaves{semantic::kVegetation, 0.35F, 0.10F, 1.6F, 0.45F, 0, 0};
+  Material thin_leaves{semantic::kVegetation, 0.35F, 0.15F, 0.6F, 0.6F, 0, 0};
+  Material bush{semantic::kVegetation, 0.35F, 0.08F, 5.0F, 0.2F, 0, 0};
+  Material hedge{semantic::kVegetation, 0.35F, 0.06F, 9.0F, 0.15F, 0, 0};
+  Material leaf_clump{semantic::kVegetation, 0.35F, 0.10F, 3.0F, 0.12F, 0, 0};
+  Material bare_twigs{semantic::kVegetation, 0.25F, 0.15F, 0.5F, 0.15F, 0, 0};
+  Material open_hedge{semantic::kVegetation, 0.35F, 0.08F, 3.5F, 0.15F, 0, 0};
+  Material glass_pane{semantic::kBuilding, 0.1F, 0.3F, 12.0F, 0, 0, 0};
+  Material wire_fence{semantic::kFence, 0.3F, 0.10F, 5.0F, 0, 0, 0};
+  Material wood_fence{semantic::kFence, 0.4F, 0.03F, 0, 0, 0.01F, 0};
+  Material guard_rail{semantic::kFence, 0.6F, 0.05F, 0, 0, 0, 0};
+  Material steel_pole{semantic::kPole, 0.5F, 0.02F, 0, 0, 0, 0};
+  Material sign_plate{semantic::kSign, 0.95F, 0.0F, 0, 0, 0, 0};
+  Material street_furniture{semantic::kOtherObject, 0.4F, 0.02F, 0, 0, 0, 0};
+  Material bright_paint{semantic::kCar, 0.6F, 0.06F, 0, 0, 0, 0};
+  Material dark_paint{semantic::kCar, 0.12F, 0.14F, 0, 0, 0, 0};
+  Material glass{semantic::kCar, 0.1F, 0.5F, 0, 0, 0.01F, 0};
+  Material tyre{semantic::kCar, 0.08F, 0.15F, 0, 0, 0, 0};
+  Material plate{semantic::kCar, 0.95F, 0, 0, 0, 0, 0};
+  Material bright_cloth{semantic::kPerson, 0.5F, 0.01F, 0, 0, 0.01F, 0};
+  Material dark_cloth{semantic::kPerson, 0.2F, 0.05F, 0, 0, 0.01F, 0};
+  Material skin{semantic::kPerson, 0.4F, 0.02F, 0, 0, 0.005F, 0};
+  Material metal{semantic::kBicycle, 0.3F, 0.2F, 3.0F, 0, 0, 0};
+  Material bicycle_frame{semantic::kBicycle, 0.3F, 0.05F, 0, 0, 0, 0};
+  Material railing{semantic::kFence, 0.5F, 0.03F, 0, 0, 0, 0};
+  Material wire{semantic::kOtherObject, 0.3F, 0.1F, 0, 0, 0, 0};
+  Material mesh{semantic::kOtherObject, 0.4F, 0.1F, 4.0F, 0, 0, 0};
+  Material pram{semantic::kPerson, 0.25F, 0.05F, 0, 0, 0.01F, 0};
+  Material ego_roof{semantic::kOutlier, 0.3F, 0.1F, 0, 0, 0, 0};
+};
+inline constexpr Materials materials;
 
 }  // namespace dynains::simulation

@@ -14,7 +14,7 @@ enum class Shape : std::uint8_t {
   kEllipsoid,  ///< the unit ball
 };
 
-/// How a surface answers to light. Constants live in materials.hpp.
+/// How a surface answers to light. materials.hpp lists all.
 struct Material {
   std::uint16_t label = 0;      ///< SemanticKITTI class, unless the object has one
   float reflectivity = 0.3F;    ///< intensity at perpendicular incidence, [0, 1]
