@@ -15,6 +15,7 @@ enum Class : std::uint16_t {
   kTruck = 18,
   kPerson = 30,
   kBicyclist = 31,
+  kRoad = 40,
   kParking = 44,
   kSidewalk = 48,
   kBuilding = 50,

@@ -8,18 +8,19 @@
 #include <vector>
 
 #include "simulation/grid_index.hpp"
+#include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 #include "simulation/street.hpp"
 
 namespace dynains::simulation {
 
 struct TerrainConfig {
-  double hill_slope = 0.015;        ///< steepest slope of the large-scale ground, about
-  double hill_length = 180.0;       ///< m, distance between crests, about
-  double roughness = 0.04;          ///< m, unevenness off the street; a third of it on the street
-  double kerb = 0.12;               ///< m, height of the pavement over the street
-  std::uint16_t open_label = 72;    ///< class where there is no street
-  std::uint16_t street_label = 40;  ///< class of the carriageway
+  double hill_slope = 0.015;   ///< steepest slope of the large-scale ground, about
+  double hill_length = 180.0;  ///< m, distance between crests, about
+  double roughness = 0.04;     ///< m, unevenness off the street; a third of it on the street
+  double kerb = 0.12;          ///< m, height of the pavement over the street
+  semantic::Class open_label = semantic::kTerrain;  ///< class where there is no street
+  semantic::Class street_label = semantic::kRoad;   ///< class of the carriageway
 };
 
 /// The ground is a height field with 0.25 m between samples, made tile by tile where it is asked
