@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,9 +15,7 @@
 #include "detail/located_points.hpp"
 #include "detail/preservation.hpp"
 #include "detail/range_gate.hpp"
-#include "detail/scan_voxels.hpp"
 #include "detail/voxel_grid.hpp"
-#include "detail/voxel_index.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/points.hpp"
 
@@ -41,22 +38,21 @@ class RadiusLookup {
         grid_(4 * radius, anchor_of(points)),
         cells_(points.size(), [&](std::size_t i, auto&& add) {
           const VoxelKey key = grid_.key(points[i]);
-          for (const VoxelKey offset : kNeighbours) {
-            const double squared =
-                key == kNoKey ? 1e300 : grid_.squared_distance(points[i], key + offset);
-            if (squared <= 1.001 * squared_radius_) add(key + offset);  // more than rounding
-          }
+          if (key == kNoKey) return;
+          for_each_around(key, [&](VoxelKey at) {  // more than rounding
+            if (grid_.squared_distance(points[i], at) <= 1.001 * squared_radius_) add(at);
+          });
         }) {}
 
   const VoxelGrid& grid() const { return grid_; }
-  /// Numbers of the cells of grid() with a position near a map point.
-  const VoxelIndex& cells() const { return cells_.index(); }
-  /// `cell`: number of the cell that contains `p`.
-  bool contains(const Eigen::Vector3d& p, std::uint32_t cell) const {
-    for (const std::uint32_t i : cells_.points(cell)) {
-      if ((points_[i] - p).squaredNorm() <= squared_radius_) return true;
-    }
-    return false;
+  /// `key`: that of `p` in grid().
+  bool contains(const Eigen::Vector3d& p, VoxelKey key) const {
+    const std::uint32_t cell = cells_.index().find(key);
+    if (cell == VoxelHashTable<>::kNone) return false;
+    const Span<const std::uint32_t> near = cells_.points(cell);
+    return std::any_of(near.begin(), near.end(), [&](std::uint32_t i) {
+      return (points_[i] - p).squaredNorm() <= squared_radius_;
+    });
   }
 
  private:
@@ -72,7 +68,6 @@ namespace dynains::evaluation {
 
 using detail::truth_bit;
 using detail::TruthMask;
-using detail::VoxelIndex;
 
 namespace {
 
@@ -96,27 +91,28 @@ class MapProtocol::Impl {
         lookup_(positive(settings.point_radius, "point_radius"), map) {}
 
   void add(const LabelledScan& scan) {
-    for_each_block_with_runs(scan, grid_, gate_, [&](const detail::PointBlock&) {
-      measured_.insert(runs_.keys.data(), runs_.count, numbers_.data());
-      for (std::size_t r = 0; r < runs_.count; ++r) note_truth(r);
-    });
-    for_each_block_with_runs(
-        scan, lookup_.grid(), point_gate_, [&](const detail::PointBlock& block) {
-          lookup_.cells().find(runs_.keys.data(), runs_.count, numbers_.data());
-          for (std::size_t r = 0; r < runs_.count; ++r) count_points(block, r);
-        });
+    detail::for_each_point(scan, grid_, gate_,
+                           [&](std::size_t i, const Eigen::Vector3d&, VoxelKey key) {
+                             const std::uint32_t number = measured_.insert(key);
+                             if (number == measured_truths_.size()) measured_truths_.push_back(0);
+                             measured_truths_[number] |= truth_bit(settings_.truth(scan.truth[i]));
+                           });
+    detail::for_each_point(scan, lookup_.grid(), point_gate_,
+                           [&](std::size_t i, const Eigen::Vector3d& p, VoxelKey key) {
+                             const Truth truth = settings_.truth(scan.truth[i]);
+                             if (truth != Truth::kIgnored)
+                               count_point(truth, lookup_.contains(p, key));
+                           });
     finished_first_pass_ = false;
   }
 
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
-    if (near_mixed_.size() == 0) return;
-    for_each_block_with_runs(scan, grid_, gate_, [&](const detail::PointBlock& block) {
-      near_mixed_.find(runs_.keys.data(), runs_.count, numbers_.data());
-      for (std::size_t r = 0; r < runs_.count; ++r) {
-        if (numbers_[r] != VoxelIndex::kNone) approach(block, r);
-      }
-    });
+    detail::for_each_point(scan, grid_, gate_,
+                           [&](std::size_t i, const Eigen::Vector3d& p, VoxelKey key) {
+                             if (near_mixed_.find(key) == kNone) return;
+                             approach({p, settings_.truth(scan.truth[i])}, key);
+                           });
   }
 
   VoxelScore voxel_score(const VoxelProtocol& raw) {
@@ -146,6 +142,7 @@ class MapProtocol::Impl {
   }
 
  private:
+  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
   /// A map point in a mixed map voxel: measured points around it have more than one class.
@@ -154,49 +151,13 @@ class MapProtocol::Impl {
     Truth truth = Truth::kIgnored;
   };
 
-  /// Numbers of the voxels around one, or kNone.
-  using Around = std::array<std::uint32_t, detail::kNeighbours.size()>;
-
-  /// Calls `visit(PointBlock)` for the blocks of the scan. `runs_`: of the block.
-  template <class Visit>
-  void for_each_block_with_runs(const LabelledScan& scan, const detail::VoxelGrid& grid,
-                                const detail::RangeGate& gate, Visit&& visit) {
-    std::uint32_t last_label = 0;
-    Truth truth = settings_.truth(last_label);
-    detail::LocatedPoints(scan, grid, gate).for_each_block([&](const detail::PointBlock& block) {
-      for (std::size_t k = 0; k < block.count; ++k) {
-        const std::uint32_t label = scan.truth[block.first + k];
-        if (label != last_label) truth = settings_.truth(label);
-        last_label = label;
-        labels_[k] = {truth, 0};
-      }
-      runs_.find(block, labels_.data());
-      visit(block);
-    });
-  }
-
-  Truth truth_of_run(std::size_t run) const { return labels_[runs_.begins[run]].truth; }
-
-  void note_truth(std::size_t run) {
-    const std::uint32_t number = numbers_[run];
-    if (number == measured_truths_.size()) measured_truths_.push_back(0);
-    measured_truths_[number] |= truth_bit(truth_of_run(run));
-  }
-
-  void count_points(const detail::PointBlock& block, std::size_t run) {
-    const Truth truth = truth_of_run(run);
-    if (truth == Truth::kIgnored) return;
-    const std::size_t begin = runs_.begins[run], end = runs_.ends[run];
-    std::size_t kept = 0;
-    for (std::size_t i = begin; i < end && numbers_[run] != VoxelIndex::kNone; ++i) {
-      kept += lookup_.contains(block.p_world(i), numbers_[run]);
-    }
+  void count_point(Truth truth, bool is_kept) {
     if (truth == Truth::kStatic) {
-      point_score_.static_total += end - begin;
-      point_score_.static_kept += kept;
+      ++point_score_.static_total;
+      point_score_.static_kept += is_kept;
     } else {
-      point_score_.dynamic_total += end - begin;
-      point_score_.dynamic_removed += end - begin - kept;
+      ++point_score_.dynamic_total;
+      point_score_.dynamic_removed += !is_kept;
     }
   }
 
@@ -208,91 +169,50 @@ class MapProtocol::Impl {
     truths_.assign(groups_.size(), 0);
     farthest_.assign(groups_.size(), kFar);
     mixed_.assign(groups_.grouped_points(), {});
-    near_mixed_ = {};
+    near_mixed_ = VoxelHashTable<>();
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
-      for (const std::uint32_t number : around(groups_.key(cell), measured_)) {
-        if (number != VoxelIndex::kNone) truths_[cell] |= measured_truths_[number];
-      }
-      if (!is_mixed(cell)) continue;
-      for (const VoxelKey offset : detail::kNeighbours) {
-        near_mixed_.insert(groups_.key(cell) + offset);
-      }
+      detail::for_each_around(groups_.key(cell), [&](VoxelKey key) {
+        const std::uint32_t number = measured_.find(key);
+        if (number != kNone) truths_[cell] |= measured_truths_[number];
+      });
+      if (!detail::is_mixed(truths_[cell])) continue;
+      detail::for_each_around(groups_.key(cell), [&](VoxelKey key) { near_mixed_.insert(key); });
     }
   }
 
-  static Around around(VoxelKey key, const VoxelIndex& index) {
-    std::array<VoxelKey, detail::kNeighbours.size()> keys = detail::kNeighbours;
-    for (VoxelKey& near : keys) near += key;
-    Around numbers;
-    index.find(keys.data(), keys.size(), numbers.data());
-    return numbers;
-  }
-
-  bool is_mixed(std::size_t cell) const {
-    return (truths_[cell] & (truths_[cell] - 1)) != 0;  // more than one bit
-  }
-
-  /// Updates the nearest measured point of the map points in mixed voxels around a run.
-  void approach(const detail::PointBlock& block, std::size_t run) {
-    Eigen::AlignedBox3d box;
-    for (std::size_t i = runs_.begins[run]; i < runs_.ends[run]; ++i) box.extend(block.p_world(i));
-    for (const std::uint32_t cell : around(runs_.keys[run], groups_.index())) {
-      if (cell == VoxelIndex::kNone || !is_mixed(cell)) continue;
-      const Eigen::Vector3d corner = grid_.corner(groups_.key(cell));
-      // Skips voxels and map points that have nearer measured points already: most, in dense maps.
-      if (squared_gap(box, corner, corner.array() + grid_.edge()) >= farthest_[cell]) continue;
+  /// Updates the nearest measured point of the map points in mixed voxels around a point.
+  void approach(const VoxelPoint& point, VoxelKey key) {
+    detail::for_each_around(key, [&](VoxelKey at) {
+      const std::uint32_t cell = groups_.index().find(at);
+      if (cell == kNone || !detail::is_mixed(truths_[cell])) return;
+      // Skips voxels whose map points have nearer measured points already: most, in dense maps.
+      if (grid_.squared_distance(point.p_world, at) >= farthest_[cell]) return;
       double farthest = 0;
       for (std::size_t rank = 0; rank < groups_.points(cell).size(); ++rank) {
         const Eigen::Vector3d& p = map_[groups_.points(cell)[rank]];
         Mixed& mixed = mixed_[groups_.first(cell) + rank];
-        if (squared_gap(box, p, p) < mixed.nearest) approach(block, run, p, mixed);
+        const double squared = (p - point.p_world).squaredNorm();
+        if (squared < mixed.nearest) mixed = {squared, point.truth};
         farthest = std::max(farthest, mixed.nearest);
       }
       farthest_[cell] = farthest;
-    }
-  }
-
-  static double squared_gap(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& lower,
-                            const Eigen::Vector3d& upper) {
-    return (box.min() - upper).cwiseMax(lower - box.max()).cwiseMax(0.0).squaredNorm();
-  }
-
-  void approach(const detail::PointBlock& block, std::size_t run, const Eigen::Vector3d& p,
-                Mixed& mixed) {
-    double nearest = mixed.nearest;
-    for (std::size_t i = runs_.begins[run]; i < runs_.ends[run]; ++i) {
-      const double squared = (p - block.p_world(i)).squaredNorm();
-      nearest = squared < nearest ? squared : nearest;
-    }
-    if (nearest < mixed.nearest) mixed = {nearest, truth_of_run(run)};
+    });
   }
 
   Truth truth_of(std::size_t cell, std::size_t rank) const {
-    if (is_mixed(cell)) return mixed_[groups_.first(cell) + rank].truth;
+    if (detail::is_mixed(truths_[cell])) return mixed_[groups_.first(cell) + rank].truth;
     if (truths_[cell] == truth_bit(Truth::kStatic)) return Truth::kStatic;
     return truths_[cell] == truth_bit(Truth::kDynamic) ? Truth::kDynamic : Truth::kIgnored;
   }
 
   std::optional<VoxelPoint> voxel_point(std::size_t cell) const {
     const Span<const std::uint32_t> points = groups_.points(cell);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    std::size_t count = 0;
-    for (std::size_t rank = 0; rank < points.size(); ++rank) {
-      if (truth_of(cell, rank) == Truth::kIgnored) continue;
-      sum += map_[points[rank]];
-      ++count;
-    }
-    if (count == 0) return std::nullopt;
-    VoxelPoint point{sum / static_cast<double>(count), Truth::kStatic};
-    double nearest = kFar;
-    for (std::size_t rank = 0; rank < points.size(); ++rank) {
-      const Truth truth = truth_of(cell, rank);
-      const double distance = (map_[points[rank]] - point.p_world).squaredNorm();
-      if (truth == Truth::kIgnored || !detail::is_nearer(distance, nearest)) continue;
-      nearest = distance;
-      point.truth = truth;
-    }
-    return point;
+    return detail::voxel_point([&](auto&& add) {
+      for (std::size_t rank = 0; rank < points.size(); ++rank) {
+        const Truth truth = truth_of(cell, rank);
+        if (truth != Truth::kIgnored) add(map_[points[rank]], truth);
+      }
+    });
   }
 
   Settings settings_;
@@ -304,17 +224,12 @@ class MapProtocol::Impl {
   detail::RadiusLookup lookup_;
   PointScore point_score_;
 
-  // The block of points that is added or resolved uses these arrays.
-  std::array<detail::LayeredTruth, detail::PointBlock::kMost> labels_;  // by point
-  detail::PointRuns runs_;
-  std::array<std::uint32_t, detail::PointBlock::kMost> numbers_;  // by run
-
-  VoxelIndex measured_;  // voxels that contain measured points
+  VoxelHashTable<> measured_;  // voxels that contain measured points
   std::vector<TruthMask> measured_truths_;
 
   bool finished_first_pass_ = false;
   std::vector<TruthMask> truths_;  // by map voxel: classes of the measured points around it
-  VoxelIndex near_mixed_;          // mixed map voxels and their neighbours
+  VoxelHashTable<> near_mixed_;    // mixed map voxels and their neighbours
   std::vector<Mixed> mixed_;       // by map point, in the order of groups_
   std::vector<double> farthest_;   // by map voxel: largest Mixed::nearest
 };

@@ -8,7 +8,6 @@
 
 #include "dynains/points.hpp"
 #include "evaluation/detail/voxel_grid.hpp"
-#include "evaluation/detail/voxel_index.hpp"
 
 namespace dynains::evaluation::detail {
 
@@ -49,7 +48,8 @@ class CellGroups {
     for (std::size_t k = end; k-- > 0;) points_[--first_[cells[k]]] = members[k];
   }
 
-  const VoxelIndex& index() const { return index_; }
+  /// Numbers of the voxels.
+  const VoxelHashTable<>& index() const { return index_; }
   std::size_t size() const { return keys_.size(); }
   VoxelKey key(std::size_t cell) const { return keys_[cell]; }
   /// Numbers of the points in the cell.
@@ -61,7 +61,7 @@ class CellGroups {
   std::size_t grouped_points() const { return points_.size(); }
 
  private:
-  VoxelIndex index_;
+  VoxelHashTable<> index_;
   std::vector<VoxelKey> keys_;
   std::vector<std::uint32_t> first_;
   std::vector<std::uint32_t> points_;
