@@ -1,10 +1,8 @@
 #include "dynains/evaluation/evaluate.hpp"
 
-#include <future>
 #include <stdexcept>
 
 #include "dynains/evaluation/map_protocol.hpp"
-#include "dynains/evaluation/object_protocol.hpp"
 #include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/voxel_protocol.hpp"
 #include "dynains/threads/background.hpp"
@@ -28,12 +26,6 @@ void check_lengths(const LabelledScan& scan, std::size_t index) {
   check(scan.causes.size(), "causes");
 }
 
-/// The row of `name` by voxels, points and objects; the columns of maps are empty.
-EvaluationRow row_of(const std::string& name, const VoxelScore& voxels, const PointScore& points,
-                     const ObjectScore& objects, std::vector<ClassScore> classes = {}) {
-  return {name, voxels, points, objects, std::move(classes), std::nullopt, std::nullopt};
-}
-
 }  // namespace
 
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
@@ -45,8 +37,6 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   VoxelProtocol voxels({config.voxel, config.min_range, config.max_range, config.truth},
                        estimates.size());
   PointProtocol points({config.min_range, config.point_max_range, config.truth}, estimates.size());
-  ObjectProtocol objects({config.min_range, config.point_max_range, config.truth},
-                         estimates.size());
   std::vector<MapProtocol> map_protocols;
   map_protocols.reserve(maps.size());
   for (const MapEstimate& map : maps) {
@@ -54,10 +44,6 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
         MapProtocol::Settings{config.voxel, config.min_range, config.max_range,
                               config.point_max_range, config.point_radius, config.truth},
         map.points_world);
-  }
-  if (!estimates.empty() && config.analyses_errors) {
-    result.errors.emplace(
-        ErrorAnalysis::Settings{config.min_range, config.point_max_range, config.truth});
   }
 
   LabelledScan scan;
@@ -67,9 +53,7 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
     result.points += scan.size();
     others.begin([&] {
       points.add(scan);
-      objects.add(scan);
       for (MapProtocol& map : map_protocols) map.add(scan);
-      if (result.errors) result.errors->add(scan);
     });
     voxels.add(scan);
     others.wait();
@@ -83,18 +67,15 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
     others.wait();
   }
 
-  result.rows.push_back(row_of("identity", voxels.score(VoxelProtocol::kIdentity),
-                               points.identity(), objects.identity()));
-  std::vector<std::future<VoxelScore>> scores;
-  for (std::size_t row = VoxelProtocol::kOracle;
-       row < VoxelProtocol::kFirstEstimate + estimates.size(); ++row) {
-    scores.push_back(std::async(std::launch::async, [&voxels, row] { return voxels.score(row); }));
+  std::vector<std::string> names = {"identity", "oracle"};
+  names.insert(names.end(), estimates.begin(), estimates.end());
+  for (std::size_t row = 0; row < names.size(); ++row) {
+    const bool is_estimate = row >= VoxelProtocol::kFirstEstimate;
+    result.rows.push_back({names[row], voxels.score(row), points.points(row), points.objects(row),
+                           is_estimate ? points.by_class(row) : std::vector<ClassScore>(),
+                           std::nullopt, std::nullopt});
   }
-  result.rows.push_back(row_of("oracle", scores.front().get(), points.oracle(), objects.oracle()));
-  for (std::size_t e = 0; e < estimates.size(); ++e) {
-    result.rows.push_back(row_of(estimates[e], scores[e + 1].get(), points.score(e),
-                                 objects.score(e), objects.by_class(e)));
-  }
+  if (!estimates.empty()) result.causes = points.by_cause();
   for (std::size_t m = 0; m < maps.size(); ++m) {
     result.rows.push_back({maps[m].name,
                            map_protocols[m].voxel_score(voxels),

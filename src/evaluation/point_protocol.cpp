@@ -1,15 +1,31 @@
 #include "dynains/evaluation/point_protocol.hpp"
 
-#include <array>
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "detail/range_gate.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/evaluation/voxel_protocol.hpp"
 
 namespace dynains::evaluation {
+namespace {
+
+/// People, walking or riding: they may stand for a while, and count as neither.
+bool is_person(std::uint16_t id) { return id >= 30 && id <= 32; }
+
+bool is_right(Truth truth, std::uint64_t points, std::uint64_t kept) {
+  const auto all = static_cast<double>(points);
+  return truth == Truth::kStatic
+             ? static_cast<double>(kept) >= ObjectScore::kKept * all
+             : static_cast<double>(points - kept) >= ObjectScore::kRemoved * all;
+}
+
+}  // namespace
 
 PointProtocol::PointProtocol(const Settings& settings, std::size_t estimates)
-    : settings_(settings), scores_(estimates) {
+    : settings_(settings), estimates_(estimates) {
   detail::RangeGate(settings.min_range, settings.max_range);
   if (estimates > kMaxEstimates) {
     throw ConfigError("PointProtocol evaluates at most " + std::to_string(kMaxEstimates) +
@@ -19,36 +35,85 @@ PointProtocol::PointProtocol(const Settings& settings, std::size_t estimates)
 
 void PointProtocol::add(const LabelledScan& scan) {
   const detail::RangeGate gate(settings_.min_range, settings_.max_range);
-  // Numbers of points by truth and LabelledScan::in_map.
-  std::array<std::array<std::uint32_t, 256>, 3> counts{};
+  if (!scan.causes.empty()) causes_.resize(kCauseCount);
+  // Consecutive points mostly have one label.
+  std::optional<std::uint32_t> last_label;
+  Truth truth = Truth::kIgnored;
+  Counts* counts = nullptr;
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    const auto truth = static_cast<std::size_t>(settings_.truth(scan.truth[i]));
-    counts[truth][scan.in_map.empty() ? 0 : scan.in_map[i]] +=
-        gate.passes(scan.xyz + i * scan.stride);
+    const std::uint32_t label = scan.truth[i];
+    if (last_label != label) {
+      last_label = label;
+      truth = settings_.truth(label);
+      counts = truth == Truth::kIgnored ? nullptr : &by_label_[label];
+    }
+    if (counts == nullptr || !gate.passes(scan.xyz + i * scan.stride)) continue;
+    ++counts->points;
+    const unsigned in_map = scan.in_map.empty() ? 0U : scan.in_map[i];
+    for (std::size_t e = 0; e < estimates_; ++e) counts->kept[e] += in_map >> e & 1U;
+    if (scan.causes.empty()) continue;
+    CauseErrors& cause = causes_[scan.causes[i] < kCauseCount ? scan.causes[i] : 0];
+    const bool is_kept = (in_map & 1U) != 0;
+    const bool is_missed = is_kept && truth == Truth::kDynamic;
+    const bool is_lost = !is_kept && truth == Truth::kStatic;
+    ++(is_missed ? cause.missed_dynamic : is_lost ? cause.lost_static : cause.right);
   }
-  for (std::size_t in_map = 0; in_map < 256; ++in_map) {
-    const std::uint32_t of_static = counts[static_cast<std::size_t>(Truth::kStatic)][in_map];
-    const std::uint32_t of_dynamic = counts[static_cast<std::size_t>(Truth::kDynamic)][in_map];
-    totals_.static_total += of_static;
-    totals_.dynamic_total += of_dynamic;
-    for (std::size_t e = 0; e < scores_.size(); ++e) {
-      const bool kept = (in_map >> e & 1U) != 0;
-      if (kept) scores_[e].static_kept += of_static;
-      if (!kept) scores_[e].dynamic_removed += of_dynamic;
+}
+
+std::uint64_t PointProtocol::kept(const Counts& counts, Truth truth, std::size_t row) const {
+  if (row == VoxelProtocol::kIdentity) return counts.points;
+  if (row == VoxelProtocol::kOracle) return truth == Truth::kStatic ? counts.points : 0;
+  return counts.kept.at(row - VoxelProtocol::kFirstEstimate);
+}
+
+std::vector<ClassScore> PointProtocol::by_class(std::size_t row) const {
+  std::map<std::pair<Truth, std::uint16_t>, ClassScore> classes;
+  for (const auto& [label, counts] : by_label_) {
+    if (counts.points == 0) continue;
+    const Truth truth = settings_.truth(label);
+    const std::uint64_t points_kept = kept(counts, truth, row);
+    ClassScore& of_class = classes[{truth, semantic_class(label)}];
+    of_class.id = semantic_class(label);
+    of_class.truth = truth;
+    of_class.points += counts.points;
+    of_class.points_kept += points_kept;
+    if (semantic_instance(label) == 0 || counts.points < ObjectScore::kMinPoints) continue;
+    ++of_class.objects;
+    of_class.right += is_right(truth, counts.points, points_kept);
+  }
+  std::vector<ClassScore> result;
+  result.reserve(classes.size());
+  for (const auto& one : classes) result.push_back(one.second);
+  return result;
+}
+
+PointScore PointProtocol::points(std::size_t row) const {
+  PointScore score;
+  for (const ClassScore& one : by_class(row)) {
+    if (one.truth == Truth::kDynamic) {
+      score.dynamic_total += one.points;
+      score.dynamic_removed += one.removed();
+    } else {
+      score.static_total += one.points;
+      score.static_kept += one.points_kept;
     }
   }
-  for (PointScore& score : scores_) {
-    score.static_total = totals_.static_total;
-    score.dynamic_total = totals_.dynamic_total;
+  return score;
+}
+
+ObjectScore PointProtocol::objects(std::size_t row) const {
+  ObjectScore score;
+  for (const ClassScore& one : by_class(row)) {
+    if (is_ground_class(one.id)) continue;
+    if (one.truth == Truth::kDynamic) {
+      score.dynamic_total += one.objects;
+      score.dynamic_removed += one.right;
+    } else if (!is_person(one.id)) {
+      score.static_total += one.objects;
+      score.static_kept += one.right;
+    }
   }
-}
-
-PointScore PointProtocol::identity() const {
-  return {totals_.static_total, totals_.static_total, totals_.dynamic_total, 0};
-}
-
-PointScore PointProtocol::oracle() const {
-  return {totals_.static_total, totals_.static_total, totals_.dynamic_total, totals_.dynamic_total};
+  return score;
 }
 
 }  // namespace dynains::evaluation

@@ -54,6 +54,15 @@ Json to_json(const ObjectScore& score) {
           {"dynamic_removed", score.dynamic_removed}};
 }
 
+/// Without ground, which has no objects.
+std::vector<ClassScore> classes_of_objects(const EvaluationRow& row) {
+  std::vector<ClassScore> classes;
+  for (const ClassScore& one : row.classes) {
+    if (!is_ground_class(one.id)) classes.push_back(one);
+  }
+  return classes;
+}
+
 Json to_json(const std::vector<ClassScore>& classes) {
   Json json = Json::array();
   for (const ClassScore& one : classes) {
@@ -72,7 +81,7 @@ Json to_json(const std::vector<ClassScore>& classes) {
 /// Objects of one estimate by class.
 std::string objects_to_table(const EvaluationRow& row) {
   TextTable table({"class", "truth", "objects", "right", "right %", "points", "points kept %"});
-  for (const ClassScore& one : row.object_classes) {
+  for (const ClassScore& one : classes_of_objects(row)) {
     table.add({semantic_class_name(one.id), name(one.truth), std::to_string(one.objects),
                std::to_string(one.right), format_number(percent(one.right, one.objects), 1),
                std::to_string(one.points), format_number(percent(one.points_kept, one.points), 2)});
@@ -80,22 +89,20 @@ std::string objects_to_table(const EvaluationRow& row) {
   return "\nobjects, " + row.name + '\n' + table.to_string();
 }
 
-Json to_json(const ErrorAnalysis& errors, const TruthClasses& truth) {
-  Json json;
-  json["by_class"] = Json::array();
-  for (const auto& [id, one] : errors.by_class()) {
-    json["by_class"].push_back({{"class", id},
-                                {"name", semantic_class_name(id)},
-                                {"truth", name(truth(id))},
-                                {"points", one.points},
-                                {"removed", one.removed},
-                                {"removed_percent", json_number(one.removed_percent())}});
+Json errors_to_json(const Evaluation& evaluation) {
+  if (evaluation.first_estimate() == nullptr) return nullptr;
+  Json json = {{"by_class", Json::array()}, {"by_cause", nullptr}};
+  for (const ClassScore& one : evaluation.first_estimate()->classes) {
+    json["by_class"].push_back(
+        {{"class", one.id},
+         {"name", semantic_class_name(one.id)},
+         {"truth", name(one.truth)},
+         {"points", one.points},
+         {"removed", one.removed()},
+         {"removed_percent", json_number(percent(one.removed(), one.points))}});
   }
-  json["by_cause"] = Json();
-  if (!errors.has_causes()) return json;
-  json["by_cause"] = Json::array();
-  for (std::size_t c = 0; c < kCauseCount; ++c) {
-    const auto& cause = errors.by_cause()[c];
+  for (std::size_t c = 0; c < evaluation.causes.size(); ++c) {
+    const CauseErrors& cause = evaluation.causes[c];
     json["by_cause"].push_back({{"cause", kCauseNames[c]},
                                 {"missed_dynamic", cause.missed_dynamic},
                                 {"lost_static", cause.lost_static},
@@ -115,7 +122,7 @@ std::string to_table(const Evaluation& evaluation) {
        << "PR RR F1: voxels of " << format_number(config.voxel, 3) << " m, "
        << range_text(config.min_range, config.max_range)
        << "; SA DA AA HA, objects: " << range_text(config.min_range, config.point_max_range)
-       << "\nkept, left: instances of " << ObjectProtocol::kMinPoints
+       << "\nkept, left: instances of " << ObjectScore::kMinPoints
        << " and more points; static ones that keep 90 % (people left out), moving ones that lose "
           "95 %\n";
   TextTable table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %", "kept %", "left %"});
@@ -131,7 +138,7 @@ std::string to_table(const Evaluation& evaluation) {
   }
   text << table.to_string();
   for (const EvaluationRow& row : evaluation.rows) {
-    if (!row.object_classes.empty()) text << objects_to_table(row);
+    if (!classes_of_objects(row).empty()) text << objects_to_table(row);
   }
   for (const EvaluationRow& row : evaluation.rows) {
     if (!row.foreign_points || *row.foreign_points == 0) continue;
@@ -146,18 +153,17 @@ std::string to_table(const Evaluation& evaluation) {
 }
 
 std::string errors_to_table(const Evaluation& evaluation) {
-  if (!evaluation.errors) return {};
-  const ErrorAnalysis& errors = *evaluation.errors;
+  if (evaluation.first_estimate() == nullptr) return {};
   TextTable classes({"class", "id", "truth", "points", "removed", "removed %"});
-  for (const auto& [id, one] : errors.by_class()) {
-    classes.add({semantic_class_name(id), std::to_string(id), name(evaluation.config.truth(id)),
-                 std::to_string(one.points), std::to_string(one.removed),
-                 format_number(one.removed_percent(), 2)});
+  for (const ClassScore& one : evaluation.first_estimate()->classes) {
+    classes.add({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
+                 std::to_string(one.points), std::to_string(one.removed()),
+                 format_number(percent(one.removed(), one.points), 2)});
   }
-  if (!errors.has_causes()) return classes.to_string();
+  if (evaluation.causes.empty()) return classes.to_string();
   TextTable causes({"cause", "missed dynamic", "lost static", "right"});
-  for (std::size_t c = 0; c < kCauseCount; ++c) {
-    const auto& cause = errors.by_cause()[c];
+  for (std::size_t c = 0; c < evaluation.causes.size(); ++c) {
+    const CauseErrors& cause = evaluation.causes[c];
     if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
     causes.add({kCauseNames[c], std::to_string(cause.missed_dynamic),
                 std::to_string(cause.lost_static), std::to_string(cause.right)});
@@ -178,18 +184,17 @@ std::string to_json(const Evaluation& evaluation) {
     Json json = {
         {"name", row.name}, {"voxels", to_json(row.voxels)}, {"points", to_json(row.points)}};
     if (row.objects) json["objects"] = to_json(*row.objects);
-    if (!row.object_classes.empty()) json["object_classes"] = to_json(row.object_classes);
+    const std::vector<ClassScore> classes = classes_of_objects(row);
+    if (!classes.empty()) json["object_classes"] = to_json(classes);
     if (row.map_points) json["map_points"] = *row.map_points;
     if (row.foreign_points) json["foreign_points"] = *row.foreign_points;
     rows.push_back(json);
   }
-  const Json json = {
-      {"settings", settings},
-      {"scans", evaluation.scans},
-      {"points", evaluation.points},
-      {"rows", rows},
-      {"errors",
-       evaluation.errors ? to_json(*evaluation.errors, evaluation.config.truth) : Json()}};
+  const Json json = {{"settings", settings},
+                     {"scans", evaluation.scans},
+                     {"points", evaluation.points},
+                     {"rows", rows},
+                     {"errors", errors_to_json(evaluation)}};
   // Names of files need not be UTF-8.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }

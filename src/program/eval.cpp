@@ -64,8 +64,7 @@ void check_are_finished(const EvalOptions& options) {
 }
 
 void eval(const EvalOptions& options) {
-  evaluation::EvaluationConfig config = options.evaluation.config();
-  config.analyses_errors = options.errors || !options.json.empty();
+  const evaluation::EvaluationConfig config = options.evaluation.config();
   if (options.runs.size() > evaluation::kMaxEstimates) {
     throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));

@@ -10,6 +10,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/report.hpp"
+#include "dynains/evaluation/voxel_protocol.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
 
@@ -39,7 +40,7 @@ std::vector<OwnedScan> street() {
 TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic points") {
   PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
   for (const OwnedScan& scan : street()) protocol.add(scan.view());
-  const PointScore& score = protocol.score(0);
+  const PointScore score = protocol.points(VoxelProtocol::kFirstEstimate);
   CHECK(score.static_total == 30);
   CHECK(score.static_kept == 25);
   CHECK(score.dynamic_total == 12);
@@ -48,9 +49,9 @@ TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic poi
   CHECK(score.dynamic_accuracy() == Approx(66.6666667));
   CHECK(score.associated_accuracy() == Approx(74.5355992));  // sqrt(83.33 * 66.67)
   CHECK(score.harmonic_accuracy() == Approx(74.0740741));    // 2 * 83.33 * 66.67 / 150
-  CHECK(protocol.identity().static_accuracy() == 100.0);
-  CHECK(protocol.identity().dynamic_accuracy() == 0.0);
-  CHECK(protocol.oracle().harmonic_accuracy() == 100.0);
+  CHECK(protocol.points(VoxelProtocol::kIdentity).static_accuracy() == 100.0);
+  CHECK(protocol.points(VoxelProtocol::kIdentity).dynamic_accuracy() == 0.0);
+  CHECK(protocol.points(VoxelProtocol::kOracle).harmonic_accuracy() == 100.0);
 }
 
 TEST_CASE("Every evaluation carries identity and oracle") {
@@ -99,14 +100,15 @@ TEST_CASE("Errors are counted by class and cause") {
   }
 
   const Evaluation result = evaluate(source_of(scans), {"run"}, {});
-  REQUIRE(result.errors);
-  const auto& classes = result.errors->by_class();
+  const auto& classes = result.rows[2].classes;
   REQUIRE(classes.size() == 2);
-  CHECK(classes.at(40).removed == 5);
-  CHECK(classes.at(252).points == 12);
-  CHECK(classes.at(252).removed == 8);
+  CHECK(classes[0].id == 40);
+  CHECK(classes[0].removed() == 5);
+  CHECK(classes[1].id == 252);
+  CHECK(classes[1].points == 12);
+  CHECK(classes[1].removed() == 8);
 
-  const auto& causes = result.errors->by_cause();
+  const auto& causes = result.causes;
   CHECK(causes[static_cast<std::size_t>(Cause::kSimilar)].missed_dynamic == 4);
   CHECK(causes[static_cast<std::size_t>(Cause::kNoEvidence)].lost_static == 5);
   CHECK(causes[static_cast<std::size_t>(Cause::kNoEvidence)].right == 33);
@@ -114,17 +116,6 @@ TEST_CASE("Errors are counted by class and cause") {
   const std::string text = errors_to_table(result);
   CHECK(text.find("moving-car") != std::string::npos);
   CHECK(text.find("similarity too high") != std::string::npos);
-}
-
-TEST_CASE("Scores are equal with and without the analysis of errors") {
-  const auto scans = street();
-  EvaluationConfig config;
-  const Evaluation with = evaluate(source_of(scans), {"run"}, {}, config);
-  config.analyses_errors = false;
-  const Evaluation without = evaluate(source_of(scans), {"run"}, {}, config);
-  CHECK(with.errors);
-  CHECK_FALSE(without.errors);
-  CHECK(to_table(with) == to_table(without));
 }
 
 TEST_CASE("All reports have equal numbers") {

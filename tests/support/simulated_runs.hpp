@@ -52,7 +52,6 @@ inline StaticByVerdict static_points(
 inline evaluation::EvaluationConfig within_50_m() {
   evaluation::EvaluationConfig config;
   config.max_range = 50.0;
-  config.analyses_errors = false;
   return config;
 }
 

@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "dynains/evaluation/error_analysis.hpp"
-#include "dynains/evaluation/object_protocol.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
@@ -24,7 +22,6 @@ struct EvaluationConfig {
   double point_max_range = 50.0;
   double point_radius = 0.05;
   TruthClasses truth;
-  bool analyses_errors = true;  ///< whether Evaluation::errors is made
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
@@ -55,8 +52,8 @@ struct EvaluationRow {
   std::string name;
   VoxelScore voxels;
   PointScore points;
-  std::optional<ObjectScore> objects;      ///< not of maps
-  std::vector<ClassScore> object_classes;  ///< of estimates only
+  std::optional<ObjectScore> objects;  ///< not of maps
+  std::vector<ClassScore> classes;     ///< of estimates only; static ones first, by id
   /// Maps only: number of points without a measured point nearby (MapProtocol::foreign_points()),
   /// and number of all points.
   std::optional<std::uint64_t> foreign_points;
@@ -70,8 +67,13 @@ struct Evaluation {
   /// "identity" (no point removed), "oracle" (exactly the dynamic points removed), the estimates
   /// and the maps, in this order.
   std::vector<EvaluationRow> rows;
-  /// Errors of estimate 0; empty without estimates or without `analyses_errors`.
-  std::optional<ErrorAnalysis> errors;
+  /// Verdicts of estimate 0 by cause; empty if no scan has causes.
+  std::vector<CauseErrors> causes;
+
+  /// Row of estimate 0; null without estimates.
+  const EvaluationRow* first_estimate() const {
+    return rows.size() > 2 && rows[2].objects ? &rows[2] : nullptr;
+  }
 };
 
 /// Evaluates estimates and maps, in several threads. Reads `source` twice, in the caller's thread.

@@ -1,17 +1,21 @@
-// SA, DA, AA and HA of KTH's DynamicMap_Benchmark (Zhang et al., ITSC 2023), scan by scan.
+// Scores by points and objects, and errors by class and cause, scan by scan.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <unordered_map>
 #include <vector>
 
+#include "dynains/evaluation/causes.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
 
 namespace dynains::evaluation {
 
-/// Counts the correctly classified points of each estimate (LabelledScan::in_map): static points in
-/// its map and dynamic points not in its map.
+/// Counts the points with each label that each estimate keeps (LabelledScan::in_map), as KTH's
+/// DynamicMap_Benchmark (Zhang et al., ITSC 2023) does by class.
 class PointProtocol {
  public:
   struct Settings {
@@ -26,16 +30,26 @@ class PointProtocol {
 
   void add(const LabelledScan& scan);
 
-  const PointScore& score(std::size_t estimate) const { return scores_.at(estimate); }
+  /// Scores of a row, as of VoxelProtocol.
+  PointScore points(std::size_t row) const;
+  ObjectScore objects(std::size_t row) const;
+  /// Static classes first, each ordered by id.
+  std::vector<ClassScore> by_class(std::size_t row) const;
 
-  /// Scores of the references: no point removed, and exactly the dynamic points removed.
-  PointScore identity() const;
-  PointScore oracle() const;
+  /// Verdicts of estimate 0 by cause; empty if no scan has causes.
+  const std::vector<CauseErrors>& by_cause() const { return causes_; }
 
  private:
+  struct Counts {
+    std::uint64_t points = 0;
+    std::array<std::uint64_t, kMaxEstimates> kept{};
+  };
+  std::uint64_t kept(const Counts& counts, Truth truth, std::size_t row) const;
+
   Settings settings_;
-  PointScore totals_;
-  std::vector<PointScore> scores_;
+  std::size_t estimates_;
+  std::unordered_map<std::uint32_t, Counts> by_label_;
+  std::vector<CauseErrors> causes_;
 };
 
 }  // namespace dynains::evaluation

@@ -1,4 +1,4 @@
-#include "dynains/evaluation/object_protocol.hpp"
+#include "dynains/evaluation/point_protocol.hpp"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -6,12 +6,14 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/evaluation/report.hpp"
+#include "dynains/evaluation/voxel_protocol.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::evaluation::testing {
 namespace {
 
+constexpr std::size_t kFirst = VoxelProtocol::kFirstEstimate;
 constexpr std::uint32_t kCar = 10, kBuilding = 50, kPerson = 30;
 
 std::uint32_t label(std::uint32_t kind, std::uint32_t instance) { return kind | instance << 16U; }
@@ -23,8 +25,8 @@ void add_object(OwnedScan& scan, std::uint32_t of, int points, int kept, float r
   }
 }
 
-ObjectProtocol protocol_of(const OwnedScan& scan) {
-  ObjectProtocol protocol({2.7, 50, TruthClasses()}, 1);
+PointProtocol protocol_of(const OwnedScan& scan) {
+  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
   protocol.add(scan.view());
   return protocol;
 }
@@ -37,7 +39,7 @@ TEST_CASE("A static object is kept with 90 % of its points, a moving one removed
   add_object(scan, label(kCar, 2), 100, 89);
   add_object(scan, label(kMovingCar, 3), 100, 5);
   add_object(scan, label(kMovingCar, 4), 100, 6);
-  const ObjectScore score = protocol_of(scan).score(0);
+  const ObjectScore score = protocol_of(scan).objects(kFirst);
   CHECK(score.static_total == 2);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_total == 2);
@@ -51,11 +53,11 @@ TEST_CASE("Objects have 50 points and more within the range, in all scans togeth
   add_object(scan, label(kCar, 1), 49, 0);
   add_object(scan, label(kCar, 2), 50, 0);
   add_object(scan, label(kCar, 3), 500, 0, 51.0F);  // out of range
-  ObjectProtocol protocol({2.7, 50, TruthClasses()}, 1);
+  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
   protocol.add(scan.view());
-  CHECK(protocol.score(0).static_total == 1);
+  CHECK(protocol.objects(kFirst).static_total == 1);
   protocol.add(scan.view());
-  CHECK(protocol.score(0).static_total == 2);
+  CHECK(protocol.objects(kFirst).static_total == 2);
 }
 
 TEST_CASE("People, ground and points without an instance are no static objects") {
@@ -64,25 +66,26 @@ TEST_CASE("People, ground and points without an instance are no static objects")
   add_object(scan, label(kRoad, 2), 100, 0);
   add_object(scan, kBuilding, 100, 25);
   add_object(scan, 0, 100, 0);
-  const ObjectProtocol protocol = protocol_of(scan);
-  CHECK(protocol.score(0).static_total == 0);
-  CHECK(std::isnan(protocol.score(0).kept()));
-  // By class, people and things without an instance are listed, with their points.
-  const auto classes = protocol.by_class(0);
-  REQUIRE(classes.size() == 2);
+  const PointProtocol protocol = protocol_of(scan);
+  CHECK(protocol.objects(kFirst).static_total == 0);
+  CHECK(std::isnan(protocol.objects(kFirst).kept()));
+  // By class, all are listed with their points.
+  const auto classes = protocol.by_class(kFirst);
+  REQUIRE(classes.size() == 3);
   CHECK(classes[0].id == kPerson);
   CHECK(classes[0].objects == 1);
-  CHECK(classes[1].id == kBuilding);
-  CHECK(classes[1].objects == 0);
-  CHECK(classes[1].points == 100);
-  CHECK(classes[1].points_kept == 25);
+  CHECK(classes[1].id == kRoad);
+  CHECK(classes[2].id == kBuilding);
+  CHECK(classes[2].objects == 0);
+  CHECK(classes[2].points == 100);
+  CHECK(classes[2].points_kept == 25);
 }
 
 TEST_CASE("Objects that move at times are one object for each class") {
   OwnedScan scan;
   add_object(scan, label(kCar, 7), 100, 100);
   add_object(scan, label(kMovingCar, 7), 100, 0);
-  const ObjectScore score = protocol_of(scan).score(0);
+  const ObjectScore score = protocol_of(scan).objects(kFirst);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_removed == 1);
 }
@@ -92,18 +95,18 @@ TEST_CASE("Estimates are judged apart, beside identity and oracle") {
   add_object(scan, label(kCar, 1), 100, 100);
   add_object(scan, label(kMovingCar, 3), 100, 100);
   for (std::size_t i = 0; i < 100; ++i) scan.in_map[i] = i < 50 ? 3 : 1;  // estimate 1 keeps half
-  ObjectProtocol protocol({2.7, 50, TruthClasses()}, 2);
+  PointProtocol protocol({2.7, 50, TruthClasses()}, 2);
   protocol.add(scan.view());
-  CHECK(protocol.score(0).kept() == 100.0);
-  CHECK(protocol.score(1).kept() == 0.0);
-  CHECK(protocol.score(0).removed() == 0.0);
-  CHECK(protocol.score(1).removed() == 100.0);
-  CHECK(protocol.identity().kept() == 100.0);
-  CHECK(protocol.identity().removed() == 0.0);
-  CHECK(protocol.oracle().kept() == 100.0);
-  CHECK(protocol.oracle().removed() == 100.0);
-  CHECK_THROWS_AS(ObjectProtocol({2.7, 50, TruthClasses()}, kMaxEstimates + 1), ConfigError);
-  CHECK_THROWS_AS(ObjectProtocol({2.7, 1, TruthClasses()}, 1), ConfigError);
+  CHECK(protocol.objects(kFirst).kept() == 100.0);
+  CHECK(protocol.objects(kFirst + 1).kept() == 0.0);
+  CHECK(protocol.objects(kFirst).removed() == 0.0);
+  CHECK(protocol.objects(kFirst + 1).removed() == 100.0);
+  CHECK(protocol.objects(VoxelProtocol::kIdentity).kept() == 100.0);
+  CHECK(protocol.objects(VoxelProtocol::kIdentity).removed() == 0.0);
+  CHECK(protocol.objects(VoxelProtocol::kOracle).kept() == 100.0);
+  CHECK(protocol.objects(VoxelProtocol::kOracle).removed() == 100.0);
+  CHECK_THROWS_AS(PointProtocol({2.7, 50, TruthClasses()}, kMaxEstimates + 1), ConfigError);
+  CHECK_THROWS_AS(PointProtocol({2.7, 1, TruthClasses()}, 1), ConfigError);
 }
 
 TEST_CASE("Table, JSON and CSV of an evaluation have the objects") {
