@@ -120,7 +120,7 @@ const std::vector<std::string>& score_names() {
 double points_kept(const evaluation::EvaluationRow& row,
                    const std::vector<std::uint16_t>& classes) {
   std::uint64_t points = 0, kept = 0;
-  for (const evaluation::ClassScore& one : row.object_classes) {
+  for (const evaluation::ClassScore& one : row.classes) {
     if (std::find(classes.begin(), classes.end(), one.id) == classes.end()) continue;
     points += one.points;
     kept += one.points_kept;
