@@ -45,7 +45,7 @@ Object object_of(ChangeKind kind, Random& random) {
     case ChangeKind::kContainer:
       object.label = semantic::kOtherObject;
       object.size = {4.0, 1.6, 1.7};
-      object.model = {block(materials.street_furniture, -2.0, 2.0, -0.8, 0.8, 0, 1.7)};
+      object.model = {block(kMaterials.street_furniture, -2.0, 2.0, -0.8, 0.8, 0, 1.7)};
       break;
   }
   return object;

@@ -73,6 +73,6 @@ struct Materials {
   Material pram{semantic::kPerson, 0.25F, 0.05F, 0, 0, 0.01F, 0};
   Material ego_roof{semantic::kOutlier, 0.3F, 0.1F, 0, 0, 0, 0};
 };
-inline constexpr Materials materials;
+inline constexpr Materials kMaterials;
 
 }  // namespace dynains::simulation

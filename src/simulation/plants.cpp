@@ -13,7 +13,7 @@ Vec3 add_branch(Model& model, Vec3 from, double heading, double tilt, double len
                 double radius) {
   const Mat3 rotation = rotation_z(heading) * rotation_y(tilt);
   const Vec3 along = rotation * vec(0, 0, length);
-  model.push_back(rod(materials.tree_trunk, from + 0.5F * along, radius, length, rotation));
+  model.push_back(rod(kMaterials.tree_trunk, from + 0.5F * along, radius, length, rotation));
   return from + along;
 }
 
@@ -23,7 +23,7 @@ void add_clumps(Model& model, Vec3 from, Vec3 to, bool bare, double size, Random
   for (int i = 0; i < clumps; ++i) {
     const Vec3 at = from + static_cast<float>(random.uniform(0.4, 1.05)) * (to - from);
     const double radius = size * random.uniform(0.6, 1.2), spread = 0.7 * size;
-    model.push_back(ball(bare ? materials.bare_twigs : materials.leaf_clump,
+    model.push_back(ball(bare ? kMaterials.bare_twigs : kMaterials.leaf_clump,
                          static_cast<double>(at.x) + random.uniform(-spread, spread),
                          static_cast<double>(at.y) + random.uniform(-spread, spread),
                          static_cast<double>(at.z) + random.uniform(-spread, spread), radius,
@@ -37,7 +37,7 @@ Model tree_model(double height, double crown_radius, double clear_height, Random
   Model model;
   const double trunk = 0.08 + 0.018 * height * random.uniform(0.7, 1.3);
   const double lean = random.uniform(-0.04, 0.04);
-  model.push_back(rod(materials.tree_trunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3), trunk,
+  model.push_back(rod(kMaterials.tree_trunk, vec(0, 0, 0.5 * (clear_height + 1) - 0.3), trunk,
                       2 * (0.5 * (clear_height + 1) + 0.3), rotation_y(lean)));
   const double middle = 0.5 * (clear_height + height);
   const double half = 0.5 * (height - clear_height);
@@ -48,7 +48,7 @@ Model tree_model(double height, double crown_radius, double clear_height, Random
   }
   // One thin ball as the whole, dense ones as boughs.
   const bool thin = random.chance(0.3);
-  model.push_back(ball(materials.thin_leaves, 0, 0, middle, crown_radius, crown_radius, half));
+  model.push_back(ball(kMaterials.thin_leaves, 0, 0, middle, crown_radius, crown_radius, half));
   const auto boughs = static_cast<int>(5 + random.index(6));
   for (int i = 0; i < boughs; ++i) {
     const double heading = random.uniform(0, 2 * kPi);
@@ -57,7 +57,7 @@ Model tree_model(double height, double crown_radius, double clear_height, Random
     const double radius = crown_radius * random.uniform(0.3, 0.5);
     const double flat = random.uniform(0.6, 1.0);
     const double z = std::max(middle + up, clear_height + 0.7 * radius);
-    model.push_back(ball(thin ? materials.thin_leaves : materials.leaves, out * std::cos(heading),
+    model.push_back(ball(thin ? kMaterials.thin_leaves : kMaterials.leaves, out * std::cos(heading),
                          out * std::sin(heading), z, radius, radius, radius * flat));
   }
   return model;
@@ -70,7 +70,7 @@ Model bush_model(double radius, double height, Random& random) {
     const double heading = random.uniform(0, 2 * kPi), out = radius * random.uniform(0.1, 0.5);
     const double r = radius * random.uniform(0.5, 0.8), h = height * random.uniform(0.35, 0.55);
     model.push_back(
-        ball(materials.bush, out * std::cos(heading), out * std::sin(heading), h, r, r, h));
+        ball(kMaterials.bush, out * std::cos(heading), out * std::sin(heading), h, r, r, h));
   }
   return model;
 }
@@ -79,7 +79,7 @@ Model open_tree_model(double height, double crown_radius, double clear_height, R
   Model model;
   const double trunk = 0.06 + 0.015 * height * random.uniform(0.7, 1.3);
   const double top = 0.85 * height;
-  model.push_back(post(materials.tree_trunk, 0, 0, -0.3, top, trunk));
+  model.push_back(post(kMaterials.tree_trunk, 0, 0, -0.3, top, trunk));
   const bool bare = random.chance(0.3);
   const auto branches = static_cast<int>(6 + random.index(5));
   for (int i = 0; i < branches; ++i) {
@@ -101,7 +101,7 @@ Model open_bush_model(double radius, double height, Random& random) {
   for (int i = 0; i < stems; ++i) {
     const double heading = random.uniform(0, 2 * kPi), out = radius * random.uniform(0.2, 0.8);
     const double r = radius * random.uniform(0.25, 0.4), z = height * random.uniform(0.3, 0.85);
-    model.push_back(ball(materials.leaf_clump, out * std::cos(heading), out * std::sin(heading), z,
+    model.push_back(ball(kMaterials.leaf_clump, out * std::cos(heading), out * std::sin(heading), z,
                          r, r, r * random.uniform(0.6, 1.2)));
   }
   return model;
@@ -113,7 +113,7 @@ Model hedge_model(double length, double width, double height, Random& random) {
   for (double x = -l; x < l - 0.1; x += 1.5) {
     const double end = std::min(x + 1.55, l), wide = w * random.uniform(0.85, 1.1);
     const double high = height * random.uniform(0.9, 1.08);
-    model.push_back(block(materials.hedge, x, end, -wide, wide, -0.2, high));
+    model.push_back(block(kMaterials.hedge, x, end, -wide, wide, -0.2, high));
   }
   return model;
 }
@@ -125,7 +125,7 @@ Model open_hedge_model(double length, double width, double height, Random& rando
     const double r = w * random.uniform(0.7, 1.1);
     for (double z = 0.3 * height; z < height; z += random.uniform(0.3, 0.6)) {
       if (random.chance(0.2)) continue;  // a gap
-      model.push_back(ball(materials.open_hedge, x, random.uniform(-0.3, 0.3) * w, z, r, r,
+      model.push_back(ball(kMaterials.open_hedge, x, random.uniform(-0.3, 0.3) * w, z, r, r,
                            random.uniform(0.2, 0.4)));
     }
   }

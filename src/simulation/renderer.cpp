@@ -135,7 +135,7 @@ void Renderer::draw_slots(const Drawn& drawn, float near, std::size_t begin, std
   const Primitive& primitive = drawn.primitive;
   const bool porous = primitive.material->density > 0;
   const bool windows = primitive.material->window_spacing > 0;
-  const bool pane = glass_passes_ > 0 && primitive.material == &materials.glass;
+  const bool pane = glass_passes_ > 0 && primitive.material == &kMaterials.glass;
   for (std::size_t slot = begin; slot < end; ++slot) {
     Hit& hit = hits_[slot];
     if (hit.range <= near) continue;

@@ -337,7 +337,7 @@ class Simulator::Implementation {
       }
     }
     if (config_.ego_points) {
-      renderer_.add(make_primitive(Shape::kBox, materials.ego_roof,
+      renderer_.add(make_primitive(Shape::kBox, kMaterials.ego_roof,
                                    {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
                                    {1.9F, 0.85F, 0.55F}, rotation_z(-model_.yaw)),
                     0, 3);

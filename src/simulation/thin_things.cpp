@@ -7,9 +7,9 @@
 namespace dynains::simulation {
 
 Model bicycle_model() {
-  const Material& frame = materials.bicycle_frame;
-  return {wheel(materials.metal, -0.52, 0, 0.34, 0.03),
-          wheel(materials.metal, 0.52, 0, 0.34, 0.03),
+  const Material& frame = kMaterials.bicycle_frame;
+  return {wheel(kMaterials.metal, -0.52, 0, 0.34, 0.03),
+          wheel(kMaterials.metal, 0.52, 0, 0.34, 0.03),
           block(frame, -0.35, 0.4, -0.02, 0.02, 0.58, 0.62),
           block(frame, -0.02, 0.02, -0.02, 0.02, 0.3, 0.9),
           block(frame, -0.15, 0.1, -0.08, 0.08, 0.88, 0.95),
@@ -22,11 +22,11 @@ Model railing_model(double length, double height, Random& random) {
   const Mat3 along = rotation_y(kPi / 2);
   Model model;
   for (const double z : {0.35 * height, 0.67 * height, height}) {
-    model.push_back(rod(materials.railing, vec(0, 0, z), radius, length, along));
+    model.push_back(rod(kMaterials.railing, vec(0, 0, z), radius, length, along));
   }
   const double gap = random.uniform(1.2, 2.2);
   for (double x = -length / 2; x <= length / 2; x += gap) {
-    model.push_back(post(materials.railing, x, 0, -0.3, height, 1.3 * radius));
+    model.push_back(post(kMaterials.railing, x, 0, -0.3, height, 1.3 * radius));
   }
   return model;
 }
@@ -35,11 +35,11 @@ Model paling_model(double length, double height, Random& random) {
   const double pale = random.uniform(0.04, 0.09), pitch = pale + random.uniform(0.04, 0.12);
   Model model;
   for (double x = -length / 2; x < length / 2; x += pitch) {
-    model.push_back(block(materials.wood_fence, x, x + pale, -0.012, 0.012, -0.1, height));
+    model.push_back(block(kMaterials.wood_fence, x, x + pale, -0.012, 0.012, -0.1, height));
   }
   for (const double z : {0.25 * height, 0.8 * height}) {
     model.push_back(
-        block(materials.wood_fence, -length / 2, length / 2, 0.012, 0.05, z - 0.04, z + 0.04));
+        block(kMaterials.wood_fence, -length / 2, length / 2, 0.012, 0.05, z - 0.04, z + 0.04));
   }
   return model;
 }
@@ -54,7 +54,7 @@ Model wire_model(double length, double height, Random& random) {
     const double rise = height_at(u1) - height_at(u0), run = length / kPieces;
     const Vec3 middle =
         vec((0.5 * (u0 + u1) - 0.5) * length, 0, 0.5 * (height_at(u0) + height_at(u1)));
-    model.push_back(rod(materials.wire, middle, radius, std::sqrt(rise * rise + run * run),
+    model.push_back(rod(kMaterials.wire, middle, radius, std::sqrt(rise * rise + run * run),
                         rotation_y(kPi / 2 - std::atan2(rise, run))));
   }
   return model;
@@ -63,9 +63,9 @@ Model wire_model(double length, double height, Random& random) {
 Model sign_model(Random& random) {
   const double height = random.uniform(1.8, 3.2), radius = random.uniform(0.025, 0.05);
   const double half_width = random.uniform(0.2, 0.9), half_height = random.uniform(0.2, 0.5);
-  Model model{post(materials.steel_pole, 0, 0, -0.3, height, radius)};
-  if (half_width > 0.6) model.push_back(post(materials.steel_pole, 0, 0.5, -0.3, height, radius));
-  model.push_back(block(materials.sign_plate, -0.06, -0.04, -half_width, half_width,
+  Model model{post(kMaterials.steel_pole, 0, 0, -0.3, height, radius)};
+  if (half_width > 0.6) model.push_back(post(kMaterials.steel_pole, 0, 0.5, -0.3, height, radius));
+  model.push_back(block(kMaterials.sign_plate, -0.06, -0.04, -half_width, half_width,
                         height - 2 * half_height, height));
   return model;
 }
@@ -73,9 +73,9 @@ Model sign_model(Random& random) {
 Model trolley_model(Random& random) {
   const double length = random.uniform(0.8, 1.1);
   const double l = length / 2;
-  return {block(materials.mesh, -l, l, -0.28, 0.28, 0.45, 1.0),
-          block(materials.mesh, -l, l, -0.25, 0.25, 0.12, 0.22),
-          block(materials.street_furniture, -l - 0.08, -l, -0.28, 0.28, 0.98, 1.03)};
+  return {block(kMaterials.mesh, -l, l, -0.28, 0.28, 0.45, 1.0),
+          block(kMaterials.mesh, -l, l, -0.25, 0.25, 0.12, 0.22),
+          block(kMaterials.street_furniture, -l - 0.08, -l, -0.28, 0.28, 0.98, 1.03)};
 }
 
 }  // namespace dynains::simulation

@@ -96,11 +96,11 @@ TEST_CASE("a share of the beams passes through panes of vehicles, none through o
     return std::count_if(renderer.hits().begin(), renderer.hits().end(),
                          [](const auto& hit) { return hit.drawn != nullptr; });
   };
-  const auto all = static_cast<double>(met(materials.glass, 0));
+  const auto all = static_cast<double>(met(kMaterials.glass, 0));
   REQUIRE(all > 5000);
-  CHECK(static_cast<double>(met(materials.glass, 0.4F)) / all == Approx(0.6).margin(0.03));
-  CHECK(met(materials.glass, 1) == 0);
-  CHECK(static_cast<double>(met(materials.bright_paint, 1)) == all);
+  CHECK(static_cast<double>(met(kMaterials.glass, 0.4F)) / all == Approx(0.6).margin(0.03));
+  CHECK(met(kMaterials.glass, 1) == 0);
+  CHECK(static_cast<double>(met(kMaterials.bright_paint, 1)) == all);
 }
 
 TEST_CASE("beam patterns have the right size and never repeat") {

@@ -126,11 +126,11 @@ void add_arcades(Builder& builder, Random& random, const Street& street) {
 
 Model gantry_model(double edge) {
   Model gantry{
-      make_primitive(Shape::kBox, materials.steel_pole, {0, 0, 6.2F},
+      make_primitive(Shape::kBox, kMaterials.steel_pole, {0, 0, 6.2F},
                      {0.15F, static_cast<float>(edge + 1), 0.15F}),
-      make_primitive(Shape::kBox, materials.sign_plate, {0.2F, -6, 6.6F}, {0.05F, 2.5F, 1.2F})};
+      make_primitive(Shape::kBox, kMaterials.sign_plate, {0.2F, -6, 6.6F}, {0.05F, 2.5F, 1.2F})};
   for (const float side : {-1.0F, 1.0F}) {
-    gantry.push_back(make_primitive(Shape::kCylinder, materials.steel_pole,
+    gantry.push_back(make_primitive(Shape::kCylinder, kMaterials.steel_pole,
                                     {0, side * static_cast<float>(edge + 1), 3},
                                     {0.15F, 0.15F, 3.3F}));
   }
