@@ -1,6 +1,5 @@
 #include "point_cloud2.hpp"
 
-#include <algorithm>
 #include <iterator>
 #include <optional>
 
@@ -22,9 +21,7 @@ PointCloud2::PointCloud2(MessageReader& in) {
   width_ = in.number<std::uint32_t>("a width");
   read_fields(in);
   const bool is_big_endian = in.number<std::uint8_t>("is_bigendian") != 0;
-  for (Field* const field : {&x, &y, &z, &intensity, &ring, &time, &label}) {
-    field->is_big_endian = is_big_endian;
-  }
+  for (Field& field : fields_) field.is_big_endian = is_big_endian;
   point_step_ = in.number<std::uint32_t>("a point step");
   row_step_ = in.number<std::uint32_t>("a row step");
   const std::uint32_t bytes = in.length(1, "data");
@@ -36,39 +33,11 @@ PointCloud2::PointCloud2(MessageReader& in) {
 
 PointColumns PointCloud2::columns() const {
   PointColumns columns;
-  columns.intensity = intensity.is_there;
-  columns.ring = ring.is_there;
-  columns.time = time.is_there;
-  columns.label = label.is_there;
+  columns.intensity = field(Role::kIntensity).is_there;
+  columns.ring = field(Role::kRing).is_there;
+  columns.time = field(Role::kTime).is_there;
+  columns.label = field(Role::kLabel).is_there;
   return columns;
-}
-
-PointCloud2::Field* PointCloud2::field_of(const std::string& name) {
-  struct Alias {
-    const char* name;
-    Field PointCloud2::*field;
-  };
-  static constexpr Alias kAliases[] = {
-      {"x", &PointCloud2::x},
-      {"y", &PointCloud2::y},
-      {"z", &PointCloud2::z},
-      {"intensity", &PointCloud2::intensity},
-      {"i", &PointCloud2::intensity},
-      {"reflectivity", &PointCloud2::intensity},
-      {"ring", &PointCloud2::ring},
-      {"channel", &PointCloud2::ring},
-      {"line", &PointCloud2::ring},
-      {"time", &PointCloud2::time},
-      {"t", &PointCloud2::time},
-      {"timestamp", &PointCloud2::time},
-      {"time_stamp", &PointCloud2::time},
-      {"offset_time", &PointCloud2::time},
-      {"label", &PointCloud2::label},
-      {"class", &PointCloud2::label},
-  };
-  const auto alias = std::find_if(std::begin(kAliases), std::end(kAliases),
-                                  [&](const Alias& one) { return name == one.name; });
-  return alias == std::end(kAliases) ? nullptr : &(this->*alias->field);
 }
 
 void PointCloud2::read_fields(MessageReader& in) {
@@ -79,25 +48,25 @@ void PointCloud2::read_fields(MessageReader& in) {
     const auto offset = in.number<std::uint32_t>("a field offset");
     const auto datatype = in.number<std::uint8_t>("a field datatype");
     in.number<std::uint32_t>("a field count");
-    Field* const field = field_of(name);
-    if (field == nullptr || field->is_there) continue;
+    const Role role = role_of(name);
+    if (role == Role::kNone || field(role).is_there) continue;
     const std::optional<Scalar> type = scalar_of(datatype);
     if (!type) {
       in.fail("expected a datatype from 1 to 8 of field " + name + ", found " +
               std::to_string(datatype));
     }
-    *field = {true, offset, *type, false};
+    fields_[static_cast<std::size_t>(role)] = {true, offset, *type, false};
   }
 }
 
 void PointCloud2::check_fields(const MessageReader& in) const {
-  for (const Field* const field : {&x, &y, &z}) {
-    if (!field->is_there || field->is_integer()) {
+  for (const Role axis : {Role::kX, Role::kY, Role::kZ}) {
+    if (!field(axis).is_there || field(axis).is_integer()) {
       in.fail("expected the fields x, y and z as float32 or float64");
     }
   }
-  for (const Field* const field : {&x, &y, &z, &intensity, &ring, &time, &label}) {
-    if (field->is_there && field->offset + size_of(field->type) > point_step_) {
+  for (const Field& one : fields_) {
+    if (one.is_there && one.offset + size_of(one.type) > point_step_) {
       in.fail("expected all fields within the " + std::to_string(point_step_) +
               " bytes of a point");
     }

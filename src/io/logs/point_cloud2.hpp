@@ -1,10 +1,11 @@
 // Layout and values of the points of a sensor_msgs/PointCloud2.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 
+#include "../points/point_sink.hpp"
 #include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
 #include "message_reader.hpp"
@@ -42,14 +43,15 @@ class PointCloud2 {
   }
   PointColumns columns() const;
 
-  Field x, y, z, intensity, ring, time, label;
+  /// By its name.
+  const Field& field(Role role) const { return fields_[static_cast<std::size_t>(role)]; }
 
  private:
-  Field* field_of(const std::string& name);
   void read_fields(MessageReader& in);
   void check_fields(const MessageReader& in) const;
   void check_size(const MessageReader& in, std::uint64_t bytes);
 
+  std::array<Field, static_cast<std::size_t>(Role::kNone)> fields_;
   std::uint32_t height_ = 0;
   std::uint32_t width_ = 0;
   std::uint64_t point_step_ = 0;  // bytes

@@ -70,13 +70,13 @@ void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const std::uint8_t* const point = cloud.point(i);
     float* const xyzi = scan.xyzi.data() + 4 * i;
-    xyzi[0] = static_cast<float>(cloud.x.value(point));
-    xyzi[1] = static_cast<float>(cloud.y.value(point));
-    xyzi[2] = static_cast<float>(cloud.z.value(point));
-    const PointCloud2::Field& intensity = cloud.intensity;
-    xyzi[3] = intensity.is_there ? static_cast<float>(intensity.value(point)) : 0.0F;
-    if (cloud.ring.is_there) scan.ring[i] = ring_of(cloud.ring.value(point));
-    if (cloud.time.is_there) scan.time[i] = cloud.time.value(point);
+    for (std::size_t k = 0; k < std::size(kUsualRoles); ++k) {
+      const PointCloud2::Field& field = cloud.field(kUsualRoles[k]);
+      xyzi[k] = field.is_there ? static_cast<float>(field.value(point)) : 0.0F;
+    }
+    const PointCloud2::Field &ring = cloud.field(Role::kRing), &time = cloud.field(Role::kTime);
+    if (ring.is_there) scan.ring[i] = ring_of(ring.value(point));
+    if (time.is_there) scan.time[i] = time.value(point);
   }
 }
 
@@ -156,10 +156,11 @@ std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
   read_header(in);
   if (is_livox(type)) in.fail("expected a field \"label\", which CustomMsg cannot have");
   const PointCloud2 cloud(in);
-  if (!cloud.label.is_there) in.fail("expected a field \"label\", as in the first cloud");
+  const PointCloud2::Field& label_field = cloud.field(Role::kLabel);
+  if (!label_field.is_there) in.fail("expected a field \"label\", as in the first cloud");
   std::vector<std::uint32_t> labels(cloud.size());
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    const double label = cloud.label.value(cloud.point(i));
+    const double label = label_field.value(cloud.point(i));
     if (!(label >= 0.0 && label < 4294967296.0)) in.fail("expected labels from 0 to 4294967295");
     labels[i] = static_cast<std::uint32_t>(label);
   }

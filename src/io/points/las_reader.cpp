@@ -160,11 +160,12 @@ void check_size(const RawFile& file, const LasHeader& header) {
 
 }  // namespace
 
-void read_las(const std::filesystem::path& path, PointSink& sink) {
+std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   constexpr std::uint64_t kBlock = 1U << 14U;  // points
   RawFile file(path);
   const LasHeader header = read_header(file, sink);
   check_size(file, header);
+  if (!with_points) return header.point_count;
   sink.resize(static_cast<std::size_t>(header.point_count));
   std::vector<std::uint8_t> block;
   for (std::uint64_t first = 0; first < header.point_count; first += kBlock) {
@@ -184,14 +185,7 @@ void read_las(const std::filesystem::path& path, PointSink& sink) {
       }
     }
   }
-}
-
-PointFileHeader read_las_header(const std::filesystem::path& path) {
-  RawFile file(path);
-  PointSink sink;
-  const LasHeader header = read_header(file, sink);
-  check_size(file, header);
-  return {Pose::Identity(), sink.columns(), header.point_count};
+  return header.point_count;
 }
 
 }  // namespace dynains

@@ -25,8 +25,6 @@ struct NpyPoints {
   std::vector<NpyColumn> columns;
 };
 
-constexpr Role kUsualRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kIntensity};
-
 void add_npy_column(const Bytes& place, const NpyArray& array, const NpyArray::Field& field,
                     Role role, std::uint64_t begin, std::uint64_t stride, PointSink& sink,
                     NpyPoints& points) {
@@ -83,38 +81,22 @@ void require_xyz(const std::filesystem::path& path, const PointSink& sink) {
   if (const auto name = sink.missing()) fail(path, "expected arrays x, y and z; found no " + *name);
 }
 
-struct NpyFile {
-  std::vector<std::uint8_t> bytes;
-  NpyPoints points;
-};
-
-NpyFile open_npy(const std::filesystem::path& path, PointSink& sink, bool with_points) {
-  RawFile raw(path);
-  NpyFile file;
-  const std::uint64_t longest = with_points ? raw.size() : kLongestNpyHeader + 16;
-  raw.read(0, std::min(raw.size(), longest), "an array", file.bytes);
-  const Bytes bytes(raw.path(), 0, file.bytes.data(), file.bytes.size());
-  const NpyArray array = parse_npy_header(bytes, raw.size());
-  file.points = points_of_array(bytes, array, sink);
-  require_xyz(path, sink);
-  return file;
-}
-
 }  // namespace
 
-void read_npy(const std::filesystem::path& path, PointSink& sink) {
-  const NpyFile file = open_npy(path, sink, true);
-  sink.resize(static_cast<std::size_t>(file.points.count));
-  const Bytes place(path, 0, file.bytes.data(), file.bytes.size());
-  for (const NpyColumn& column : file.points.columns) {
-    store_column(place, column, file.points.count, file.bytes.data(), sink);
+std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool with_points) {
+  RawFile raw(path);
+  const std::uint64_t wanted = with_points ? raw.size() : kLongestNpyHeader + 16;
+  const auto bytes = raw.read(0, std::min(raw.size(), wanted), "an array");
+  const Bytes place(raw.path(), 0, bytes.data(), bytes.size());
+  const NpyArray array = parse_npy_header(place, raw.size());
+  const NpyPoints points = points_of_array(place, array, sink);
+  require_xyz(path, sink);
+  if (!with_points) return points.count;
+  sink.resize(static_cast<std::size_t>(points.count));
+  for (const NpyColumn& column : points.columns) {
+    store_column(place, column, points.count, bytes.data(), sink);
   }
-}
-
-PointFileHeader read_npy_header(const std::filesystem::path& path) {
-  PointSink sink;
-  const NpyFile file = open_npy(path, sink, false);
-  return {Pose::Identity(), sink.columns(), file.points.count};
+  return points.count;
 }
 
 }  // namespace dynains

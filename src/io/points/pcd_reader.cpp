@@ -1,5 +1,4 @@
 #include <array>
-#include <cstring>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -208,50 +207,44 @@ PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
                    std::to_string(i));
 }
 
-void check_ascii(const ByteReader& reader, const PcdHeader& header) {
+void check_size(const ByteReader& reader, const PcdHeader& header) {
   std::uint64_t values = 0;
   for (const Field& field : header.fields) values += field.count;
-  reader.check_room(header.points, "points", 2 * values, true);
-}
-
-void check_binary(const ByteReader& reader, const PcdHeader& header) {
-  reader.check_room(header.points, "points", header.record_bytes());
+  const bool is_text = header.encoding == PcdEncoding::kAscii;
+  reader.check_room(header.points, "points", is_text ? 2 * values : header.record_bytes(), is_text);
 }
 
 struct BlockSizes {
-  std::uint32_t compressed;
-  std::uint32_t plain;
+  std::uint32_t compressed = 0;
+  std::uint32_t plain = 0;
 };
 
 /// Reads the sizes of the compressed block. Throws IoError unless the file can hold the block, and
 /// the block can hold the points.
 BlockSizes read_block_sizes(ByteReader& reader, const PcdHeader& header) {
-  std::array<std::uint32_t, 2> sizes{};
-  std::array<char, sizeof(sizes)> bytes{};
-  reader.read(bytes.data(), bytes.size(), "the sizes of the compressed block");
-  std::memcpy(sizes.data(), bytes.data(), bytes.size());
-  if (sizes[0] > reader.remaining()) {
-    reader.fail_here("expected " + std::to_string(sizes[0]) +
+  BlockSizes sizes;
+  reader.read(&sizes.compressed, 1, "the sizes of the compressed block");
+  reader.read(&sizes.plain, 1, "the sizes of the compressed block");
+  if (sizes.compressed > reader.remaining()) {
+    reader.fail_here("expected " + std::to_string(sizes.compressed) +
                      " bytes of compressed points, the file has " +
                      std::to_string(reader.remaining()) + " bytes left");
   }
-  const auto [compressed_size, plain_size] = BlockSizes{sizes[0], sizes[1]};
   const std::uint64_t each = header.record_bytes();
-  if (plain_size % each != 0 || plain_size / each != header.points) {
+  if (sizes.plain % each != 0 || sizes.plain / each != header.points) {
     reader.fail_here("expected a block of " + std::to_string(header.points) + " points of " +
                      std::to_string(each) + " bytes, its size is given as " +
-                     std::to_string(plain_size));
+                     std::to_string(sizes.plain));
   }
-  if (plain_size > std::uint64_t{compressed_size} * kLzfMaxExpansion) {
+  if (sizes.plain > std::uint64_t{sizes.compressed} * kLzfMaxExpansion) {
     reader.fail_here("expected a block of points that LZF can have compressed: " +
-                     std::to_string(compressed_size) + " bytes cannot hold " +
-                     std::to_string(plain_size));
+                     std::to_string(sizes.compressed) + " bytes cannot hold " +
+                     std::to_string(sizes.plain));
   }
-  return {compressed_size, plain_size};
+  return sizes;
 }
 
 void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
-  check_ascii(reader, header);
   sink.resize(static_cast<std::size_t>(header.points));
   std::string line;
   for (std::size_t i = 0; i < header.points; ++i) {
@@ -271,7 +264,6 @@ void read_ascii(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 }
 
 void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
-  check_binary(reader, header);
   if (header.points == 0) return;
   std::vector<char> record(header.record_bytes());
   sink.resize(static_cast<std::size_t>(header.points));
@@ -290,10 +282,10 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
 
 /// One compressed block with the values of all points field by field.
 std::vector<char> read_block(ByteReader& reader, const PcdHeader& header) {
-  const auto [compressed_size, plain_size] = read_block_sizes(reader, header);
-  std::vector<char> compressed(compressed_size);
+  const BlockSizes sizes = read_block_sizes(reader, header);
+  std::vector<char> compressed(sizes.compressed);
   reader.read(compressed.data(), compressed.size(), "compressed points");
-  std::vector<char> plain(plain_size);
+  std::vector<char> plain(sizes.plain);
   if (!decode_lzf(compressed, plain)) {
     reader.fail_here("expected a sound compressed block (LZF) before this byte");
   }
@@ -356,38 +348,21 @@ void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   }
 }
 
-void read_pcd(const std::filesystem::path& path, PointSink& sink) {
+std::uint64_t read_pcd(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   ByteReader reader(path);
   const PcdHeader header = parse_pcd_header(reader, sink);
-  switch (header.encoding) {
-    case PcdEncoding::kAscii:
-      read_ascii(reader, header, sink);
-      break;
-    case PcdEncoding::kBinary:
-      read_binary(reader, header, sink);
-      break;
-    case PcdEncoding::kCompressed:
+  if (header.encoding == PcdEncoding::kCompressed) {
+    if (with_points) {
       read_compressed(reader, header, sink);
-      break;
-  }
-}
-
-PointFileHeader read_pcd_header(const std::filesystem::path& path) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PcdHeader header = parse_pcd_header(reader, sink);
-  switch (header.encoding) {
-    case PcdEncoding::kAscii:
-      check_ascii(reader, header);
-      break;
-    case PcdEncoding::kBinary:
-      check_binary(reader, header);
-      break;
-    case PcdEncoding::kCompressed:
+    } else {
       read_block_sizes(reader, header);
-      break;
+    }
+    return header.points;
   }
-  return {sink.file().viewpoint, sink.columns(), header.points};
+  check_size(reader, header);
+  if (with_points && header.encoding == PcdEncoding::kAscii) read_ascii(reader, header, sink);
+  if (with_points && header.encoding == PcdEncoding::kBinary) read_binary(reader, header, sink);
+  return header.points;
 }
 
 }  // namespace dynains

@@ -191,30 +191,23 @@ std::uint64_t min_bytes(const Element& element, PlyEncoding encoding) {
   return bytes;
 }
 
-void check_count(const ByteReader& reader, const Element& element, PlyEncoding encoding) {
-  reader.check_room(element.count, "elements", min_bytes(element, encoding),
-                    encoding == PlyEncoding::kAscii);
-}
-
-/// Reads all elements; the sink gets the vertices.
-void read_elements(ByteReader& reader, const PlyHeader& header, PointSink& sink) {
-  const bool swap = header.encoding == PlyEncoding::kBigEndian;
+/// Reads all items of an element; the sink gets the vertices.
+void read_element(ByteReader& reader, const Element& element, PlyEncoding encoding,
+                  PointSink& sink) {
+  if (element.properties.empty()) return;
+  if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
+  const bool is_text = encoding == PlyEncoding::kAscii;
   std::string line;
-  for (const Element& element : header.elements) {
-    check_count(reader, element, header.encoding);
-    if (element.properties.empty()) continue;
-    if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
-    for (std::size_t i = 0; i < element.count; ++i) {
-      const auto store = [&](const Property& property, double value) {
-        if (sink.set(i, property.role, value)) return;
-        const std::string what = "expected a whole number that " + property.name + " can have";
-        header.encoding == PlyEncoding::kAscii ? reader.fail_on_line(what) : reader.fail_here(what);
-      };
-      if (header.encoding == PlyEncoding::kAscii) {
-        read_ascii_element(reader, element, line, store);
-      } else {
-        read_binary_element(reader, element, swap, store);
-      }
+  for (std::size_t i = 0; i < element.count; ++i) {
+    const auto store = [&](const Property& property, double value) {
+      if (sink.set(i, property.role, value)) return;
+      const std::string what = "expected a whole number that " + property.name + " can have";
+      is_text ? reader.fail_on_line(what) : reader.fail_here(what);
+    };
+    if (is_text) {
+      read_ascii_element(reader, element, line, store);
+    } else {
+      read_binary_element(reader, element, encoding == PlyEncoding::kBigEndian, store);
     }
   }
 }
@@ -249,18 +242,15 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   copy_records(reader, static_cast<std::size_t>(size), "a vertex", keep, target);
 }
 
-void read_ply(const std::filesystem::path& path, PointSink& sink) {
+std::uint64_t read_ply(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   ByteReader reader(path);
   const PlyHeader header = parse_ply_header(reader, sink);
-  read_elements(reader, header, sink);
-}
-
-PointFileHeader read_ply_header(const std::filesystem::path& path) {
-  ByteReader reader(path);
-  PointSink sink;
-  const PlyHeader header = parse_ply_header(reader, sink);
-  for (const Element& element : header.elements) check_count(reader, element, header.encoding);
-  return {sink.file().viewpoint, sink.columns(), header.elements.back().count};
+  for (const Element& element : header.elements) {
+    reader.check_room(element.count, "elements", min_bytes(element, header.encoding),
+                      header.encoding == PlyEncoding::kAscii);
+    if (with_points) read_element(reader, element, header.encoding, sink);
+  }
+  return header.elements.back().count;
 }
 
 }  // namespace dynains

@@ -28,14 +28,12 @@ bool is_pcd(const fs::path& path) {
 
 struct PointFileFormat {
   const char* extension;
-  void (*read)(const fs::path&, PointSink&);
-  PointFileHeader (*read_header)(const fs::path&);
+  std::uint64_t (*read)(const fs::path&, PointSink&, bool with_points);
 };
 
-constexpr PointFileFormat kPointFileFormats[] = {
-    {".ply", read_ply, read_ply_header}, {".pcd", read_pcd, read_pcd_header},
-    {".las", read_las, read_las_header}, {".npy", read_npy, read_npy_header},
-    {".xyz", read_xyz, read_xyz_header}, {".csv", read_xyz, read_xyz_header}};
+constexpr PointFileFormat kPointFileFormats[] = {{".ply", read_ply}, {".pcd", read_pcd},
+                                                 {".las", read_las}, {".npy", read_npy},
+                                                 {".xyz", read_xyz}, {".csv", read_xyz}};
 
 const PointFileFormat& format_to_read(const fs::path& path) {
   const std::string extension = extension_in_lower_case(path);
@@ -176,12 +174,14 @@ std::optional<std::string> conversion_of(const fs::path& path) {
 
 PointFile read_points(const fs::path& path) {
   PointSink sink;
-  format_to_read(path).read(path, sink);
+  format_to_read(path).read(path, sink, true);
   return std::move(sink.file());
 }
 
 PointFileHeader read_point_file_header(const fs::path& path) {
-  return format_to_read(path).read_header(path);
+  PointSink sink;
+  const std::uint64_t count = format_to_read(path).read(path, sink, false);
+  return {sink.file().viewpoint, sink.columns(), count};
 }
 
 }  // namespace dynains

@@ -29,6 +29,7 @@ constexpr Alias kAliases[] = {
     {"time", Role::kTime},
     {"t", Role::kTime},
     {"timestamp", Role::kTime},
+    {"time_stamp", Role::kTime},
     {"offset_time", Role::kTime},
     {"scalar_time", Role::kTime},
     {"label", Role::kLabel},

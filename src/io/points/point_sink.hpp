@@ -15,6 +15,9 @@ namespace dynains {
 /// Meaning of a column.
 enum class Role : std::uint8_t { kX, kY, kZ, kIntensity, kRing, kTime, kLabel, kNone };
 
+/// Meaning of the first columns without names.
+inline constexpr Role kUsualRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kIntensity};
+
 /// Meaning of a column with this name; case is ignored.
 Role role_of(std::string_view name);
 

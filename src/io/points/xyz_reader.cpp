@@ -64,12 +64,11 @@ class XyzColumns {
   }
 
   void take_default(std::size_t count) {
-    constexpr Role kRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kIntensity};
     if (count < 3) reader_.fail_on_line("expected at least 3 numbers: x y z");
     roles_.assign(count, Role::kNone);
-    for (std::size_t i = 0; i < count && i < std::size(kRoles); ++i) {
-      roles_[i] = kRoles[i];
-      sink_.claim(kRoles[i]);
+    for (std::size_t i = 0; i < count && i < std::size(kUsualRoles); ++i) {
+      roles_[i] = kUsualRoles[i];
+      sink_.claim(kUsualRoles[i]);
     }
   }
 
@@ -123,9 +122,10 @@ std::size_t count_points(const std::filesystem::path& path, PointSink& sink) {
 
 }  // namespace
 
-void read_xyz(const std::filesystem::path& path, PointSink& sink) {
+std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   PointSink counted;
-  const std::size_t count = count_points(path, counted);
+  const std::size_t count = count_points(path, with_points ? counted : sink);
+  if (!with_points) return count;
   ByteReader reader(path);
   XyzColumns columns(reader, sink);
   read_lines(reader, columns, [&](const std::vector<std::string_view>& tokens, std::size_t row) {
@@ -133,12 +133,7 @@ void read_xyz(const std::filesystem::path& path, PointSink& sink) {
     if (row >= count) reader.fail_on_line("expected no more points than before");
     columns.store(tokens, row);
   });
-}
-
-PointFileHeader read_xyz_header(const std::filesystem::path& path) {
-  PointSink sink;
-  const std::size_t count = count_points(path, sink);
-  return {Pose::Identity(), sink.columns(), count};
+  return count;
 }
 
 }  // namespace dynains
