@@ -27,7 +27,7 @@ class Candidates {
   /// all the time, and not a part of something that stands in both states.
   std::vector<CityPoint> objects() const {
     std::vector<CityPoint> result;
-    for_each_component(
+    ComponentSearch().for_each(
         points_.keys, points_.numbers, [&](const std::vector<std::uint32_t>& members) {
           if (!is_object(members)) return;
           for (const std::uint32_t block : members) {

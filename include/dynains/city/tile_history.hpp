@@ -215,18 +215,19 @@ class TileHistory {
       const std::uint32_t part = own.part_of[i];
       parts.values[parts.add(blocks_.keys[parts_[part].block])] = part;
     }
-    for_each_component(parts.keys, parts.numbers, [&](const std::vector<std::uint32_t>& members) {
-      const bool is_whole = is_compact(parts.keys, members);
-      VoxelHashTable<> cubes;
-      for (const std::uint32_t member : members) {
-        const auto cube = [&](int axis) {
-          return voxel_index(parts.keys[member], axis) >> kCubeBits;
-        };
-        const VoxelKey key = is_whole ? 0 : voxel_key(cube(0), cube(1), cube(2));
-        parts_[parts.values[member]].component = component_count_ + cubes.insert(key);
-      }
-      component_count_ += static_cast<std::uint32_t>(cubes.size());
-    });
+    ComponentSearch().for_each(
+        parts.keys, parts.numbers, [&](const std::vector<std::uint32_t>& members) {
+          const bool is_whole = is_compact(parts.keys, members);
+          VoxelHashTable<> cubes;
+          for (const std::uint32_t member : members) {
+            const auto cube = [&](int axis) {
+              return voxel_index(parts.keys[member], axis) >> kCubeBits;
+            };
+            const VoxelKey key = is_whole ? 0 : voxel_key(cube(0), cube(1), cube(2));
+            parts_[parts.values[member]].component = component_count_ + cubes.insert(key);
+          }
+          component_count_ += static_cast<std::uint32_t>(cubes.size());
+        });
   }
 
   bool is_compact(const std::vector<VoxelKey>& keys,

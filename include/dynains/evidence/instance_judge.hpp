@@ -12,6 +12,8 @@
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/verdict.hpp"
+#include "dynains/voxels/touching_voxels.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
 
@@ -22,60 +24,31 @@ class SupervoxelGroups {
   /// reorders the rest. `members`: supervoxels of one instance.
   void keep_large(const InstanceSamples& samples, std::size_t least_samples,
                   std::vector<std::uint32_t>& members) {
-    entries_.clear();
+    if (members.empty()) return;
+    places_.clear();
+    numbers_.clear();
     for (const std::uint32_t member : members) {
-      entries_.push_back({samples.place[member], member, false});
+      places_.push_back(samples.place[member]);
+      numbers_.insert(places_.back());
     }
-    std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
-      return a.place != b.place ? a.place < b.place : a.member < b.member;
-    });
-    members.clear();
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      if (entries_[i].visited) continue;
-      collect(i);
+    kept_.clear();
+    search_.for_each(places_, numbers_, [&](const std::vector<std::uint32_t>& group) {
       std::size_t count = 0;
-      for (const std::size_t entry : group_) {
-        const std::uint32_t s = entries_[entry].member;
-        count += samples.sample_begin[s + 1] - samples.sample_begin[s];
+      for (const std::uint32_t i : group) {
+        count += samples.sample_begin[members[i] + 1] - samples.sample_begin[members[i]];
       }
-      if (count < least_samples) continue;
-      for (const std::size_t entry : group_) members.push_back(entries_[entry].member);
-    }
+      for (const std::uint32_t i : group) {
+        if (count >= least_samples) kept_.push_back(members[i]);
+      }
+    });
+    members.swap(kept_);
   }
 
  private:
-  struct Entry {
-    VoxelKey place;
-    std::uint32_t member;
-    bool visited;
-  };
-
-  // Writes the group of one entry to group_.
-  void collect(std::size_t first) {
-    group_.assign(1, first);
-    entries_[first].visited = true;
-    for (std::size_t next = 0; next < group_.size(); ++next) {
-      const VoxelKey place = entries_[group_[next]].place;
-      for (int dx = -1; dx <= 1; ++dx) {
-        for (int dy = -1; dy <= 1; ++dy) {
-          // The three neighbours along z are consecutive in the order of keys.
-          const VoxelKey low = place + voxel_key_step(dx, dy, -1);
-          const VoxelKey high = place + voxel_key_step(dx, dy, 1);
-          auto at = std::lower_bound(
-              entries_.begin(), entries_.end(), low,
-              [](const Entry& entry, VoxelKey value) { return entry.place < value; });
-          for (; at != entries_.end() && at->place <= high; ++at) {
-            if (at->visited) continue;
-            at->visited = true;
-            group_.push_back(static_cast<std::size_t>(at - entries_.begin()));
-          }
-        }
-      }
-    }
-  }
-
-  std::vector<Entry> entries_;
-  std::vector<std::size_t> group_;
+  std::vector<VoxelKey> places_;
+  VoxelHashTable<> numbers_;
+  ComponentSearch search_;
+  std::vector<std::uint32_t> kept_;
 };
 
 /// Evidence on the instances of one scan.

@@ -229,24 +229,26 @@ class RecordingPlaces {
       }
       tiles_.free_far(tiles_.middle(index), 0.0);
     });
-    for_each_component(found.keys, found.numbers, [&](const std::vector<std::uint32_t>& members) {
-      tiles_.free_far(corner_of(found.keys[members.front()]), 0.0);
-      VoxelHashTable<> contacts;
-      for (const std::uint32_t member : members) {
-        for_each_touching(found.keys[member], [&](VoxelKey key) {
-          const Place* const place = found.find(key) == nullptr ? find(key) : nullptr;
-          if (place != nullptr && place->was_hit) contacts.insert(key);
+    ComponentSearch().for_each(
+        found.keys, found.numbers, [&](const std::vector<std::uint32_t>& members) {
+          tiles_.free_far(corner_of(found.keys[members.front()]), 0.0);
+          VoxelHashTable<> contacts;
+          for (const std::uint32_t member : members) {
+            for_each_touching(found.keys[member], [&](VoxelKey key) {
+              const Place* const place = found.find(key) == nullptr ? find(key) : nullptr;
+              if (place != nullptr && place->was_hit) contacts.insert(key);
+            });
+          }
+          const auto size = static_cast<double>(members.size());
+          if (members.size() < kFewest ||
+              static_cast<double>(contacts.size()) > kMostContact * size)
+            return;
+          for (const std::uint32_t member : members) {
+            const Place& place = found.values[member];
+            changed_.values[changed_.add(found.keys[member])] = {false, place.first.removed_last,
+                                                                 place.last_free};
+          }
         });
-      }
-      const auto size = static_cast<double>(members.size());
-      if (members.size() < kFewest || static_cast<double>(contacts.size()) > kMostContact * size)
-        return;
-      for (const std::uint32_t member : members) {
-        const Place& place = found.values[member];
-        changed_.values[changed_.add(found.keys[member])] = {false, place.first.removed_last,
-                                                             place.last_free};
-      }
-    });
     find_beside();
     tiles_.rest();
   }
