@@ -83,9 +83,6 @@ class BlockTable {
   Block& operator[](std::uint32_t block) { return blocks_[block]; }
   const Block& operator[](std::uint32_t block) const { return blocks_[block]; }
 
-  /// Number of a block, or kNone.
-  std::uint32_t find(const BlockIndex& index) const { return find(index, hash_of(index)); }
-
   /// Number of a block; adds a new block with `data`. Throws std::length_error beyond 2^32 - 2
   /// blocks, and std::bad_alloc.
   std::uint32_t find_or_add(const BlockIndex& index, const Data& data) {
@@ -109,6 +106,7 @@ class BlockTable {
     return bucket < buckets_.size() ? bucket : bucket - round_begin_;
   }
 
+  // Number of a block, or kNone.
   std::uint32_t find(const BlockIndex& index, std::uint32_t hash) const {
     if (buckets_.size() == 0) return kNone;
     std::uint32_t block = buckets_[bucket_of(hash)];
@@ -197,13 +195,14 @@ class StaticMapAccumulator {
   void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_sensor) {
     // Transforms to a corner next to the sensor, an exact multiple of all block edges, so that
     // single precision is sufficient.
-    const double step = voxel_ * kLongestBlock;
+    const double step = block_size(0);
     Pose T_corner_sensor = T_world_sensor;
     std::int32_t first_block[3];
     for (int axis = 0; axis < 3; ++axis) {
       const double corner = std::floor(T_world_sensor(axis, 3) / step);
       T_corner_sensor(axis, 3) -= corner * step;
-      first_block[axis] = static_cast<std::int32_t>(corner) * (kLongestBlock / kBlockVoxels[axis]);
+      first_block[axis] =
+          static_cast<std::int32_t>(corner) * (kBlockVoxels[0] / kBlockVoxels[axis]);
     }
     const detail::PackTransform to_corner(T_corner_sensor);
     const BlockIndex first = {first_block[0], first_block[1], first_block[2]};
@@ -236,49 +235,31 @@ class StaticMapAccumulator {
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t block = 0; block < blocks_.size(); ++block) visit_block(block, visit);
-  }
-
-  /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame) inside `box` (m, world frame,
-  /// borders included). The cost is proportional to the number of possible blocks in the box, or to
-  /// the number of blocks of the map if this is smaller.
-  template <class Visitor>
-  void for_each_in(const Eigen::AlignedBox3d& box, Visitor&& visit) const {
-    if (box.isEmpty()) return;
-    const auto inside = [&](const Eigen::Vector3d& point) {
-      if (box.contains(point)) visit(point);
-    };
-    const BlockRange range = blocks_of(box);
-    if (!(range.count < static_cast<double>(blocks_.size()))) {
-      for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
-        if (range.contains(blocks_[block].index)) visit_block(block, inside);
-      }
-      return;
-    }
-    for (std::int32_t x = range.first.x; x <= range.last.x; ++x) {
-      for (std::int32_t y = range.first.y; y <= range.last.y; ++y) {
-        for (std::int32_t z = range.first.z; z <= range.last.z; ++z) {
-          const std::uint32_t block = blocks_.find({x, y, z});
-          if (block != kNone) visit_block(block, inside);
-        }
+    for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
+      const BlockIndex& index = blocks_[block].index;
+      const Eigen::Vector3d corner(index.x * block_size(0), index.y * block_size(1),
+                                   index.z * block_size(2));
+      for (std::uint32_t i = blocks_[block].data.first; i != Blocks::kNone; i = points_[i].next) {
+        const Point& point = points_[i];
+        visit(Eigen::Vector3d(corner.x() + static_cast<double>(point.x),
+                              corner.y() + static_cast<double>(point.y),
+                              corner.z() + static_cast<double>(point.z)));
       }
     }
   }
 
  private:
   using BlockIndex = detail::BlockIndex;
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   static constexpr int kBlockVoxels[3] = {8, 4, 2};
-  static constexpr int kLongestBlock = 8;  // voxels
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
-    std::uint32_t next;  // next point of the block, or kNone
+    std::uint32_t next;  // next point of the block, or Blocks::kNone
   };
 
   struct BlockContent {
     std::uint64_t occupied;  // one bit per voxel
-    std::uint32_t first;     // first point of the block, or kNone
+    std::uint32_t first;     // first point of the block, or Blocks::kNone
   };
   using Blocks = detail::BlockTable<BlockContent>;
   using Block = Blocks::Block;  // never moves in memory
@@ -301,35 +282,6 @@ class StaticMapAccumulator {
 
   // Edge of a block along an axis, m.
   double block_size(int axis) const { return voxel_ * kBlockVoxels[axis]; }
-
-  // Box of blocks from `first` to `last`, both included; `count`: number of its blocks.
-  struct BlockRange {
-    BlockIndex first, last;
-    double count;
-
-    bool contains(const BlockIndex& index) const {
-      return index.x >= first.x && index.x <= last.x && index.y >= first.y && index.y <= last.y &&
-             index.z >= first.z && index.z <= last.z;
-    }
-  };
-
-  // The blocks that may contain points of a box (m, world frame).
-  BlockRange blocks_of(const Eigen::AlignedBox3d& box) const {
-    // Blocks have 32-bit indices; the indices of the box are clamped to this range.
-    constexpr double kFarthest = std::numeric_limits<std::int32_t>::max() - 1;
-    std::int32_t first[3], last[3];
-    double count = 1.0;
-    for (int axis = 0; axis < 3; ++axis) {
-      // Rounding to single precision can move a point slightly out of its block.
-      const double slack = 1e-3 * block_size(axis);
-      const double low = std::floor((box.min()(axis) - slack) / block_size(axis));
-      const double high = std::floor((box.max()(axis) + slack) / block_size(axis));
-      first[axis] = static_cast<std::int32_t>(std::max(-kFarthest, std::min(low, kFarthest)));
-      last[axis] = static_cast<std::int32_t>(std::max(-kFarthest, std::min(high, kFarthest)));
-      count *= static_cast<double>(last[axis]) - first[axis] + 1.0;
-    }
-    return {{first[0], first[1], first[2]}, {last[0], last[1], last[2]}, count};
-  }
 
   // Computes blocks and voxels of `count` points of the scan, from `begin` on. `to_corner`:
   // transform from the sensor frame to the corner of the block `corner`.
@@ -385,7 +337,7 @@ class StaticMapAccumulator {
       const BlockIndex index = {batch.block[0][i], batch.block[1][i], batch.block[2][i]};
       Block*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
       if (known == nullptr || !(known->index == index)) {
-        known = &blocks_[blocks_.find_or_add(index, {0, kNone})];
+        known = &blocks_[blocks_.find_or_add(index, {0, Blocks::kNone})];
       }
       BlockContent& block = known->data;
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i];
@@ -393,19 +345,6 @@ class StaticMapAccumulator {
       block.first =
           points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
       block.occupied |= bit;
-    }
-  }
-
-  template <class Visitor>
-  void visit_block(std::uint32_t block, Visitor&& visit) const {
-    const BlockIndex& index = blocks_[block].index;
-    const Eigen::Vector3d corner(index.x * block_size(0), index.y * block_size(1),
-                                 index.z * block_size(2));
-    for (std::uint32_t i = blocks_[block].data.first; i != kNone; i = points_[i].next) {
-      const Point& point = points_[i];
-      visit(Eigen::Vector3d(corner.x() + static_cast<double>(point.x),
-                            corner.y() + static_cast<double>(point.y),
-                            corner.z() + static_cast<double>(point.z)));
     }
   }
 
