@@ -146,13 +146,9 @@ class CloudView {
       size_ = PointCloudTraits<Cloud>::size(cloud);
       copy_ = &copy_from<Cloud>;
     }
-    if constexpr (std::is_same_v<Cloud, RawPoints<float>>) raw_ = &cloud;
   }
 
   std::size_t size() const { return size_; }
-  /// The cloud if it is of type RawPoints<float>, else null.
-  const RawPoints<float>* raw_floats() const { return raw_; }
-
   /// Writes the coordinates of points [begin, begin + count), m, sensor frame.
   void copy(std::size_t begin, std::size_t count, float* x, float* y, float* z) const {
     copy_(cloud_, begin, count, x, y, z);
@@ -174,7 +170,6 @@ class CloudView {
   const void* cloud_;
   std::size_t size_ = 0;
   void (*copy_)(const void*, std::size_t, std::size_t, float*, float*, float*) = nullptr;
-  const RawPoints<float>* raw_ = nullptr;
 };
 
 }  // namespace dynains::detail

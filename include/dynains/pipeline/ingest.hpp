@@ -41,7 +41,8 @@ class Ingest {
     count_ = 0;
     for (std::size_t begin = 0; begin < count; begin += kChunk) {
       const std::size_t length = std::min(kChunk, count - begin);
-      copy(cloud, begin, length);
+      cloud.copy(begin, length, points_.x.data() + count_, points_.y.data() + count_,
+                 points_.z.data() + count_);
       if (!region.origin.isZero(0.0F)) subtract(region.origin, length);
       const std::size_t valid_count = filter(begin, length, region.min_range * region.min_range,
                                              region.max_range * region.max_range, unjudged);
@@ -64,31 +65,6 @@ class Ingest {
  private:
   // Points per step: fits the L1 cache.
   static constexpr std::size_t kChunk = 128;
-
-  // Appends points, valid or not, behind the valid ones.
-  void copy(const CloudView& cloud, std::size_t begin, std::size_t length) {
-    if (cloud.raw_floats() != nullptr) {
-      copy(*cloud.raw_floats(), begin, length);
-    } else {
-      cloud.copy(begin, length, points_.x.data() + count_, points_.y.data() + count_,
-                 points_.z.data() + count_);
-    }
-  }
-
-  // Prefetching helps because the input is usually not in the cache.
-  void copy(const RawPoints<float>& cloud, std::size_t begin, std::size_t length) {
-    constexpr std::size_t kAhead = 128;  // points
-    float* const x = points_.x.data() + count_;
-    float* const y = points_.y.data() + count_;
-    float* const z = points_.z.data() + count_;
-    for (std::size_t i = 0; i < length; ++i) {
-      const float* const point = cloud.data + (begin + i) * cloud.stride;
-      __builtin_prefetch(cloud.data + std::min(begin + i + kAhead, cloud.count - 1) * cloud.stride);
-      x[i] = point[0];
-      y[i] = point[1];
-      z[i] = point[2];
-    }
-  }
 
   // Moves the appended points, except beams without a return, which stay at the origin.
   void subtract(const Eigen::Vector3f& origin, std::size_t length) {
