@@ -17,6 +17,7 @@
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 
@@ -135,39 +136,25 @@ class MountingEstimator {
   }
 
   // Mean of the points in each occupied cell, in random order, so that any subrange is a random
-  // sample. Empty if there are fewer points than kFewestCells.
+  // sample.
   static std::vector<Eigen::Vector3d> thin(PointsView points) {
-    std::size_t near = 0;
-    for (std::size_t i = 0; i < points.size() && near < kFewestCells; ++i) {
-      if (is_near(points, i)) ++near;
-    }
-    if (near < kFewestCells) return {};
-    constexpr auto kHalf = static_cast<std::int32_t>(kMaxDistance / kCell);
-    constexpr std::size_t kWidth = 2 * static_cast<std::size_t>(kHalf);
     struct Sum {
-      std::size_t cell;
+      VoxelKey cell;
       double x, y, z;
       double count;
     };
-    std::vector<std::uint32_t> number(kWidth * kWidth * kWidth, 0);  // by cell; from 1
+    VoxelHashTable<> number;  // by cell
     std::vector<Sum> sums;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!is_near(points, i)) continue;
-      const float p[3] = {points.x[i], points.y[i], points.z[i]};
-      std::size_t at = 0;
-      for (const float coordinate : p) {
-        const auto index = floor_to<std::int32_t>(coordinate / static_cast<float>(kCell));
-        at = at * kWidth + static_cast<std::size_t>(index + kHalf);
-      }
-      if (number[at] == 0) {
-        sums.push_back({at, 0.0, 0.0, 0.0, 0.0});
-        number[at] = static_cast<std::uint32_t>(sums.size());
-      }
-      Sum& sum = sums[number[at] - 1];
-      sum.x += static_cast<double>(p[0]);
-      sum.y += static_cast<double>(p[1]);
-      sum.z += static_cast<double>(p[2]);
-      sum.count += 1.0;
+      const double p[3] = {points.x[i], points.y[i], points.z[i]};
+      const VoxelKey cell = voxel_at(p, kCell);
+      const std::uint32_t at = number.insert(cell);
+      if (at == sums.size()) sums.push_back({cell, 0.0, 0.0, 0.0, 0.0});
+      sums[at].x += p[0];
+      sums[at].y += p[1];
+      sums[at].z += p[2];
+      sums[at].count += 1.0;
     }
     // Makes the result independent of the order of the points.
     std::sort(sums.begin(), sums.end(), [](const Sum& a, const Sum& b) { return a.cell < b.cell; });
