@@ -63,9 +63,9 @@ Int pack_indices() {
   return Int::load(kIndices);
 }
 
-/// Bit i is set if values[i] differs from values[i - 1] in any of the arrays, i < `count` <= 64.
-/// values[-1] must exist.
-template <class Packs, class... Values>
+/// Bit i is set if values[i] differs from values[i - 1] in any of the arrays, apart from the lower
+/// `kIgnored` bits, i < `count` <= 64. values[-1] must exist.
+template <class Packs, int kIgnored = 0, class... Values>
 std::uint64_t find_changes(std::size_t count, const Values*... values) {
   using Int = typename Packs::Int;
   std::uint64_t changes = 0;
@@ -74,11 +74,11 @@ std::uint64_t find_changes(std::size_t count, const Values*... values) {
     const auto load = [i](const auto* from) {
       return Int::load(reinterpret_cast<const std::int32_t*>(from + i));
     };
-    const auto equal = ((load(values) == load(values - 1)) & ...);
+    const auto equal = ((((load(values) ^ load(values - 1)) >> kIgnored) == Int(0)) & ...);
     changes |= std::uint64_t{(~equal).bits()} << i;
   }
   for (; i < count; ++i) {
-    changes |= std::uint64_t{((*(values + i) != *(values + i - 1)) || ...)} << i;
+    changes |= std::uint64_t{(((values[i] ^ *(values + i - 1)) >> kIgnored != 0) || ...)} << i;
   }
   return changes;
 }

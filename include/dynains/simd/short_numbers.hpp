@@ -68,27 +68,9 @@ class ShortNumbers {
     if (count > 0) begin_run(0);
     for (std::size_t begin = 1; begin < count; begin += kWordBits) {
       const std::size_t size = std::min(kWordBits, count - begin);
-      const std::uint64_t begins = find_begins<Packs>(from + begin, size);
+      const std::uint64_t begins = find_changes<Packs, kHalf>(size, from + begin);
       for_each_bit(begins, [&](std::size_t i) { begin_run(begin + i); });
     }
-  }
-
-  // Bit i is set if number i of at most kWordBits begins a run. The number before the first must
-  // exist.
-  template <class Packs>
-  static std::uint64_t find_begins(const std::uint32_t* numbers, std::size_t count) {
-    using Int = typename Packs::Int;
-    std::uint64_t same = 0;
-    std::size_t i = 0;
-    for (; i + Packs::kCount <= count; i += Packs::kCount) {
-      const auto* const from = reinterpret_cast<const std::int32_t*>(numbers + i);
-      const Int changed = (Int::load(from) ^ Int::load(from - 1)) >> kHalf;
-      same |= std::uint64_t{(changed == Int(0)).bits()} << i;
-    }
-    for (; i < count; ++i) {
-      same |= std::uint64_t{(numbers[i] ^ *(numbers + i - 1)) >> kHalf == 0} << i;
-    }
-    return ~same & ~std::uint64_t{0} >> (kWordBits - count);
   }
 
   std::vector<std::uint16_t> lower_;
