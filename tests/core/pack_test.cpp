@@ -74,7 +74,7 @@ std::vector<std::vector<std::uint32_t>> results(const std::vector<float>& a,
     const Float small = max(min(x, limit), lower);
     put_int(truncate(small));
     put_int(floor(small));
-    put_int(keep(x < y, truncate(small)));
+    put_int((x < y) & truncate(small));
     put(detail::with_sign_of(y, x));
     put_int((truncate(small) << 3) + (truncate(small) >> 2) - (truncate(small) & Int(77)));
     put_int(multiply(truncate(small), 1234567));

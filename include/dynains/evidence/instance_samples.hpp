@@ -157,9 +157,9 @@ class InstanceSampler {
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       rank.store(&rank_[at.begin]);
-      const Int xy = keep(is_sampled, (floor(px * per_metre) << kHalf) +
-                                          (floor(py * per_metre) & Int((1 << kHalf) - 1)));
-      const Int z = keep(is_sampled, floor(pz * per_metre));
+      const Int xy = is_sampled & ((floor(px * per_metre) << kHalf) +
+                                   (floor(py * per_metre) & Int((1 << kHalf) - 1)));
+      const Int z = is_sampled & floor(pz * per_metre);
       const Int kept_instance = select(is_sampled, instance, Int(-1));
       xy.store(&xy_[at.begin]);
       z.store(&z_[at.begin]);

@@ -115,8 +115,8 @@ struct ImageLocator {
     const typename Packs::Mask inside = (row >= kZero) & (row < rows);
     // Exact in single precision, since images have fewer than 2^24 cells.
     const Float first = to_float(truncate(keep(inside, row))) * stride;
-    return keep(inside, truncate(first + kBorder) +
-                            truncate(max(min(column, Float(last_column)), Float(kZero))));
+    return inside & (truncate(first + kBorder) +
+                     truncate(max(min(column, Float(last_column)), Float(kZero))));
   }
 
   detail::PackConstant lowest, rows_per_level, rows, stride, columns_per_radian, last_column;

@@ -90,26 +90,6 @@ template <class T, int kWidth>
 void broadcast(T number, Register<T, kWidth>& to) {
   to.v = number - typename Register<T, kWidth>::Vector{};  // -0 + 0 would be 0
 }
-template <class T, int kWidth>
-void multiply(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
-              Register<T, kWidth>& result) {
-  result.v = a.v * b.v;
-}
-template <class T, int kWidth>
-void compare_less(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
-                  Register<MaskNumber<T>, kWidth>& result) {
-  result.v = a.v < b.v;
-}
-template <class T, int kWidth>
-void compare_at_most(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
-                     Register<MaskNumber<T>, kWidth>& result) {
-  result.v = a.v <= b.v;
-}
-template <class T, int kWidth>
-void compare_equal(const Register<T, kWidth>& a, const Register<T, kWidth>& b,
-                   Register<MaskNumber<T>, kWidth>& result) {
-  result.v = a.v == b.v;
-}
 /// `a` where the mask is set, else `b`.
 template <class T, int kWidth>
 void choose(const Register<MaskNumber<T>, kWidth>& mask, const Register<T, kWidth>& a,
@@ -251,7 +231,7 @@ struct Pack {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { r.v = x.v - y.v; }, a, b);
   }
   friend Pack operator*(const Pack& a, const Pack& b) {
-    return by_parts<Pack>([](auto& r, auto& x, auto& y) { multiply(x, y, r); }, a, b);
+    return by_parts<Pack>([](auto& r, auto& x, auto& y) { r.v = x.v * y.v; }, a, b);
   }
   friend Pack operator/(const Pack& a, const Pack& b) {
     return by_parts<Pack>([](auto& r, auto& x, auto& y) { r.v = x.v / y.v; }, a, b);
@@ -279,13 +259,13 @@ struct Pack {
   }
 
   friend Mask operator<(const Pack& a, const Pack& b) {
-    return by_parts<Mask>([](auto& r, auto& x, auto& y) { compare_less(x, y, r); }, a, b);
+    return by_parts<Mask>([](auto& r, auto& x, auto& y) { r.v = x.v < y.v; }, a, b);
   }
   friend Mask operator<=(const Pack& a, const Pack& b) {
-    return by_parts<Mask>([](auto& r, auto& x, auto& y) { compare_at_most(x, y, r); }, a, b);
+    return by_parts<Mask>([](auto& r, auto& x, auto& y) { r.v = x.v <= y.v; }, a, b);
   }
   friend Mask operator==(const Pack& a, const Pack& b) {
-    return by_parts<Mask>([](auto& r, auto& x, auto& y) { compare_equal(x, y, r); }, a, b);
+    return by_parts<Mask>([](auto& r, auto& x, auto& y) { r.v = x.v == y.v; }, a, b);
   }
   friend Mask operator>(const Pack& a, const Pack& b) { return b < a; }
   friend Mask operator>=(const Pack& a, const Pack& b) { return b <= a; }
@@ -379,10 +359,6 @@ FloatPack<W, P> float_of(const IntPack<W, P>& a) {
 template <int W, int P>
 FloatPack<W, P> keep(const IntPack<W, P>& mask, const FloatPack<W, P>& a) {
   return float_of(mask & bits_of(a));
-}
-template <int W, int P>
-IntPack<W, P> keep(const IntPack<W, P>& mask, const IntPack<W, P>& a) {
-  return mask & a;
 }
 
 template <int W, int P>
