@@ -240,12 +240,6 @@ inline Pose moved(const Pose& T, const PoseStep& step) {
   return result;
 }
 
-/// Movement (m) of a point kLever away by a step.
-inline double movement(const PoseStep& step) {
-  return std::hypot(std::hypot(step[0], step[1], step[2]),
-                    kLever * std::hypot(step[3], step[4], step[5]));
-}
-
 /// Result of an alignment.
 struct Alignment {
   PoseStep found = {};      ///< step from the first estimate to the best fit
