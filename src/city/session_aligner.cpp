@@ -16,11 +16,8 @@ namespace dynains {
 namespace {
 
 constexpr double kReach = 40.0;     // m, points of a scan that count
-constexpr double kNearest = 2.0;    // m
-constexpr double kThinned = 0.4;    // m, edge of the voxels that keep one point of the session
 constexpr std::size_t kNewest = 3;  // sessions in a tile that count
 constexpr double kInlier = 0.15;    // m
-constexpr double kDegree = M_PI / 180.0;
 
 std::string rounded(double value, int digits) {
   const double scale = std::pow(10.0, digits);
@@ -38,7 +35,7 @@ std::vector<Pose> guesses() {
     for (const double x : {0.0, -1.3, 1.3}) {
       for (const double y : {0.0, -1.3, 1.3}) {
         for (const double z : {0.0, -0.7, 0.7}) {
-          Pose T(Eigen::AngleAxisd(yaw * kDegree, Eigen::Vector3d::UnitZ()));
+          Pose T(Eigen::AngleAxisd(yaw * detail::kRadians, Eigen::Vector3d::UnitZ()));
           T.translation() = Eigen::Vector3d(x, y, z);
           result.push_back(T);
         }
@@ -112,8 +109,6 @@ Fit fitted(const RegistrationScan& map, const RegistrationScan& session, const P
 
 /// The best fit from all guesses.
 Fit best_fit(const RegistrationScan& map, const RegistrationScan& session) {
-  constexpr double kDistinct = 0.5;  // m
-  constexpr double kAlmost = 0.9;    // ratio of scores
   std::vector<Fit> fits;
   for (const Pose& guess : guesses()) fits.push_back(fitted(map, session, guess));
   Fit best = *std::max_element(fits.begin(), fits.end(),
@@ -149,7 +144,7 @@ void check_fit(const City& city, const Fit& fit) {
   }
   if (fit.is_ambiguous) refuse(city, "it fits nearly as well at another place");
   const double way = fit.T.translation().norm();
-  const double angle = angle_of(fit.T.linear()) / kDegree;
+  const double angle = angle_of(fit.T.linear()) / detail::kRadians;
   if (way > kSlack * SessionAligner::kMostTranslation ||
       angle > kSlack * SessionAligner::kMostRotation) {
     refuse(city, "the best fit is " + rounded(way, 2) + " m and " + rounded(angle, 2) +
@@ -165,7 +160,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
     const Eigen::Vector3d local(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                                 static_cast<double>(points.z[i]));
     const double range = local.norm();
-    if (!(range > kNearest && range < kReach)) continue;
+    if (!(range > kNearestPoint && range < kReach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
     if (adds(taken_, voxel_at(point - sensors_.front(), kThinned))) points_.push_back(point);
   }

@@ -68,8 +68,7 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kFewest = 6.0;   // points
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
-  constexpr double kSteep = 0.8;    // z of a pole
-  constexpr double kUpright = 0.5;  // most z of the normal of an upright plane
+  constexpr double kUpright = 0.5;  // most sine of the tilt of what is upright
   CellSurface surface;
   if (cell.count < kFewest) return surface;
   const Eigen::Vector3d mean = cell.sum / cell.count;
@@ -81,7 +80,7 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   surface.directions = {axes.col(0), axes.col(1)};
   if (extent[1] < kNarrow * extent[2]) {
     // Rings of a sensor lie along lines on the ground that move with the sensor.
-    if (std::abs(axes(2, 2)) < kSteep) return surface;
+    if (std::hypot(axes(0, 2), axes(1, 2)) > kUpright) return surface;
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {

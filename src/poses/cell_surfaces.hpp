@@ -121,7 +121,6 @@ class NormalEquations {
       J << n, arm.cross(n) / kLever;
       add(J, n.dot(point - surface.mean), weight);
     }
-    ++count_;
     return weight;
   }
   /// Adds a point that is `distance` (m) from its place, with the derivative of this distance.
@@ -129,8 +128,6 @@ class NormalEquations {
     for (Eigen::Index i = 0; i < 6; ++i) hessian_.col(i) += (weight * jacobian[i]) * jacobian;
     gradient_ += (weight * distance) * jacobian;
   }
-
-  std::size_t count() const { return count_; }  ///< points
 
   struct Solution {
     Vector6 step = Vector6::Zero();  ///< 0 along directions that too little determines
@@ -143,7 +140,6 @@ class NormalEquations {
  private:
   Matrix6 hessian_ = Matrix6::Zero();
   Vector6 gradient_ = Vector6::Zero();
-  std::size_t count_ = 0;
   double least_;
 };
 

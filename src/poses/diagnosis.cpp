@@ -29,8 +29,8 @@ constexpr std::size_t kFewestPairs = 3;       // of neighbours, for a statement 
 constexpr std::size_t kPairs = 8;             // of a sample
 constexpr double kExact = 0.03;  // m at points 10 m away; registrations are worse rarely
 constexpr double kRough = 0.4;   // m at points 10 m away; more is not inexact but wrong
-constexpr double kInexactTranslation = 0.05;  // m, from one scan to the next
-constexpr double kInexactRotation = 0.0045;   // rad
+constexpr double kInexact =
+    0.05;  // m, from one scan to the next, of places and at points 10 m away
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// Whether the gap of `a` is clearly smaller than that of `b`.
@@ -196,18 +196,15 @@ struct SampledPairs {
 /// Pairs of neighbours if these do not agree without motion, or if the sensor moves or turns so
 /// fast that scans farther apart see other places. Else the stride increases until pairs do not
 /// agree: scans farther apart show more of the motion of a slow sensor.
-SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double step,
-                          double turn) {
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double extent) {
   constexpr std::size_t kStride = 5;       // scans
-  constexpr double kFast = 2.0;            // m from scan to scan
-  constexpr double kTurning = 0.1;         // rad from scan to scan
+  constexpr double kFast = 2.0;            // m from scan to scan, at points 10 m away
   constexpr double kFastAgreement = 0.35;  // of neighbours
   const std::size_t scans = recording.size();
   if (scans < 2) return {};
   SampledPairs result{sample.pairs(0, scans - 1, 1, kPairs), 1, {}};
   result.neighbours = agreement_under(no_motion, result.pairs);
-  if (step > kFast || turn > kTurning || scans < 2 * kStride ||
-      result.neighbours.share < kFastAgreement) {
+  if (extent > kFast || scans < 2 * kStride || result.neighbours.share < kFastAgreement) {
     return result;
   }
   for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
@@ -217,20 +214,20 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double
   return result;
 }
 
-/// Sets the members of `d` that describe the motion. Returns the median turn from scan to scan,
-/// rad.
+/// Sets the members of `d` that describe the motion. Returns its median extent from scan to scan,
+/// m.
 double describe_motion(const Recording& recording, Diagnosis& d) {
-  std::vector<double> periods, steps, turns;
+  std::vector<double> periods, steps, extents;
   for (std::size_t i = 1; i < recording.size(); ++i) {
     const Pose T = motion_between(recording, i - 1, i);
     periods.push_back(recording.time(i) - recording.time(i - 1));
     steps.push_back(T.translation().norm());
-    turns.push_back(angle_of(T.linear()));
+    extents.push_back(extent_of(T));
   }
   if (!steps.empty()) d.longest_step = *std::max_element(steps.begin(), steps.end());
   d.period = median(std::move(periods));
   d.step = median(std::move(steps));
-  return median(std::move(turns));
+  return median(std::move(extents));
 }
 
 /// Largest distance of which all coordinates of an axis are multiples, m; 0 if they are finer than
@@ -287,15 +284,14 @@ PoseFlaws flaws_of(const Recording& recording) {
 /// Whether poses and scans do not move alike at a fourth of the pairs between which one of them
 /// moves, as with poses that stand, those of another recording, or points of the world.
 bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion& given) {
-  constexpr double kMoving = 0.3;  // m at points 10 m away
-  constexpr double kMost = 0.7;    // ratio
+  constexpr double kMost = 0.7;  // ratio
   std::size_t moving = 0, missed = 0;
   for (const RegisteredMotion& motion : motions) {
     const auto T = given(motion);
     if (!T) continue;
     const double by_poses = extent_of(*T);
     const double by_scans = extent_of(motion.T_first_second);
-    if (!(std::max(by_poses, by_scans) > kMoving)) continue;
+    if (!(std::max(by_poses, by_scans) > kAgreeing)) continue;
     ++moving;
     missed += error_at_points({motion}, given) > kMost * std::min(by_poses, by_scans) ? 1 : 0;
   }
@@ -398,8 +394,8 @@ void propose(const Reading& reading, Diagnosis& d) {
 /// that of the next scan by as much to the other side.
 bool is_inexact(const Recording& recording, const MotionError& steps) {
   constexpr double kUneven = 0.25;
-  double translation = std::max(kInexactTranslation, 3.0 * steps.translation_noise);
-  double rotation = std::max(kInexactRotation, 3.0 * steps.rotation_noise);
+  double translation = std::max(kInexact, 3.0 * steps.translation_noise);
+  double rotation = std::max(kInexact / kLever, 3.0 * steps.rotation_noise);
   if (recording.is_deskewed()) {
     std::vector<double> translations, rotations;
     for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
@@ -472,8 +468,8 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
   } else if (d.verdict == PoseVerdict::kDisagree || is_inexact(recording, steps)) {
     d.verdict = PoseVerdict::kInexact;
   }
-  const bool is_uncertain = d.translation_error > kInexactTranslation ||
-                            d.rotation_error > kInexactRotation;  // as their noise is large, too
+  const bool is_uncertain = d.translation_error > kInexact ||
+                            kLever * d.rotation_error > kInexact;  // as their noise is large, too
   if (d.verdict != PoseVerdict::kInexact && d.verdict != PoseVerdict::kDisagree && is_uncertain) {
     d.registered_pairs = 0;
   }
@@ -486,9 +482,9 @@ Diagnosis diagnose_as_opened(const Recording& recording) {
   d.pose_rows = recording.pose_count();
   d.scans = recording.size();
   d.proposal = recording.options();
-  const double turn = describe_motion(recording, d);
+  const double extent = describe_motion(recording, d);
   ScanSample sample(recording);
-  const SampledPairs sampled = sample_pairs(recording, sample, d.step, turn);
+  const SampledPairs sampled = sample_pairs(recording, sample, extent);
   if (recording.size() == 1) sample.read({0});
   sample.describe(d);
   d.stride = sampled.stride;

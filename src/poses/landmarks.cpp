@@ -88,7 +88,6 @@ double Landmarks::distance_to(const Eigen::Vector3d& p) const {
 
 Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
                              std::size_t most) const {
-  constexpr double kAgreeing = 0.3;  // m
   if (size() == 0 || other.size() == 0) return {};
   const std::size_t step = std::max<std::size_t>(1, other.size() / most);
   std::size_t close = 0;

@@ -17,6 +17,8 @@ namespace dynains {
 
 /// Fewer landmarks of a scan tell nothing of its motion.
 inline constexpr std::size_t kFewestLandmarks = 60;
+/// Nearer points (m) of two scans agree.
+inline constexpr double kAgreeing = 0.3;
 
 /// Points of one scan: above the ground, 2 m to `farthest` from the sensor, one per voxel of 0.25
 /// m, sorted by voxel. The first search builds a tree; only after it may threads search at once.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
 #include "io/points/finite_points.hpp"
 
@@ -30,14 +31,13 @@ Eigen::Vector3d middle_in_file(const Recording& recording, std::size_t i) {
 /// How much the elevations of points, seen from `origin` (m), gather, as those of the beams of a
 /// spinning sensor do: about 1 for a smooth distribution.
 double sharpness(const PointBuffer& points, const Eigen::Vector3d& origin) {
-  constexpr double kNearest = 3.0;       // m; nearer points belong to the vehicle, or are noise
   constexpr double kBinsPerRad = 570.0;  // ten a degree
   constexpr std::size_t kWindow = 40;    // bins over which a smooth distribution hardly changes
   std::vector<double> counts(static_cast<std::size_t>(kBinsPerRad * M_PI) + 2);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p =
         Eigen::Vector3f(points.x[i], points.y[i], points.z[i]).cast<double>() - origin;
-    if (!(p.norm() > kNearest)) continue;
+    if (!(p.norm() > kNearestPoint)) continue;
     const double elevation = std::asin(std::clamp(p.z() / p.norm(), -1.0, 1.0));
     counts[static_cast<std::size_t>(kBinsPerRad * (elevation + M_PI / 2))] += 1.0;
   }

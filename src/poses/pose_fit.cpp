@@ -31,7 +31,8 @@ class ChainScan {
   Landmarks landmarks_;
 };
 
-constexpr double kFarthestStep = 6.0;  // m, from one scan to the next
+constexpr double kFarthestStep = 6.0;       // m, from one scan to the next
+constexpr double kFarthestFromGuess = 1.5;  // m
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
 /// and the motion at another place.
@@ -51,10 +52,10 @@ std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& el
   return guesses;
 }
 
-/// `uncertain`: m, uncertainty of the translation.
-bool is_certain(const std::optional<Registration>& registration, double uncertain) {
+bool is_certain(const std::optional<Registration>& registration) {
+  constexpr double kUncertain = 0.08;  // m
   return registration && registration->score > kLeastScore &&
-         registration->uncertainty < uncertain && !registration->is_ambiguous;
+         registration->uncertainty < kUncertain && !registration->is_ambiguous;
 }
 
 /// Residual of a motion: translation, and rotation times kLever, m.
@@ -74,10 +75,9 @@ struct CheckedMotion {
 };
 
 std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
-                                     const std::optional<Registration>& back, double uncertain,
-                                     double deviation) {
+                                     const std::optional<Registration>& back, double deviation) {
   constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
-  if (!is_certain(forth, uncertain) || !is_certain(back, uncertain)) return std::nullopt;
+  if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
   const Vector6 difference = residual(forth->T_a_b, back->T_a_b.inverse(), Pose::Identity());
   if (difference.norm() > kNoisy) return std::nullopt;
   return CheckedMotion{forth->T_a_b, difference, deviation};
@@ -98,7 +98,7 @@ std::optional<GuidedRegistration> register_along(const ChainScan& a, const Chain
   constexpr double kDeviation = 0.04;  // m, of search_way()
   const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
   if (!guess) return std::nullopt;
-  const KnownTranslation way{direction, kDeviation};
+  const KnownTranslation way{direction, direction.dot(guess->translation()), kDeviation};
   const auto found = register_near(a.surfaces(), b.points(), *guess, way);
   if (!found) return std::nullopt;
   return GuidedRegistration{*found, way};
@@ -111,9 +111,6 @@ std::optional<GuidedRegistration> register_along(const ChainScan& a, const Chain
 std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
                                       const Registration& by_planes, const Pose& given,
                                       double farthest) {
-  constexpr double kUncertain = 0.08;  // m; a narrow view tells less of other directions, too
-  constexpr double kNear = 1.0;        // m
-  constexpr double kDistant = 0.5;     // m
   std::optional<GuidedRegistration> best;
   double least_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
@@ -121,7 +118,7 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
     if (!found) continue;
     // The planes that meet at the found pose determine the open direction better.
     if (const auto again = register_along(a, b, found->registration.T_a_b,
-                                          found->registration.uncertain[0], kNear)) {
+                                          found->registration.uncertain[0], kFarthestFromGuess)) {
       found = again;
     }
     const double gap = mean_gap(a.landmarks(), b.landmarks(), found->registration.T_a_b);
@@ -134,12 +131,13 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
   }
   if (!best) return std::nullopt;
   const Pose& found = best->registration.T_a_b;
-  const bool is_distant = (found.translation() - given.translation()).norm() > kDistant;
+  const bool is_distant = (found.translation() - given.translation()).norm() > kDistinct;
   if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < least_gap) return std::nullopt;
   const Pose T_b_a = best->registration.T_a_b.inverse();
-  const KnownTranslation way{T_b_a.linear() * best->way.direction, best->way.deviation};
+  const Eigen::Vector3d direction = T_b_a.linear() * best->way.direction;
+  const KnownTranslation way{direction, direction.dot(T_b_a.translation()), best->way.deviation};
   return checked(best->registration, register_near(b.surfaces(), a.points(), T_b_a, way),
-                 kUncertain, best->way.deviation);
+                 best->way.deviation);
 }
 
 /// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the
@@ -148,16 +146,15 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
 std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainScan& b,
                                                 const Pose& given, const std::vector<Pose>& guesses,
                                                 double farthest) {
-  constexpr double kOpen = 0.025;      // m, uncertainty of a direction that planes leave open
-  constexpr double kUncertain = 0.06;  // m
-  constexpr double kWorse = 1.02;      // ratio of gaps
+  constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
+  constexpr double kWorse = 1.02;  // ratio of gaps
   const auto forth = register_scans(a.surfaces(), b.points(), guesses);
   if (!forth) return std::nullopt;
   const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
   const auto found =
-      is_open ? complete(a, b, *forth, given, farthest)
-              : checked(forth, register_scans(b.surfaces(), a.points(), {forth->T_a_b.inverse()}),
-                        kUncertain, 0.0);
+      is_open
+          ? complete(a, b, *forth, given, farthest)
+          : checked(forth, register_scans(b.surfaces(), a.points(), {forth->T_a_b.inverse()}), 0.0);
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
   return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
 }
@@ -257,14 +254,11 @@ class Chain {
 
   /// Registers scans ever farther away, from the motion found before.
   void finish() {
-    constexpr std::size_t kLongest = 9;         // scans
-    constexpr double kFar = 3.0;                // m
-    constexpr double kFarthestFromGuess = 1.5;  // m
-    constexpr double kTurned = 0.25;            // rad
+    constexpr std::size_t kLongest = 9;  // scans
+    constexpr double kFar = 3.0;         // m, at points kLever away
     for (std::size_t step = 3; step <= kLongest && !motions_.empty(); step *= 3) {
       const Pose T = motions_.back().T_first_second;
-      const bool is_far = T.translation().norm() > kFar || angle_of(T.linear()) > kTurned;
-      if (is_far || first_ + step >= recording_->size()) break;
+      if (extent_of(T) > kFar || first_ + step >= recording_->size()) break;
       const Pose guess = T * T * T;
       if (!add(step, {guess}, kFarthestFromGuess)) break;
       const Pose& found = motions_.back().T_first_second;
@@ -380,7 +374,6 @@ double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyM
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
                                   const BodyMotion& body) {
   constexpr std::size_t kFewest = 4;
-  constexpr double kClearly = 0.9;  // ratio of costs
   std::vector<BothMotions> motions;
   for (const RegisteredMotion& motion : registered) {
     const auto T_body = body(motion);
@@ -395,7 +388,7 @@ std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registere
     T_body_sensor = refine(motions, T_body_sensor);
     const double cost = robust_cost(motions, T_body_sensor);
     // The rotations are sorted by their angle: the first of equal results stays.
-    if (best && !(cost < kClearly * least)) continue;
+    if (best && !(cost < kAlmost * least)) continue;
     best = T_body_sensor;
     least = cost;
   }

@@ -54,23 +54,19 @@ std::optional<Reading> fit_scale(const Recording& recording, const Motions& moti
 /// of the range.
 std::optional<Reading> fit_offset(const Recording& recording, const Motions& motions) {
   constexpr double kFarthest = 0.6;  // s
-  constexpr double kCoarseOffset = 0.02;
-  constexpr double kFineOffset = 0.005;
+  constexpr double kStep = 0.005;    // s
   Reading result = given_reading(recording);
   double best = 0.0;
   double least = error_at_points(motions, motion_under(recording, result));
-  const auto look = [&](double from, double to, double step) {
-    for (double offset = from; offset < to + 0.5 * step; offset += step) {
-      result.time_offset = recording.time_offset() + offset;
-      const MotionError error = motion_error(motions, motion_under(recording, result));
-      if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
-      least = error.at_points;
-      best = offset;
-    }
-  };
-  look(-kFarthest, kFarthest, kCoarseOffset);
-  look(best - kCoarseOffset, best + kCoarseOffset, kFineOffset);
-  if (best == 0.0 || !(std::abs(best) < kFarthest - kCoarseOffset)) return std::nullopt;
+  const auto steps = static_cast<int>(kFarthest / kStep);
+  for (int k = -steps; k <= steps; ++k) {
+    result.time_offset = recording.time_offset() + kStep * k;
+    const MotionError error = motion_error(motions, motion_under(recording, result));
+    if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
+    least = error.at_points;
+    best = kStep * k;
+  }
+  if (best == 0.0 || !(std::abs(best) < kFarthest - 4.0 * kStep)) return std::nullopt;
   return Reading{recording.convention(), recording.time_offset() + best, 1};
 }
 

@@ -37,29 +37,13 @@ Linearization linearize(const SurfaceGrid& a, const Points& b, const Pose& T, st
   return result;
 }
 
-/// A known component of the translation, as a term of the normal equations.
-struct Prior {
-  Eigen::Vector3d direction;
-  double place;  // m, along direction
-  double weight;
-
-  void add_to(NormalEquations& equations, const Pose& T) const {
-    Vector6 J;
-    J << direction, Eigen::Vector3d::Zero();
-    equations.add(J, direction.dot(T.translation()) - place, weight);
-  }
-};
-
-/// Gauss-Newton steps from `T`, at most `most`, until they are short or fewer than 30 points meet a
-/// surface.
+/// Gauss-Newton steps from `T`, at most `most`, until they are short.
 Pose refine(const SurfaceGrid& a, const Points& b, Pose T, std::size_t level, double scale,
-            std::size_t stride, int most, const std::optional<Prior>& prior = {}) {
-  constexpr std::size_t kFewest = 30;
+            std::size_t stride, int most, const std::optional<KnownTranslation>& way = {}) {
   constexpr double kShort = 1e-4;  // m
   for (int k = 0; k < most; ++k) {
     Linearization result = linearize(a, b, T, level, scale, stride);
-    if (prior) prior->add_to(result.equations, T);
-    if (result.equations.count() < kFewest) break;
+    if (way) way->add_to(result.equations, T);
     const Vector6 step = result.equations.solve().step;
     if (!step.allFinite()) break;
     T = stepped(T, step);
@@ -68,12 +52,20 @@ Pose refine(const SurfaceGrid& a, const Points& b, Pose T, std::size_t level, do
   return T;
 }
 
-/// The result of small steps; empty if too few points meet a surface.
-std::optional<Registration> finished(const SurfaceGrid& a, const Points& b, Pose T,
-                                     const std::optional<Prior>& prior) {
+}  // namespace
+
+void KnownTranslation::add_to(NormalEquations& equations, const Pose& T) const {
+  const double ratio = kPointDeviation / deviation;
+  Vector6 J;
+  J << direction, Eigen::Vector3d::Zero();
+  equations.add(J, direction.dot(T.translation()) - place, ratio * ratio);
+}
+
+std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b, Pose T,
+                                          const std::optional<KnownTranslation>& way) {
   constexpr double kFine = 0.1;  // m
-  T = refine(a, b, T, 1, 0.2, 1, 8, prior);
-  T = refine(a, b, T, 2, kFine, 1, 15, prior);
+  T = refine(a, b, T, 1, 0.2, 1, 8, way);
+  T = refine(a, b, T, 2, kFine, 1, 15, way);
   Linearization last = linearize(a, b, T, 2, kFine, 1);
   if (last.firm_count < kFewestMatches) return std::nullopt;
   Registration result;
@@ -83,16 +75,13 @@ std::optional<Registration> finished(const SurfaceGrid& a, const Points& b, Pose
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> by_planes(solution.covariance);
   result.uncertain = {by_planes.eigenvectors().col(2), by_planes.eigenvectors().col(1)};
   result.free_directions = solution.free_directions;
-  if (prior) prior->add_to(last.equations, T);
+  if (way) way->add_to(last.equations, T);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> by_all(last.equations.solve().covariance);
   result.uncertainty = kPointDeviation * std::sqrt(std::max(0.0, by_all.eigenvalues()[2]));
   return result;
 }
 
-}  // namespace
-
 RegistrationScan::RegistrationScan(PointsView points, double farthest) {
-  constexpr double kThinned = 0.4;  // m
   VoxelHashTable<> thinned;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
@@ -106,9 +95,7 @@ RegistrationScan::RegistrationScan(PointsView points, double farthest) {
 
 std::optional<Registration> register_scans(const SurfaceGrid& a, const Points& b,
                                            const std::vector<Pose>& guesses) {
-  constexpr double kDistinct = 0.5;  // m
-  constexpr double kSame = 0.1;      // m, at points kLever away
-  constexpr double kAlmost = 0.93;   // ratio of scores
+  constexpr double kSame = 0.1;  // m, at points kLever away
   Pose best = Pose::Identity();
   double best_score = 0.0;
   std::vector<std::pair<Eigen::Vector3d, double>> results;  // translation and score
@@ -129,21 +116,13 @@ std::optional<Registration> register_scans(const SurfaceGrid& a, const Points& b
     best = T;
     best_score = score;
   }
-  auto result = finished(a, b, best, {});
+  auto result = register_near(a, b, best);
   if (!result) return result;
   result->is_ambiguous = std::any_of(results.begin(), results.end(), [&](const auto& other) {
     return (other.first - best.translation()).norm() > kDistinct &&
            other.second > kAlmost * best_score;
   });
   return result;
-}
-
-std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b, const Pose& guess,
-                                          const std::optional<KnownTranslation>& way) {
-  if (!way) return finished(a, b, guess, {});
-  const double ratio = kPointDeviation / way->deviation;
-  return finished(a, b, guess,
-                  Prior{way->direction, way->direction.dot(guess.translation()), ratio * ratio});
 }
 
 }  // namespace dynains

@@ -29,6 +29,12 @@ class RegistrationScan {
   SurfaceGrid surfaces_;
 };
 
+/// Edge (m) of the voxels that keep one point each.
+inline constexpr double kThinned = 0.4;
+/// Results farther apart (m) are other places.
+inline constexpr double kDistinct = 0.5;
+/// Ratio of what is nearly as good as the best.
+inline constexpr double kAlmost = 0.93;
 /// Points at planes and poles that a registration needs.
 inline constexpr std::size_t kFewestMatches = 100;
 /// Score that registrations of other places hardly reach.
@@ -56,12 +62,15 @@ std::optional<Registration> register_scans(const SurfaceGrid& a,
 /// A component of the translation that is known otherwise.
 struct KnownTranslation {
   Eigen::Vector3d direction;  ///< unit vector, frame of a
+  double place;               ///< m, along direction
   double deviation;           ///< m
+
+  void add_to(NormalEquations& equations, const Pose& T_a_b) const;
 };
 
-/// As register_scans(), by small steps from `guess`, whose translation along `way` is known.
+/// As register_scans(), by small steps from `guess`.
 std::optional<Registration> register_near(const SurfaceGrid& a,
-                                          const std::vector<Eigen::Vector3d>& b, const Pose& guess,
+                                          const std::vector<Eigen::Vector3d>& b, Pose guess,
                                           const std::optional<KnownTranslation>& way = {});
 
 }  // namespace dynains

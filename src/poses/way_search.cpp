@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "scan_registration.hpp"
+
 namespace dynains {
 namespace {
 
@@ -35,11 +37,10 @@ double gap_of(const Landmarks& a, const Points& points, const Pose& T, double mo
 /// The `points` of another scan that do not keep their place beside `a`, as traffic ahead and
 /// samples of smooth walls do; all if those are few.
 Points decisive_of(const Points& points, const Landmarks& a, const Pose& standing) {
-  constexpr double kKeptPlace = 0.5;    // m
   constexpr double kLeastShare = 0.15;  // of the points
   Points decisive;
   for (const Eigen::Vector3d& p : points) {
-    if (a.distance_to(standing * p) > kKeptPlace) decisive.push_back(p);
+    if (a.distance_to(standing * p) > kDistinct) decisive.push_back(p);
   }
   const double least_count = kLeastShare * static_cast<double>(points.size());
   const bool are_few =
@@ -49,14 +50,13 @@ Points decisive_of(const Points& points, const Landmarks& a, const Pose& standin
 
 /// The index of the least gap; empty if it is at an end, or if another minimum is nearly as low.
 std::optional<std::size_t> clear_minimum(const std::vector<double>& gaps) {
-  constexpr double kClearly = 1.08;  // ratio to the next minimum
   const auto least =
       static_cast<std::size_t>(std::min_element(gaps.begin(), gaps.end()) - gaps.begin());
   if (least == 0 || least + 1 == gaps.size()) return std::nullopt;
   for (std::size_t k = 1; k + 1 < gaps.size(); ++k) {
     const bool is_minimum = gaps[k] <= gaps[k - 1] && gaps[k] <= gaps[k + 1];
     const bool is_other = std::max(k, least) - std::min(k, least) > 1;
-    if (is_minimum && is_other && gaps[k] < kClearly * gaps[least]) return std::nullopt;
+    if (is_minimum && is_other && kAlmost * gaps[k] < gaps[least]) return std::nullopt;
   }
   return least;
 }
