@@ -110,7 +110,7 @@ class MapProtocol::Impl {
     finish_first_pass();
     detail::for_each_point(scan, grid_, gate_,
                            [&](std::size_t i, const Eigen::Vector3d& p, VoxelKey key) {
-                             if (near_mixed_.find(key) == kNone) return;
+                             if (near_mixed_.find(key) == VoxelHashTable<>::kNone) return;
                              approach({p, settings_.truth(scan.truth[i])}, key);
                            });
   }
@@ -142,7 +142,6 @@ class MapProtocol::Impl {
   }
 
  private:
-  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
   /// A map point in a mixed map voxel: measured points around it have more than one class.
@@ -173,7 +172,7 @@ class MapProtocol::Impl {
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
       detail::for_each_around(groups_.key(cell), [&](VoxelKey key) {
         const std::uint32_t number = measured_.find(key);
-        if (number != kNone) truths_[cell] |= measured_truths_[number];
+        if (number != VoxelHashTable<>::kNone) truths_[cell] |= measured_truths_[number];
       });
       if (!detail::is_mixed(truths_[cell])) continue;
       detail::for_each_around(groups_.key(cell), [&](VoxelKey key) { near_mixed_.insert(key); });
@@ -184,7 +183,7 @@ class MapProtocol::Impl {
   void approach(const VoxelPoint& point, VoxelKey key) {
     detail::for_each_around(key, [&](VoxelKey at) {
       const std::uint32_t cell = groups_.index().find(at);
-      if (cell == kNone || !detail::is_mixed(truths_[cell])) return;
+      if (cell == VoxelHashTable<>::kNone || !detail::is_mixed(truths_[cell])) return;
       // Skips voxels whose map points have nearer measured points already: most, in dense maps.
       if (grid_.squared_distance(point.p_world, at) >= farthest_[cell]) return;
       double farthest = 0;

@@ -20,10 +20,12 @@ void add_eval_command(CLI::App& app);
 void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 
-/// Exit codes; an interrupted run exits with 128 + the number of the signal.
-inline constexpr int kExitFailure = 1;
-inline constexpr int kExitUsage = 2;
-inline constexpr int kExitLostTrack = 3;  ///< of the odometry; results before it are complete
+/// An interrupted run exits with 128 + the number of the signal.
+enum ExitCode {
+  kExitFailure = 1,
+  kExitUsage = 2,
+  kExitLostTrack = 3  ///< of the odometry; results before it are complete
+};
 
 /// The checked recording has a defect, which the command has printed.
 struct Finding {};

@@ -16,9 +16,7 @@
 namespace dynains::program {
 
 /// Class ids that `dynains run` writes (SemanticKITTI-MOS).
-inline constexpr std::uint32_t kRunNotJudged = 0;
-inline constexpr std::uint32_t kRunStatic = 9;
-inline constexpr std::uint32_t kRunMoving = 251;
+enum RunClass : std::uint32_t { kRunNotJudged = 0, kRunStatic = 9, kRunMoving = 251 };
 
 /// Labels that `dynains run` wrote for `count` points. Throws IoError for a file of another size or
 /// with labels of another program.

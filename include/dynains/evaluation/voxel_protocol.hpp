@@ -42,9 +42,11 @@ class VoxelProtocol {
   };
 
   /// Row numbers for score().
-  static constexpr std::size_t kIdentity = 0;  ///< no point removed
-  static constexpr std::size_t kOracle = 1;    ///< exactly the dynamic points removed
-  static constexpr std::size_t kFirstEstimate = 2;
+  enum Row : std::size_t {
+    kIdentity,  ///< no point removed
+    kOracle,    ///< exactly the dynamic points removed
+    kFirstEstimate
+  };
 
   /// `estimates`: number of estimates. Throws ConfigError for `voxel` <= 0, negative ranges,
   /// min_range above max_range, or more than kMaxEstimates estimates.
