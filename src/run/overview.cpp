@@ -14,8 +14,8 @@
 namespace dynains::program {
 namespace {
 
-constexpr int kTextHeight = 14;                                                     // pixels
-constexpr int kColumns = 5, kRows = 7, kAdvance = 6, kScale = kTextHeight / kRows;  // of letters
+constexpr int kTextHeight = 14;                                       // pixels
+constexpr int kRows = 7, kAdvance = 6, kScale = kTextHeight / kRows;  // of letters
 
 /// Rows of a letter from the top, five bits each, the left column in the highest bit.
 using Glyph = std::array<std::uint8_t, kRows>;
@@ -45,9 +45,9 @@ constexpr std::array<Glyph, kCharacters.size()> kGlyphs = {{
 
 void draw_glyph(Picture& picture, int x, int y, const Glyph& glyph, Colour colour) {
   for (int row = 0; row < kRows * kScale; ++row) {
-    for (int column = 0; column < kColumns * kScale; ++column) {
-      const int bit = kColumns - 1 - column / kScale;
-      if ((glyph[static_cast<std::size_t>(row / kScale)] >> bit & 1) == 0) continue;
+    for (int column = 0; column < kAdvance * kScale; ++column) {
+      const int bits = glyph[static_cast<std::size_t>(row / kScale)] << 1;  // and a gap
+      if ((bits >> (kAdvance - 1 - column / kScale) & 1) == 0) continue;
       const int to_x = x + column, to_y = y + row;
       if (to_x < 0 || to_y < 0 || to_x >= picture.width() || to_y >= picture.height()) continue;
       picture.set(to_x, to_y, colour);
@@ -70,17 +70,20 @@ void draw_text(Picture& picture, int x, int y, const std::string& text, Colour c
   }
 }
 
-constexpr double kMargin = 50.0;         // m around the path
-constexpr double kLongerSide = 1200.0;   // pixels of a panel
-constexpr double kMostPerMetre = 8.0;    // pixels
-constexpr int kGap = 8;                  // pixels between panels
-constexpr int kStrip = kTextHeight + 8;  // pixels of a title, and of the scale below all panels
-constexpr int kInset = 4;                // pixels around text
-constexpr Colour kInk = {40, 40, 40};
-constexpr Colour kGrey = {150, 150, 150};  // static points in a legend
-constexpr Colour kMoving = {30, 80, 220};
-constexpr Colour kRemoved = {30, 160, 60};
-constexpr Colour kPale = {232, 232, 232};
+constexpr double kMargin = 50.0;                  // m around the path
+constexpr double kLongerSide = 1200.0;            // pixels of a panel
+constexpr double kMostPerMetre = 8.0;             // pixels
+constexpr int kInset = 4;                         // pixels around text and panels
+constexpr int kStrip = kTextHeight + 2 * kInset;  // pixels of a title, and of the scale below
+
+struct Palette {
+  Colour ink = {40, 40, 40};
+  Colour grey = {150, 150, 150};  ///< static points in a legend
+  Colour moving = {30, 80, 220};
+  Colour removed = {30, 160, 60};
+  Colour pale = {232, 232, 232};
+};
+constexpr Palette kPalette;
 
 /// One of so many static points of a scan is drawn: later scans show the same places again.
 std::size_t static_step(std::size_t scans) {
@@ -107,12 +110,12 @@ using Entries = std::vector<std::pair<Colour, std::string>>;
 void draw_title(Picture& picture, int x, int y, const std::string& title, const Entries& entries) {
   x += kInset;
   y += kInset;
-  draw_text(picture, x, y, title, kInk);
+  draw_text(picture, x, y, title, kPalette.ink);
   x += text_width(title + ' ');
   for (const auto& [colour, meaning] : entries) {
     fill(picture, x, y + 2, kTextHeight - 4, kTextHeight - 4, colour);
     x += kTextHeight;
-    draw_text(picture, x, y, meaning, kInk);
+    draw_text(picture, x, y, meaning, kPalette.ink);
     x += text_width(meaning + "  ");
   }
 }
@@ -120,15 +123,14 @@ void draw_title(Picture& picture, int x, int y, const std::string& title, const 
 /// A bar of a round length at the lower border. `scale`: pixels per m.
 void draw_scale(Picture& picture, double scale) {
   constexpr double kMostPixels = 200.0;
-  constexpr int kBar = 4;  // pixels
   int metres = 1;
   for (const int next : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000}) {
     if (next * scale <= kMostPixels) metres = next;
   }
   const int length = std::max(1, static_cast<int>(std::lround(metres * scale)));
   const int y = picture.height() - kStrip + kInset;
-  fill(picture, kInset, y + (kTextHeight - kBar) / 2, length, kBar, kInk);
-  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kInk);
+  fill(picture, kInset, y + (kTextHeight - kInset) / 2, length, kInset, kPalette.ink);
+  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kPalette.ink);
 }
 
 }  // namespace
@@ -181,8 +183,8 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
 
 Picture Overview::picture() const {
   const bool is_beside = height_ > width_;
-  const int step_x = is_beside ? width_ + kGap : 0;
-  const int step_y = is_beside ? 0 : kStrip + height_ + kGap;
+  const int step_x = is_beside ? width_ + 2 * kInset : 0;
+  const int step_y = is_beside ? 0 : kStrip + height_ + 2 * kInset;
   Picture picture(width_ + 2 * step_x, kStrip + height_ + 2 * step_y + kStrip);
   const auto draw = [&](int panel, int x, int y, Colour colour) {
     picture.set(x + panel * step_x, y + kStrip + panel * step_y, colour);
@@ -193,19 +195,19 @@ Picture Overview::picture() const {
       const Pixel& pixel = row[static_cast<std::size_t>(x)];
       const Colour grey = {pixel.grey, pixel.grey, pixel.grey};
       if (pixel.has_moving) {
-        draw(0, x, y, kMoving);
-        draw(2, x, y, kRemoved);
+        draw(0, x, y, kPalette.moving);
+        draw(2, x, y, kPalette.removed);
       } else if (pixel.has_static()) {
         draw(0, x, y, grey);
-        draw(2, x, y, kPale);
+        draw(2, x, y, kPalette.pale);
       }
       if (pixel.has_static()) draw(1, x, y, grey);
     }
   }
-  const Entries before = {{kGrey, "static"}, {kMoving, "moving"}};
+  const Entries before = {{kPalette.grey, "static"}, {kPalette.moving, "moving"}};
   draw_title(picture, 0, 0, "before:", before);
-  draw_title(picture, step_x, step_y, "after:", {{kGrey, "static"}});
-  draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kRemoved, "moving"}});
+  draw_title(picture, step_x, step_y, "after:", {{kPalette.grey, "static"}});
+  draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kPalette.removed, "moving"}});
   draw_scale(picture, scale_);
   return picture;
 }

@@ -9,20 +9,10 @@
 #include "dynains/io/atomic_file.hpp"
 
 namespace dynains::program {
-namespace {
-
-constexpr int kMaxSide = 16384;
-
-int checked_side(int side) {
-  if (side >= 1 && side <= kMaxSide) return side;
-  throw ConfigError("picture side = " + std::to_string(side) + " must be in [1, 16384] pixels");
-}
-
-}  // namespace
 
 Picture::Picture(int width, int height)
-    : width_(checked_side(width)),
-      height_(checked_side(height)),
+    : width_(width),
+      height_(height),
       bytes_(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 255) {}
 
 void Picture::write_png(const std::filesystem::path& path) const {
