@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
@@ -13,7 +14,7 @@
 namespace dynains::program {
 namespace {
 
-constexpr std::uint32_t kMostIds = 65535;  // 16 bits; ids beyond start again at 1
+using Id = std::uint16_t;  // of an instance in a file; ids beyond start again at 1
 
 constexpr std::uint32_t mos_class(PointLabel label) {
   if (label == PointLabel::kDynamic) return kRunMoving;
@@ -41,7 +42,7 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
       labels[i] = mos_class(verdict.labels[i]) | verdict.instances[i] << 16U;
     }
   });
-  if (all_ids <= kMostIds) return;
+  if (all_ids <= std::numeric_limits<Id>::max()) return;
   for (std::size_t i = 0; i < count; ++i) {
     labels[i] = mos_label(verdict.labels[i], verdict.instances[i]);
   }
@@ -50,7 +51,8 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
 }  // namespace
 
 std::uint32_t mos_label(PointLabel label, std::uint32_t instance) {
-  const std::uint32_t id = instance == kNoInstance ? 0 : (instance - 1) % kMostIds + 1;
+  const std::uint32_t id =
+      instance == kNoInstance ? 0 : (instance - 1) % std::numeric_limits<Id>::max() + 1;
   return mos_class(label) | id << 16U;
 }
 

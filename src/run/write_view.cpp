@@ -39,9 +39,9 @@ class Collector {
         max_points_(max_points),
         // A third is left for the moving points.
         static_(max_points - max_points / 3, std::max(map_voxel, kSmallestCell),
-                ViewPoint::kMostScans + 1),
+                std::numeric_limits<ViewPoint::ScanIndex>::max() + 1),
         moving_(max_points, kSmallestCell, 1) {
-    if (range.size() > ViewPoint::kMostScans) {
+    if (range.size() > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
       throw ConfigError("a page shows at most 65535 scans, not " + std::to_string(range.size()));
     }
     data_.origin = recording.T_world_sensor(range.first).translation();

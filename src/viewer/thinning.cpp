@@ -1,6 +1,7 @@
 #include "thinning.hpp"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace dynains::viewer {
@@ -46,7 +47,7 @@ bool ThinnedPoints::is_first(const ViewPoint& point) {
 }
 
 void ThinnedPoints::thin() {
-  if (cell_ < kWidestCell || scans_per_cell_ > ViewPoint::kMostScans) {
+  if (cell_ < kWidestCell || scans_per_cell_ > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
     cell_ *= kGrowth;
   } else {
     scans_per_cell_ *= 2;

@@ -26,14 +26,13 @@ enum class ViewTruth : std::uint8_t {
 
 /// A measured point with its verdict.
 struct ViewPoint {
-  static constexpr std::size_t kMostScans = 65535;
-
   Eigen::Vector3f local = Eigen::Vector3f::Zero();  ///< m, world axes, relative to ViewData::origin
   float intensity = 0.0F;                           ///< in the unit of the recording
-  std::uint16_t scan = 0;                           ///< index in ViewData::scans
-  std::uint16_t instance = 0;                       ///< 0: none
-  std::uint8_t belief = 0;                          ///< probability of being dynamic times 255
-  std::uint8_t cause = 0;                           ///< number of the Cause
+  using ScanIndex = std::uint16_t;                  ///< in ViewData::scans
+  ScanIndex scan = 0;
+  std::uint16_t instance = 0;  ///< 0: none
+  std::uint8_t belief = 0;     ///< probability of being dynamic times 255
+  std::uint8_t cause = 0;      ///< number of the Cause
   ViewLabel label = ViewLabel::kNotJudged;
   ViewTruth truth = ViewTruth::kUnknown;
 };
