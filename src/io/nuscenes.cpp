@@ -7,6 +7,7 @@
 #include <system_error>
 #include <unordered_map>
 
+#include "dynains/io/trajectory.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "io/poses/kitti_files.hpp"
@@ -100,13 +101,12 @@ bool is_sweep(const std::string& file) {
 }
 
 std::vector<SweepRow> read_sample_data(const fs::path& table) {
-  constexpr double kMicrosecond = 1e-6;
   std::vector<SweepRow> sweeps;
   read_table(table, [&](const TableRow& row) {
     const std::string file = row.text("filename");
     if (!is_sweep(file)) return;
     sweeps.push_back({file, row.text("sample_token"), row.text("ego_pose_token"),
-                      row.text("calibrated_sensor_token"), kMicrosecond * row.number("timestamp")});
+                      row.text("calibrated_sensor_token"), to_seconds(row.number("timestamp"))});
   });
   if (sweeps.empty()) fail(table, "expected sweeps of a LiDAR (.pcd.bin), found none");
   return sweeps;

@@ -351,8 +351,7 @@ ScanAddress Recording::address(std::size_t i) const {
 /// Points are densest around the sensor: compares the number of points around the origin with the
 /// number around the position of a scan that is far from the origin.
 PointFrame Recording::guess_frame() const {
-  constexpr double kNear = 8.0;      // m
-  constexpr double kFarPose = 20.0;  // m, so that the two do not overlap
+  constexpr double kNear = 8.0;  // m
   const PointFrame usual = has_viewpoints_ ? PointFrame::kWorld : PointFrame::kSensor;
   if (format_ == ScanFormat::kBin || format_ == ScanFormat::kNuScenes ||
       format_ == ScanFormat::kLog) {
@@ -363,7 +362,7 @@ PointFrame Recording::guess_frame() const {
         return a.T_world_sensor.translation().norm() < b.T_world_sensor.translation().norm();
       });
   const Eigen::Vector3d position = farthest->T_world_sensor.translation();
-  if (position.norm() < kFarPose) return usual;
+  if (position.norm() < 2.0 * kNear) return usual;  // the two overlap
   std::size_t around_origin = 0;
   std::size_t around_pose = 0;
   for (const Eigen::Vector3d& read : read_points(farthest->file).positions) {

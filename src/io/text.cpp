@@ -5,6 +5,11 @@
 #include <sstream>
 
 namespace dynains::text {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n\v\f";
+
+}  // namespace
 
 std::string lower_case(std::string text) {
   for (char& c : text) {
@@ -61,8 +66,12 @@ std::optional<double> parse_number(std::string_view token) {
   return value;
 }
 
+std::string_view trimmed(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+}
+
 std::string_view next_token(std::string_view& line) {
-  constexpr std::string_view kBlanks = " \t\r\n\v\f";
   const std::size_t begin = line.find_first_not_of(kBlanks);
   if (begin == std::string_view::npos) {
     line = {};

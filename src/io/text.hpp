@@ -17,6 +17,9 @@ std::optional<double> parse_number(std::string_view token);
 /// Removes the next token, separated by blanks, from the front of `line`; empty at the end.
 std::string_view next_token(std::string_view& line);
 
+/// Without blanks at its ends.
+std::string_view trimmed(std::string_view text);
+
 /// The text with its ASCII letters in lower case.
 std::string lower_case(std::string text);
 

@@ -102,8 +102,7 @@ class Odometry::Loop {
   }
 
   bool is_after_gap(double period) const {
-    constexpr double kLongest = 1.0;  // s, at constant velocity within some metres
-    return period > kLongest && are_scans_missing(period);
+    return period > kLongestPoseGap && are_scans_missing(period);
   }
 
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.

@@ -23,13 +23,6 @@ std::string format_real(Real value) {
   }
 }
 
-std::string trim(const std::string& text) {
-  constexpr const char* kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
 }  // namespace
 
 std::string flag_name(std::string parameter_name) {
@@ -51,12 +44,14 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
       throw ConfigError(path.string() + ":" + std::to_string(number) +
                         ": expected a line of text, found a NUL byte");
     }
-    line = trim(line.substr(0, line.find('#')));
+    line = std::string(text::trimmed(line.substr(0, line.find('#'))));
     if (line.empty()) continue;
     const std::string where = path.string() + ":" + std::to_string(number) + ": ";
     const std::size_t equals = line.find('=');
-    const std::string name = flag_name(trim(line.substr(0, equals)));
-    const std::string value = equals == std::string::npos ? "" : trim(line.substr(equals + 1));
+    const std::string name = flag_name(std::string(text::trimmed(line.substr(0, equals))));
+    const std::string value(equals == std::string::npos
+                                ? ""
+                                : text::trimmed(std::string_view(line).substr(equals + 1)));
     if (name.empty() || value.empty()) {
       throw ConfigError(where + "expected a line such as tau-s = 0.6");
     }

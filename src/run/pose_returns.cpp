@@ -10,6 +10,7 @@
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "poses/given_motion.hpp"
+#include "poses/landmarks.hpp"
 #include "recorded_scans.hpp"
 #include "scratch_file.hpp"
 
@@ -55,7 +56,6 @@ std::vector<ReturnToPlace> find_returns(const Recording& recording,
 
 std::vector<ReturnError> return_errors(const Recording& recording, std::size_t first,
                                        const std::vector<ReturnToPlace>& returns) {
-  constexpr double kLeast = 0.3;  // m
   std::vector<ReturnError> errors;
   for (const ReturnToPlace& place : returns) {
     if (!place.is_known()) continue;
@@ -64,7 +64,7 @@ std::vector<ReturnError> return_errors(const Recording& recording, std::size_t f
                          recording.T_world_sensor(earlier) * place.T_earlier_later;
     const double metres = T_error.translation().norm();
     const double degrees = 180.0 / M_PI * angle_of(T_error.linear());
-    if (metres >= kLeast) add(errors, earlier, later, metres, degrees);
+    if (metres >= kAgreeing) add(errors, earlier, later, metres, degrees);
   }
   return errors;
 }

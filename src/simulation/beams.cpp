@@ -86,8 +86,8 @@ SensorModel sensor_model(Sensor sensor, std::uint64_t seed) {
 }
 
 int BeamTable::row_of(double elevation) {
-  const double row = (elevation + kPi / 2) * (kRows / kPi);
-  return std::clamp(static_cast<int>(row), 0, kRows - 1);
+  const double row = (elevation + kPi / 2) * (kColumns / 2 / kPi);
+  return std::clamp(static_cast<int>(row), 0, kColumns / 2 - 1);
 }
 
 int BeamTable::column_of(double azimuth) {
@@ -168,7 +168,7 @@ void BeamTable::add_rings(const SensorModel& model, std::uint64_t seed, std::siz
 
 // Counting sort, stable.
 void BeamTable::sort_by_cell() {
-  first_.assign(grid_index(kRows, 0, kColumns) + 1, 0);
+  first_.assign(grid_index(kColumns / 2, 0, kColumns) + 1, 0);
   for (const std::uint32_t cell : cells_) ++first_[cell + 1];
   for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
   std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);

@@ -42,7 +42,6 @@ SensorModel sensor_model(Sensor sensor, std::uint64_t seed = 0);
 class BeamTable {
  public:
   static constexpr int kColumns = 720;  ///< cells of half a degree
-  static constexpr int kRows = 360;
 
   /// Columns of one turn: `first` to `last`, `last` excluded.
   struct Columns {

@@ -9,8 +9,6 @@
 namespace dynains {
 namespace {
 
-/// For the chunks that are kept, bytes.
-constexpr std::uint64_t kMostMemory = std::uint64_t{1} << 28;
 constexpr std::size_t kMostChunks = 16;  // that are kept if their messages alternate
 
 }  // namespace

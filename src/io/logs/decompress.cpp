@@ -81,8 +81,7 @@ Decompressed decompress_bz2(const Block& input, Block& output) {
 
 std::uint64_t most_decompressed(std::uint64_t compressed) {
   constexpr std::uint64_t kSmall = std::uint64_t{1} << 24U;
-  constexpr std::uint64_t kLargest = std::uint64_t{1} << 28U;
-  return std::clamp(std::min(compressed, kLargest) * kLargestRatio, kSmall, kLargest);
+  return std::clamp(std::min(compressed, kMostMemory) * kLargestRatio, kSmall, kMostMemory);
 }
 
 std::string decompress(const std::string& method, const Block& input, std::uint64_t size,

@@ -10,6 +10,8 @@ namespace dynains {
 
 /// Most decompressed bytes of each compressed one.
 inline constexpr std::uint64_t kLargestRatio = 1000;
+/// Largest block, and memory for the blocks that are kept, bytes.
+inline constexpr std::uint64_t kMostMemory = std::uint64_t{1} << 28U;
 
 /// Largest size, bytes, of a block that takes `compressed` bytes in a file: 1,000 times as many,
 /// within 16 MiB and 256 MiB. Recorders write some megabytes.

@@ -54,9 +54,7 @@ std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {
 }
 
 bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
-  constexpr std::uint64_t kMessageHead = kRecordHead + 14;  // and channel, sequence, log time
-  const std::uint64_t head_size = std::min(size, kMessageHead);
-  const auto head = file_.read(position, head_size, "a record");
+  const auto head = file_.read(position, std::min(size, kLongestHead), "a record");
   Bytes fields(path_, position, head.data(), head.size());
   const auto opcode = fields.number<std::uint8_t>("an opcode");
   if (opcode == mcap::kMessageIndex) {

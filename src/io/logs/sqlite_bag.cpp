@@ -3,10 +3,12 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdio>
+#include <limits>
 #include <map>
 #include <string>
-#include <string_view>
 
 #include "../failure.hpp"
 #include "message_types.hpp"
@@ -22,14 +24,15 @@ std::string text_of(sqlite3_stmt* statement, int column) {
 
 /// Opened in this way, the database is read as it is, and SQLite writes no file beside it.
 std::string uri_of(const std::filesystem::path& path) {
-  constexpr const char* kDigits = "0123456789ABCDEF";
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
     const auto byte = static_cast<unsigned char>(c);
     if (std::isalnum(byte) != 0 || c == '/' || c == '.' || c == '-' || c == '_') {
       uri += c;
     } else {
-      uri = uri + '%' + kDigits[byte / 16] + kDigits[byte % 16];
+      std::array<char, 4> code{};
+      std::snprintf(code.data(), code.size(), "%%%02X", static_cast<unsigned>(byte));
+      uri += code.data();
     }
   }
   return uri + "?mode=ro&immutable=1";
@@ -117,14 +120,14 @@ SqliteBag::SqliteBag(const std::filesystem::path& path) : LogFile(path) {
 /// No SQL of the file runs, and nothing is larger or takes longer than a file of `size` bytes can
 /// need.
 void SqliteBag::limit(std::uint64_t size) {
-  constexpr std::uint64_t kLeast = 1U << 20U;
-  constexpr std::uint64_t kMost = 1U << 30U;
+  constexpr std::uint64_t kSlack = 1U << 20U;  // bytes, for queries
+  const std::uint64_t most = std::numeric_limits<int>::max();
   sqlite3* const database = database_.get();
   for (const int program : {SQLITE_DBCONFIG_ENABLE_VIEW, SQLITE_DBCONFIG_ENABLE_TRIGGER,
                             SQLITE_DBCONFIG_TRUSTED_SCHEMA}) {
     sqlite3_db_config(database, program, 0, nullptr);
   }
-  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::clamp(size, kLeast, kMost)));
+  sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::min(size + kSlack, most)));
   most_rows_ = size;
   budget_ = static_cast<std::int64_t>(100 + size / 1000);
   sqlite3_progress_handler(database, kStepsOfProgress, spend, &budget_);
@@ -136,9 +139,7 @@ std::map<std::string, bool> SqliteBag::columns_of(const std::string& table) {
   const SqliteStatement kind =
       prepare("SELECT type, sql FROM sqlite_master WHERE name = '" + table + "'");
   if (!step(kind.get())) return {};
-  constexpr std::string_view kVirtual = "CREATE VIRTUAL";
-  if (text_of(kind.get(), 0) != "table" ||
-      text_of(kind.get(), 1).compare(0, kVirtual.size(), kVirtual) == 0) {
+  if (text_of(kind.get(), 0) != "table" || text_of(kind.get(), 1).rfind("CREATE VIRTUAL", 0) == 0) {
     fail(path_, kExpected + table + " is no table");
   }
   const SqliteStatement rows = prepare("PRAGMA table_xinfo(" + table + ")");
