@@ -42,7 +42,7 @@ void read_whole(const fs::path& log, std::size_t bytes) {
 std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) {
   const std::vector<test::CloudField> fields = {{"x", 0, 7},      {"y", 4, 7},     {"z", 8, 7},
                                                 {"label", 12, 6}, {"ring", 16, 4}, {"t", 18, 6}};
-  test::ByteWriter points;
+  ByteWriter points;
   for (const float x : {1.0F, 2.0F}) {
     points.number(x).number(2.0F).number(3.0F).number(9U).number(std::uint16_t{1}).number(50U);
   }
@@ -51,7 +51,7 @@ std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) 
     const std::uint64_t at = test::nanoseconds(time);
     const Eigen::Isometry3d pose = test::pose_at(time, 0.5);
     messages.push_back(
-        {0, at, test::cloud_message(encoding, time, "lidar", fields, 22, points.text())});
+        {0, at, test::cloud_message(encoding, time, "lidar", fields, 22, points.bytes())});
     messages.push_back({1, at,
                         by_transforms ? test::transform(time, "odom", "lidar", pose, encoding)
                                       : test::odometry(time, "lidar", pose, encoding)});

@@ -130,7 +130,7 @@ TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
       }
       messages.push_back(
           {0, nanoseconds(time),
-           cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 16, points.text())});
+           cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 16, points.bytes())});
     }
     const TemporaryFolder folder;
     write_text(folder / "drive.mcap",

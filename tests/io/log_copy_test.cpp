@@ -45,8 +45,11 @@ std::string marked_with(const std::string& type, const SerialisedMessage& cloud,
 
 /// A cloud of `rows` rows, each of two points and `padding` bytes, with a field of another type.
 std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::size_t padding) {
-  FieldWriter out(encoding);
-  out.header(1.5, "lidar").number(rows).number(std::uint32_t{2}).number(std::uint32_t{4});
+  MessageWriter out(encoding);
+  out.header(nanoseconds(1.5), "lidar")
+      .number(rows)
+      .number(std::uint32_t{2})
+      .number(std::uint32_t{4});
   for (const CloudField& field : {kXyz[0], kXyz[1], kXyz[2], CloudField{"rgb", 12, 4}}) {
     out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
   }
@@ -58,8 +61,10 @@ std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::si
   }
   out.number(std::uint8_t{0}).number(std::uint32_t{14});
   out.number(static_cast<std::uint32_t>(28 + padding));
-  out.number(static_cast<std::uint32_t>(data.size())).raw(data.text()).number(std::uint8_t{1});
-  return out.text();
+  out.number(static_cast<std::uint32_t>(data.bytes().size()))
+      .raw(data.bytes())
+      .number(std::uint8_t{1});
+  return out.bytes();
 }
 
 /// A cloud of one row that has only the points with these numbers.
@@ -71,12 +76,12 @@ std::string one_row(MessageEncoding encoding, const std::vector<std::uint16_t>& 
   }
   std::vector<CloudField> fields = kXyz;
   fields.push_back({"rgb", 12, 4});
-  return cloud_message(encoding, 1.5, "lidar", fields, 14, data.text());
+  return cloud_message(encoding, 1.5, "lidar", fields, 14, data.bytes());
 }
 
 std::string livox_message(MessageEncoding encoding, const std::vector<std::uint8_t>& points) {
-  FieldWriter out(encoding);
-  out.header(1.5, "livox").number(std::uint64_t{77});
+  MessageWriter out(encoding);
+  out.header(nanoseconds(1.5), "livox").number(std::uint64_t{77});
   out.number(static_cast<std::uint32_t>(points.size()));
   out.number(std::uint8_t{3}).raw("abc").number(static_cast<std::uint32_t>(points.size()));
   for (const std::uint8_t i : points) {
@@ -84,7 +89,7 @@ std::string livox_message(MessageEncoding encoding, const std::vector<std::uint8
     for (std::uint32_t axis = 0; axis < 3; ++axis) out.number(static_cast<float>(i + axis));
     out.number(i).number(static_cast<std::uint8_t>(i + 1)).number(static_cast<std::uint8_t>(2));
   }
-  return out.text();
+  return out.bytes();
 }
 
 /// Replaces the messages of one time, and ends the copy at another one.
@@ -162,7 +167,7 @@ TEST_CASE("Labels become the last field of a cloud, and all others are as they w
                                        .number(static_cast<std::uint16_t>(1000 + i))
                                        .number(labels[i])
                                        .raw(std::string(3, '\0'))
-                                       .text());
+                                       .bytes());
     }
     CHECK_THROWS_WITH(marked_with(kCloud, message, labels),
                       ContainsSubstring("place: expected no field \"label\""));
@@ -206,7 +211,7 @@ TEST_CASE("Attachments, metadata, sequence numbers and publish times of an MCAP 
   std::string file = mcap_file(kChannels, five_messages(), {});
   const auto times = ByteWriter().number(std::uint64_t{5}).number(std::uint64_t{6});
   const std::string attachment = mcap_record(9, ByteWriter()
-                                                    .raw(times.text())
+                                                    .raw(times.bytes())
                                                     .string("calibration")
                                                     .string("text/plain")
                                                     .number(std::uint64_t{4})
@@ -235,11 +240,11 @@ TEST_CASE("Attachments, metadata, sequence numbers and publish times of an MCAP 
     return ByteWriter()
         .number(std::uint64_t{copy.find(record)})
         .number(std::uint64_t{record.size()})
-        .text();
+        .bytes();
   };
   CHECK_THAT(copy, ContainsSubstring(mcap_record(10, ByteWriter()
                                                          .raw(index(attachment))
-                                                         .raw(times.text())
+                                                         .raw(times.bytes())
                                                          .number(std::uint64_t{4})
                                                          .string("calibration")
                                                          .string("text/plain"))));

@@ -360,10 +360,11 @@ TEST_CASE("Chunks whose messages alternate in time are unpacked once, if they ar
         entries.number(count * i + chunk).number(std::uint64_t{records.size()});
         records += mcap_message({0, count * i + chunk, "m"});
       }
-      chunks += zstd_chunk(records, mcap_record(7, ByteWriter()
-                                                       .number(std::uint16_t{0})
-                                                       .number(std::uint32_t(entries.size()))
-                                                       .raw(entries.text())));
+      chunks +=
+          zstd_chunk(records, mcap_record(7, ByteWriter()
+                                                 .number(std::uint16_t{0})
+                                                 .number(std::uint32_t(entries.bytes().size()))
+                                                 .raw(entries.bytes())));
     }
     write_text(path, mcap_of(chunks));
   };

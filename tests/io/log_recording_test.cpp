@@ -173,10 +173,10 @@ TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
 
   std::vector<std::string> poses;
   for (int i = 0; i < 3; ++i) {
-    poses.push_back(FieldWriter(MessageEncoding::kCdr)
-                        .header(1.0 + 0.1 * i, "map")
+    poses.push_back(MessageWriter(MessageEncoding::kCdr)
+                        .header(nanoseconds(1.0 + 0.1 * i), "map")
                         .pose(pose_at(i, 0.1))
-                        .text());
+                        .bytes());
   }
   write_text(log, mcap_file({kPoints, {"/pose", "geometry_msgs/msg/PoseStamped"}},
                             clouds_with("lidar", poses), {}));
@@ -486,7 +486,7 @@ TEST_CASE("A field label gives the labels, and a truncated log gives the scans b
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   std::vector<CloudField> fields = kXyz;
   fields.push_back({"label", 12, 6});
-  const std::string points = xyz_of({1, 2, 3}) + ByteWriter().number(0x1000FBU).text();
+  const std::string points = xyz_of({1, 2, 3}) + ByteWriter().number(0x1000FBU).bytes();
   for (WrittenMessage& message : messages) {
     if (message.channel != 0) continue;
     message.data = cloud_message(MessageEncoding::kCdr, 1e-9 * static_cast<double>(message.time),

@@ -40,13 +40,13 @@ inline std::string compressed(const std::string& method, const std::string& byte
   const auto size = static_cast<std::uint32_t>(bytes.size());
   if (method == "lz4") {
     const std::string head("\x04\x22\x4D\x18\x60\x40\x82", 7);
-    return ByteWriter().raw(head).number(size | 1U << 31U).raw(bytes).number(0U).text();
+    return ByteWriter().raw(head).number(size | 1U << 31U).raw(bytes).number(0U).bytes();
   }
   if (method == "zstd") {
     const std::uint32_t block = size << 3U | 1U;  // the last block, raw
-    const std::string block_head = ByteWriter().number(block).text().substr(0, 3);
+    const std::string block_head = ByteWriter().number(block).bytes().substr(0, 3);
     const std::string head("\x28\xB5\x2F\xFD\xA0", 5);
-    return ByteWriter().raw(head).number(size).raw(block_head).raw(bytes).text();
+    return ByteWriter().raw(head).number(size).raw(block_head).raw(bytes).bytes();
   }
   return bytes;
 }
@@ -54,9 +54,9 @@ inline std::string compressed(const std::string& method, const std::string& byte
 inline std::string mcap_record(std::uint8_t opcode, const ByteWriter& content) {
   return ByteWriter()
       .number(opcode)
-      .number(std::uint64_t{content.size()})
-      .raw(content.text())
-      .text();
+      .number(std::uint64_t{content.bytes().size()})
+      .raw(content.bytes())
+      .bytes();
 }
 
 /// Schemas and channels; the id of a schema is that of its channel and 1.
@@ -139,11 +139,11 @@ struct BagParts {
 inline std::string bag_file(const std::vector<LogChannel>& channels,
                             const std::vector<WrittenMessage>& messages, const BagParts& parts) {
   const auto field = [](const std::string& name, const std::string& value) {
-    return ByteWriter().string(name + '=' + value).text();
+    return ByteWriter().string(name + '=' + value).bytes();
   };
-  const auto bytes = [](auto value) { return ByteWriter().number(value).text(); };
+  const auto bytes = [](auto value) { return ByteWriter().number(value).bytes(); };
   const auto record = [&](std::uint8_t opcode, const std::string& fields, const std::string& data) {
-    return ByteWriter().string(field("op", bytes(opcode)) + fields).string(data).text();
+    return ByteWriter().string(field("op", bytes(opcode)) + fields).string(data).bytes();
   };
   const auto stamp = [&](std::uint64_t time) {
     return bytes(static_cast<std::uint32_t>(time / 1000000000)) +

@@ -19,7 +19,7 @@ inline std::string npy_file(const std::string& descr, const std::string& shape,
       .raw(std::string("\x93NUMPY\1\0", 8))
       .number(static_cast<std::uint16_t>(header.size()))
       .raw(header + data)
-      .text();
+      .bytes();
 }
 
 struct LasParts {
@@ -36,7 +36,7 @@ inline std::string extra_bytes(const std::string& name, std::uint8_t type) {
       .number(type)
       .raw(std::string(1, '\0') + name + std::string(32 - name.size(), '\0'))
       .raw(std::string(156, '\0'))
-      .text();
+      .bytes();
 }
 
 /// LAS with scale 0.01 and offset 100, 200, 300.
@@ -51,7 +51,7 @@ inline std::string las_file(const LasParts& parts, const std::string& points) {
   ByteWriter out;
   out.raw("LASF" + std::string(20, '\0')).number(std::uint8_t{1}).number(parts.minor);
   out.raw(std::string(68, '\0')).number(header_size);
-  out.number(static_cast<std::uint32_t>(header_size + vlr.size()));
+  out.number(static_cast<std::uint32_t>(header_size + vlr.bytes().size()));
   out.number(parts.extra_bytes.empty() ? 0U : 1U).number(parts.format).number(parts.point_size);
   out.number(parts.minor < 4 ? parts.count : 0U).raw(std::string(20, '\0'));
   for (const double value : {0.01, 0.01, 0.01, 100.0, 200.0, 300.0}) out.number(value);
@@ -59,7 +59,7 @@ inline std::string las_file(const LasParts& parts, const std::string& points) {
   if (parts.minor == 4) {
     out.raw(std::string(20, '\0')).number(std::uint64_t{parts.count}).raw(std::string(120, '\0'));
   }
-  return out.raw(vlr.text() + points).text();
+  return out.raw(vlr.bytes() + points).bytes();
 }
 
 }  // namespace dynains::test

@@ -61,7 +61,7 @@ std::string structured_point(double x, char ring, std::int64_t time, std::uint8_
       .raw(std::string(16, '\0') + '\0' + ring)
       .number(time)
       .number(label)
-      .text();
+      .bytes();
 }
 
 void check_two_points(const PointFile& points) {
@@ -77,11 +77,11 @@ std::string las_points(const LasParts& parts, std::uint8_t label) {
                            .number(std::int32_t{-1})
                            .number(std::int32_t{2000000000})
                            .number(std::uint16_t{700})
-                           .text();
+                           .bytes();
   record.resize(parts.format < 6 ? 20 : 22, '\0');
-  record += ByteWriter().number(1234.5).text();
+  record += ByteWriter().number(1234.5).bytes();
   record.resize(parts.point_size - 3U, '\0');
-  return record + ByteWriter().number(std::uint16_t{17}).number(label).text();
+  return record + ByteWriter().number(std::uint16_t{17}).number(label).bytes();
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
     const std::vector<CloudField> fields = {
         {"z", 16, 8}, {"y", 8, 8},       {"x", 0, 8}, {"ring", 24, 4}, {"reflectivity", 26, 2},
         {"t", 27, 6}, {"unknown", 31, 2}};
-    const std::string message = cloud_message(encoding, 12.25, "/lidar", fields, 32, data.text());
+    const std::string message = cloud_message(encoding, 12.25, "/lidar", fields, 32, data.bytes());
     const CloudInfo info = inspect_cloud("sensor_msgs/PointCloud2", view(message, encoding));
     CHECK(info.time == 12.25);
     CHECK(info.frame == "lidar");
@@ -65,14 +65,17 @@ TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
 TEST_CASE("Clouds may be big-endian, and their row step may be that of another cloud") {
   const auto message = [](std::uint8_t is_big_endian, std::uint32_t row_step, std::uint32_t rows,
                           const std::string& data) {
-    FieldWriter out(MessageEncoding::kRos1);
-    out.header(1.0, "l").number(rows).number(std::uint32_t{2}).number(std::uint32_t{3});
+    MessageWriter out(MessageEncoding::kRos1);
+    out.header(nanoseconds(1.0), "l")
+        .number(rows)
+        .number(std::uint32_t{2})
+        .number(std::uint32_t{3});
     for (const CloudField& field : kXyz) {
       out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
     }
     out.number(is_big_endian).number(std::uint32_t{12}).number(row_step);
     out.number(static_cast<std::uint32_t>(data.size())).raw(data).number(std::uint8_t{1});
-    return out.text();
+    return out.bytes();
   };
   const std::vector<float> values = {1, 2, 3, 4, 5, 6};
   std::string swapped;
@@ -95,8 +98,10 @@ TEST_CASE("Clouds may be big-endian, and their row step may be that of another c
 
 TEST_CASE("Livox messages are read as clouds") {
   for (const MessageEncoding encoding : kBoth) {
-    FieldWriter out(encoding);
-    out.header(5.0, "livox").number(std::uint64_t{5000000000}).number(std::uint32_t{2});
+    MessageWriter out(encoding);
+    out.header(nanoseconds(5.0), "livox")
+        .number(std::uint64_t{5000000000})
+        .number(std::uint32_t{2});
     out.number(std::uint8_t{1}).raw(std::string(3, '\0'));
     out.number(std::uint32_t{2});
     for (int i = 0; i < 2; ++i) {
@@ -105,7 +110,7 @@ TEST_CASE("Livox messages are read as clouds") {
       out.number(std::uint8_t{99}).number(std::uint8_t{0}).number(static_cast<std::uint8_t>(i));
     }
     RecordedScan scan;
-    read_cloud("livox_ros_driver/CustomMsg", view(out.text(), encoding), scan);
+    read_cloud("livox_ros_driver/CustomMsg", view(out.bytes(), encoding), scan);
     REQUIRE(scan.size() == 2);
     CHECK(scan.xyzi[6] == 4.0F);
     CHECK(scan.xyzi[7] == 99.0F);
@@ -142,8 +147,12 @@ TEST_CASE("Malformed clouds are refused with their place") {
 TEST_CASE("Poses are read from every type") {
   const Eigen::Isometry3d T = pose_at(3.0, 0.5);
   for (const MessageEncoding encoding : kBoth) {
-    const std::string odometry =
-        FieldWriter(encoding).header(2.5, "/odom").string("base").pose(T).raw("rest").text();
+    const std::string odometry = MessageWriter(encoding)
+                                     .header(nanoseconds(2.5), "/odom")
+                                     .string("base")
+                                     .pose(T)
+                                     .raw("rest")
+                                     .bytes();
     const auto poses = read_poses("nav_msgs/Odometry", view(odometry, encoding));
     REQUIRE(poses.size() == 1);
     CHECK(poses[0].time == 2.5);
@@ -151,13 +160,15 @@ TEST_CASE("Poses are read from every type") {
     CHECK(poses[0].child == "base");
     CHECK(poses[0].T_frame_child.isApprox(T, 1e-12));
 
-    const std::string stamped = FieldWriter(encoding).header(2.5, "map").pose(T).text();
+    const std::string stamped =
+        MessageWriter(encoding).header(nanoseconds(2.5), "map").pose(T).bytes();
     CHECK(read_poses("geometry_msgs/PoseStamped", view(stamped, encoding))[0].child.empty());
 
-    FieldWriter tf(encoding);
+    MessageWriter tf(encoding);
     tf.number(std::uint32_t{2});
-    for (const char* const child : {"a", "b"}) tf.header(1.0, "map").string(child).pose(T);
-    CHECK(read_poses("tf2_msgs/TFMessage", view(tf.text(), encoding))[1].child == "b");
+    for (const char* const child : {"a", "b"})
+      tf.header(nanoseconds(1.0), "map").string(child).pose(T);
+    CHECK(read_poses("tf2_msgs/TFMessage", view(tf.bytes(), encoding))[1].child == "b");
   }
   Eigen::Isometry3d bad = T;
   bad.translation().x() = std::numeric_limits<double>::quiet_NaN();

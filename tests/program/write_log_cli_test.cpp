@@ -37,7 +37,7 @@ std::string points_of_scan(std::size_t i, const std::vector<bool>& keep = {}) {
     for (std::size_t c = 0; c < 4; ++c) points.number(scan[4 * k + c]);
     points.number(static_cast<std::uint16_t>(k)).number(static_cast<std::uint8_t>(i));
   }
-  return points.text();
+  return points.bytes();
 }
 
 std::string cloud_of(std::size_t i, const std::string& points) {

@@ -23,23 +23,34 @@ class MessageWriter {
   }
 
   template <class Number>
-  void number(Number value) {
+  MessageWriter& number(Number value) {
     while (!is_ros1_ && (bytes_.size() - kCdrHeader) % sizeof(value) != 0) bytes_.push_back('\0');
     append_number(value, bytes_);
+    return *this;
   }
-  void string(const std::string& text) {
+  MessageWriter& string(const std::string& text) {
     const std::size_t end = is_ros1_ ? 0 : 1;
     number(static_cast<std::uint32_t>(text.size() + end));
     bytes_.append(text.c_str(), text.size() + end);
+    return *this;
   }
   /// std_msgs/Header; `time`: ns.
-  void header(std::uint64_t time, const std::string& frame) {
+  MessageWriter& header(std::uint64_t time, const std::string& frame) {
     if (is_ros1_) number(std::uint32_t{0});  // sequence number
     number(static_cast<std::uint32_t>(time / kSecondOfLog));
-    number(static_cast<std::uint32_t>(time % kSecondOfLog));
-    string(frame);
+    return number(static_cast<std::uint32_t>(time % kSecondOfLog)).string(frame);
   }
-  void bytes(const std::string& values) { bytes_ += values; }
+  /// geometry_msgs/Pose, or a Transform.
+  MessageWriter& pose(const Pose& T) {
+    for (const double value : Eigen::Vector3d(T.translation())) number(value);
+    for (const double value : Eigen::Vector4d(detail::Quaternion(T.linear()).coeffs()))
+      number(value);
+    return *this;
+  }
+  MessageWriter& raw(const std::string& bytes) {
+    bytes_ += bytes;
+    return *this;
+  }
   const std::string& bytes() const { return bytes_; }
 
  private:
@@ -52,13 +63,11 @@ class MessageWriter {
 inline std::string transform_message(std::uint64_t time, const std::string& parent,
                                      const std::string& child, const Pose& T_parent_child) {
   MessageWriter out(MessageEncoding::kCdr);
-  out.number(std::uint32_t{1});
-  out.header(time, parent);
-  out.string(child);
-  for (const double value : Eigen::Vector3d(T_parent_child.translation())) out.number(value);
-  const detail::Quaternion rotation(T_parent_child.linear());
-  for (const double value : Eigen::Vector4d(rotation.coeffs())) out.number(value);
-  return out.bytes();
+  return out.number(std::uint32_t{1})
+      .header(time, parent)
+      .string(child)
+      .pose(T_parent_child)
+      .bytes();
 }
 
 /// Types of fields; the datatype of sensor_msgs/PointField is the index plus 1.
@@ -92,25 +101,15 @@ inline std::string cloud_message(std::uint64_t time, const std::string& frame,
   const std::uint32_t step = layout.point_size();
   const auto size = static_cast<std::uint32_t>(points.size());
   MessageWriter out(MessageEncoding::kCdr);
-  out.header(time, frame);
-  out.number(std::uint32_t{1});  // height
-  out.number(size / step);
+  out.header(time, frame).number(std::uint32_t{1}).number(size / step);  // one row
   out.number(static_cast<std::uint32_t>(layout.fields.size()));
   std::uint32_t offset = 0;
   for (const CloudLayout::Field& field : layout.fields) {
-    out.string(field.name);
-    out.number(offset);
-    out.number(datatype_of(field.type));
-    out.number(std::uint32_t{1});  // count
+    out.string(field.name).number(offset).number(datatype_of(field.type)).number(std::uint32_t{1});
     offset += static_cast<std::uint32_t>(size_of(field.type));
   }
-  out.number(std::uint8_t{0});  // little endian
-  out.number(step);
-  out.number(size);
-  out.number(size);
-  out.bytes(points);
-  out.number(std::uint8_t{1});  // dense
-  return out.bytes();
+  out.number(std::uint8_t{0}).number(step).number(size);                // little endian
+  return out.number(size).raw(points).number(std::uint8_t{1}).bytes();  // dense
 }
 
 }  // namespace dynains
