@@ -70,20 +70,21 @@ void draw_text(Picture& picture, int x, int y, const std::string& text, Colour c
   }
 }
 
-constexpr double kMargin = 50.0;                  // m around the path
-constexpr double kLongerSide = 1200.0;            // pixels of a panel
-constexpr double kMostPerMetre = 8.0;             // pixels
 constexpr int kInset = 4;                         // pixels around text and panels
 constexpr int kStrip = kTextHeight + 2 * kInset;  // pixels of a title, and of the scale below
 
-struct Palette {
+struct Style {
+  double margin = 50.0;         ///< m around the path
+  double longer_side = 1200.0;  ///< pixels of a panel
+  double most_per_metre = 8.0;  ///< pixels
+  double longest_bar = 200.0;   ///< pixels, of the scale
   Colour ink = {40, 40, 40};
   Colour grey = {150, 150, 150};  ///< static points in a legend
   Colour moving = {30, 80, 220};
   Colour removed = {30, 160, 60};
   Colour pale = {232, 232, 232};
 };
-constexpr Palette kPalette;
+constexpr Style kStyle;
 
 /// One of so many static points of a scan is drawn: later scans show the same places again.
 std::size_t static_step(std::size_t scans) {
@@ -110,27 +111,26 @@ using Entries = std::vector<std::pair<Colour, std::string>>;
 void draw_title(Picture& picture, int x, int y, const std::string& title, const Entries& entries) {
   x += kInset;
   y += kInset;
-  draw_text(picture, x, y, title, kPalette.ink);
+  draw_text(picture, x, y, title, kStyle.ink);
   x += text_width(title + ' ');
   for (const auto& [colour, meaning] : entries) {
     fill(picture, x, y + 2, kTextHeight - 4, kTextHeight - 4, colour);
     x += kTextHeight;
-    draw_text(picture, x, y, meaning, kPalette.ink);
+    draw_text(picture, x, y, meaning, kStyle.ink);
     x += text_width(meaning + "  ");
   }
 }
 
 /// A bar of a round length at the lower border. `scale`: pixels per m.
 void draw_scale(Picture& picture, double scale) {
-  constexpr double kMostPixels = 200.0;
   int metres = 1;
   for (const int next : {2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000}) {
-    if (next * scale <= kMostPixels) metres = next;
+    if (next * scale <= kStyle.longest_bar) metres = next;
   }
   const int length = std::max(1, static_cast<int>(std::lround(metres * scale)));
   const int y = picture.height() - kStrip + kInset;
-  fill(picture, kInset, y + (kTextHeight - kInset) / 2, length, kInset, kPalette.ink);
-  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kPalette.ink);
+  fill(picture, kInset, y + (kTextHeight - kInset) / 2, length, kInset, kStyle.ink);
+  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kStyle.ink);
 }
 
 }  // namespace
@@ -143,9 +143,9 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
     low = low.min(position.head<2>().array());
     high = high.max(position.head<2>().array());
   }
-  low_ = low - kMargin;
-  const Eigen::Array2d size = high + kMargin - low_.array();
-  scale_ = std::min(kMostPerMetre, kLongerSide / size.maxCoeff());
+  low_ = low - kStyle.margin;
+  const Eigen::Array2d size = high + kStyle.margin - low_.array();
+  scale_ = std::min(kStyle.most_per_metre, kStyle.longer_side / size.maxCoeff());
   const auto pixels = [&](double metres) {
     return std::max(1, static_cast<int>(std::ceil(metres * scale_)));
   };
@@ -195,19 +195,19 @@ Picture Overview::picture() const {
       const Pixel& pixel = row[static_cast<std::size_t>(x)];
       const Colour grey = {pixel.grey, pixel.grey, pixel.grey};
       if (pixel.has_moving) {
-        draw(0, x, y, kPalette.moving);
-        draw(2, x, y, kPalette.removed);
+        draw(0, x, y, kStyle.moving);
+        draw(2, x, y, kStyle.removed);
       } else if (pixel.has_static()) {
         draw(0, x, y, grey);
-        draw(2, x, y, kPalette.pale);
+        draw(2, x, y, kStyle.pale);
       }
       if (pixel.has_static()) draw(1, x, y, grey);
     }
   }
-  const Entries before = {{kPalette.grey, "static"}, {kPalette.moving, "moving"}};
+  const Entries before = {{kStyle.grey, "static"}, {kStyle.moving, "moving"}};
   draw_title(picture, 0, 0, "before:", before);
-  draw_title(picture, step_x, step_y, "after:", {{kPalette.grey, "static"}});
-  draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kPalette.removed, "moving"}});
+  draw_title(picture, step_x, step_y, "after:", {{kStyle.grey, "static"}});
+  draw_title(picture, 2 * step_x, 2 * step_y, "removed:", {{kStyle.removed, "moving"}});
   draw_scale(picture, scale_);
   return picture;
 }

@@ -10,12 +10,17 @@
 namespace dynains::las {
 
 inline const std::string kMagic = "LASF";
-inline constexpr std::size_t kHeaderSize12 = 227;  // bytes, of version 1.2
-inline constexpr std::size_t kHeaderSize14 = 375;  // bytes, of version 1.4
-inline constexpr std::size_t kVlrHeaderSize = 54;  // bytes, of a variable length record
 inline constexpr char kSpecUser[] = "LASF_Spec";
 inline constexpr std::uint16_t kExtraBytesRecord = 4;
-inline constexpr std::size_t kExtraBytesSize = 192;  // bytes, of the description of one value
+
+/// Bytes of the parts of a file.
+struct Sizes {
+  std::size_t header_1_2 = 227, header_1_4 = 375;
+  std::size_t before_count = 247;  ///< the number of points in 64 bits, in the header of 1.4
+  std::size_t record_header = 54;  ///< of a variable length record
+  std::size_t extra_bytes = 192;   ///< of the description of one value
+};
+inline constexpr Sizes kSizes;
 
 /// Parts of a point record, by its format.
 struct PointFormat {

@@ -31,12 +31,10 @@ struct LasHeader {
   std::vector<LasColumn> columns;
 };
 
-/// The number of points in 64 bits stands at the end of the header of version 1.4.
 std::uint64_t read_count(RawFile& file, std::uint8_t minor, std::uint32_t legacy_count) {
-  constexpr std::uint64_t kCountPosition = 247;
   if (minor < 4) return legacy_count;
-  const auto bytes = file.read(kCountPosition, 8, "the number of points");
-  return Bytes(file.path(), kCountPosition, bytes.data(), bytes.size())
+  const auto bytes = file.read(las::kSizes.before_count, 8, "the number of points");
+  return Bytes(file.path(), las::kSizes.before_count, bytes.data(), bytes.size())
       .number<std::uint64_t>("the number of points");
 }
 
@@ -58,8 +56,8 @@ void add_fixed_columns(PointSink& sink, LasHeader& header, const las::PointForma
 /// Columns of extra bytes whose names are those of a ring or a label.
 void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
   std::size_t offset = header.extra_begin;
-  while (descriptions.remaining() >= las::kExtraBytesSize) {
-    Bytes fields = descriptions.block(las::kExtraBytesSize, "the description of extra bytes");
+  while (descriptions.remaining() >= las::kSizes.extra_bytes) {
+    Bytes fields = descriptions.block(las::kSizes.extra_bytes, "the description of extra bytes");
     fields.skip(2, "reserved bytes");
     const auto type = fields.number<std::uint8_t>("a type of extra bytes");
     const auto options = fields.number<std::uint8_t>("options of extra bytes");
@@ -86,7 +84,7 @@ void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
 void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
   std::uint64_t position = header.vlr_begin;
   for (std::uint32_t i = 0; i < header.vlr_count; ++i) {
-    const auto head = file.read(position, las::kVlrHeaderSize, "a variable length record");
+    const auto head = file.read(position, las::kSizes.record_header, "a variable length record");
     Bytes fields(file.path(), position, head.data(), head.size());
     fields.skip(2, "reserved bytes");
     const auto* const text = reinterpret_cast<const char*>(fields.here());
@@ -94,7 +92,7 @@ void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
     fields.skip(16, "a user id");
     const auto record = fields.number<std::uint16_t>("a record id");
     const auto size = fields.number<std::uint16_t>("the size of a record");
-    position += las::kVlrHeaderSize;
+    position += las::kSizes.record_header;
     if (user == las::kSpecUser && record == las::kExtraBytesRecord) {
       const auto content = file.read(position, size, "a variable length record");
       add_extra_columns(sink, header, Bytes(file.path(), position, content.data(), content.size()));
@@ -104,8 +102,8 @@ void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
 }
 
 LasHeader read_header(RawFile& file, PointSink& sink) {
-  const auto head =
-      file.read(0, std::min<std::uint64_t>(file.size(), las::kHeaderSize12), "the header of LAS");
+  const auto head = file.read(0, std::min<std::uint64_t>(file.size(), las::kSizes.header_1_2),
+                              "the header of LAS");
   Bytes fields(file.path(), 0, head.data(), head.size());
   if (head.size() < las::kMagic.size() ||
       !std::equal(las::kMagic.begin(), las::kMagic.end(), head.begin())) {

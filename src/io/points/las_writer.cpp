@@ -44,7 +44,6 @@ std::string extra_bytes_vlr() {
 }
 
 constexpr std::uint8_t kLasPointFormat = 6;
-constexpr std::uint16_t kLasPointSize = 30 + 4 + 1 + 4;  // bytes, with extra bytes
 
 }  // namespace
 
@@ -71,10 +70,13 @@ std::string LasWriter::header() const {
   out.number(std::uint8_t{1}).number(std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files
-  out.number(static_cast<std::uint16_t>(las::kHeaderSize14));
-  out.number(static_cast<std::uint32_t>(las::kHeaderSize14 + records.size()));
+  out.number(static_cast<std::uint16_t>(las::kSizes.header_1_4));
+  out.number(static_cast<std::uint32_t>(las::kSizes.header_1_4 + records.size()));
   out.number(std::uint32_t{options_.wkt.empty() ? 1U : 2U});
-  out.number(kLasPointFormat).number(kLasPointSize);
+  const std::size_t extra =
+      sizeof(LasPoint::belief) + sizeof(LasPoint::cause) + sizeof(LasPoint::instance);
+  out.number(kLasPointFormat);
+  out.number(static_cast<std::uint16_t>(las::kPointFormats[kLasPointFormat].size + extra));
   out.zeros(24);  // numbers of points as in older versions
   for (int axis = 0; axis < 3; ++axis) out.number(options_.scale);
   for (const double offset : options_.offset) out.number(offset);

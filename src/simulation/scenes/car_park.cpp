@@ -10,9 +10,13 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kAisleSpeed = 3;     // m/s
-constexpr double kStartInAisle = 40;  // m along the aisle
-constexpr double kLaneOffset = 1.35;  // m beside the centre line
+struct Aisle {
+  double speed = 3;     ///< m/s
+  double start = 40;    ///< m along the aisle
+  double lane = 1.35;   ///< m beside the centre line
+  double radius = 8.5;  ///< m, of the turn to the next one
+};
+constexpr Aisle kAisle;
 
 /// A parking place: arc length (m) along the aisle, and its side (+1 left, -1 right).
 struct Place {
@@ -22,13 +26,12 @@ struct Place {
 
 /// Straight aisles joined by U-turns that alternate.
 std::vector<Bend> serpentine(double aisle, double least_length) {
-  constexpr double kRadius = 8.5;
   std::vector<Bend> bends{{aisle, 0}};
   double length = aisle;
   for (int turn = 1; length < least_length || bends.size() < 7; turn = -turn) {
-    bends.push_back({kPi * kRadius, turn / kRadius});
+    bends.push_back({kPi * kAisle.radius, turn / kAisle.radius});
     bends.push_back({aisle, 0});
-    length += kPi * kRadius + aisle;
+    length += kPi * kAisle.radius + aisle;
   }
   return bends;
 }
@@ -101,7 +104,7 @@ bool add_moving_car(Builder& builder, const Street& street, const Place& place, 
   Waypoint spot = street.centre.beside(place.s, place.side * 6.0);
   spot.heading += place.side > 0 ? -kPi / 2 : kPi / 2;
   const double s_lane = place.s + (leaving ? 7.5 : -7.5) * (place.side < 0 ? 1 : -1);
-  const double lateral = place.side < 0 ? -kLaneOffset : kLaneOffset;
+  const double lateral = place.side < 0 ? -kAisle.lane : kAisle.lane;
   Waypoint lane = street.centre.beside(s_lane, lateral);
   if (place.side > 0) lane.heading += kPi;
   const Footprint room{spot.position, spot.heading, 2.5, 1.2};
@@ -114,10 +117,10 @@ bool add_moving_car(Builder& builder, const Street& street, const Place& place, 
   if (!builder.is_free_of_drivers(route.at(0), 3.5)) return false;
   const std::size_t object = traffic.add_object(Kind::kCar);
   const std::size_t path = traffic.add_lane(std::move(route));
-  Traffic::Driver& driver = traffic.add_driver(object, path, leaving ? 0 : 1, kAisleSpeed);
+  Traffic::Driver& driver = traffic.add_driver(object, path, leaving ? 0 : 1, kAisle.speed);
   if (leaving) {
     driver.speed = 0;
-    driver.schedule = {{0, 0}, {start, kAisleSpeed}};
+    driver.schedule = {{0, 0}, {start, kAisle.speed}};
     driver.waits_for_gap = true;
   } else {
     driver.stays_at_end = true;
@@ -250,9 +253,9 @@ void roof_over(Builder& builder, Random& random, const Street& street) {
 
 World parking_level(const Config& config, Random& random, bool roofed) {
   const double aisle = random.uniform(60, 90);
-  const double drive = travel(config, kAisleSpeed);
+  const double drive = travel(config, kAisle.speed);
   std::vector<Street> streets{
-      {route_of_bends(serpentine(aisle, 2 * kStartInAisle + drive + 60)), 3.3, 0}};
+      {route_of_bends(serpentine(aisle, 2 * kAisle.start + drive + 60)), 3.3, 0}};
   TerrainConfig ground;
   ground.kerb = 0;
   ground.roughness = 0.03;
@@ -265,16 +268,16 @@ World parking_level(const Config& config, Random& random, bool roofed) {
   ground.open_label = semantic::kParking;
   Builder builder(config, ground, std::move(streets));
   const Street& street = builder.street(0);
-  const std::size_t forward = builder.lane(street, -kLaneOffset);
-  const std::size_t backward = builder.lane(street, kLaneOffset);
-  builder.ego(forward, kStartInAisle, kAisleSpeed);
+  const std::size_t forward = builder.lane(street, -kAisle.lane);
+  const std::size_t backward = builder.lane(street, kAisle.lane);
+  builder.ego(forward, kAisle.start, kAisle.speed);
 
   const double occupied = random.uniform(0.55, 0.9);
-  const double from = kStartInAisle - 30, to = kStartInAisle + drive + 60;
+  const double from = kAisle.start - 30, to = kAisle.start + drive + 60;
   const std::vector<Place> places = find_places(builder, random, street, roofed);
   fill_places(builder, random, street, places, occupied, from, to);
-  fill_lane(builder, forward, 45, kAisleSpeed, 0, 0, 0);
-  fill_lane(builder, backward, 40, kAisleSpeed, 0, 0, 0);
+  fill_lane(builder, forward, 45, kAisle.speed, 0, 0, 0);
+  fill_lane(builder, backward, 40, kAisle.speed, 0, 0, 0);
   add_walkers(builder, random, street, from, to);
   if (roofed) {
     roof_over(builder, random, street);
