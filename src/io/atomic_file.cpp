@@ -127,17 +127,12 @@ struct OpenTemporary {
 /// A new file. Throws IoError.
 OpenTemporary open_temporary(const fs::path& target) {
   const std::string name = target.filename().string();
-  constexpr int kAttempts = 100;
-  OpenTemporary file;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    file.path = target;
-    file.path.replace_filename('.' + name + '.' + random_digits() + std::string(kTemporaryEnd));
-    file.descriptor =
-        ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-    if (file.descriptor >= 0) return file;
-    if (errno != EEXIST) break;
-  }
-  fail_by_system(target, "cannot be written", errno);
+  OpenTemporary file{target};
+  file.path.replace_filename('.' + name + '.' + random_digits() + std::string(kTemporaryEnd));
+  file.descriptor =
+      ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (file.descriptor < 0) fail_by_system(target, "cannot be written", errno);
+  return file;
 }
 
 /// A rename is on the disk when its folder is. Some file systems cannot sync folders (EINVAL), and

@@ -86,8 +86,7 @@ std::size_t add_npy_field(const NpyLiteral& literal, const std::string& name,
   std::uint32_t size = 0;
   const char* const begin = text.data() + std::min<std::size_t>(1, text.size());
   const auto [stop, error] = std::from_chars(begin, text.data() + text.size(), size);
-  constexpr std::uint32_t kLargest = 1U << 20U;
-  if (text.empty() || error != std::errc{} || size == 0 || size > kLargest) {
+  if (text.empty() || error != std::errc{} || size == 0 || size > kLargestNpyField) {
     literal.fail("expected a type such as '<f4', found '" + type.substr(0, 40) + '\'');
   }
   struct Type {

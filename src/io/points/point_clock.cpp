@@ -51,12 +51,10 @@ struct DirectedTime {
   double time;
 };
 
-/// Some of the points with a return, by azimuth.
+/// The points with a return, by azimuth.
 std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
-  constexpr std::size_t kMost = 4096;
-  const std::size_t step = 1 + scan.time.size() / kMost;
   std::vector<DirectedTime> times;
-  for (std::size_t k = 0; k < scan.time.size(); k += step) {
+  for (std::size_t k = 0; k < scan.time.size(); ++k) {
     const float* const xyz = scan.xyzi.data() + 4 * k;
     if (!std::isfinite(scan.time[k]) || !has_return(xyz)) continue;
     times.push_back({std::atan2(xyz[1], xyz[0]), scan.time[k]});
