@@ -47,38 +47,23 @@ kill_run() {
 # as NAME: whether the results are those of $work/NAME.
 as() { complete "$work/out" && same "$work/$1" "$work/out"; }
 
-echo "--- kill -9, $kills times within $((span / 1000)) ms: nothing, or the whole results"
+"$program" run "$seq" --out "$work/earlier" --end 4 --write-online --quiet
+echo "--- kill -9, $kills times within $((span / 1000)) ms: the earlier results or the new ones, whole"
 left=0
 for ((i = 0; i < kills || (left == 0 && i < kills + 20); ++i)); do
-  kill_run
+  rm -rf "$work"/out*
+  # Every second run replaces earlier results.
+  ((i % 2)) || cp -r "$work/earlier" "$work/out"
+  kill_run --force
   [[ ! -d $work/out.partial ]] || left=$((left + 1))
-  [[ ! -d $work/out ]] || as expected || fail "kill $i left a part"
-  # Two of three runs find what earlier ones left.
-  ((i % 3 == 2)) || continue
-  [[ -d $work/out ]] || "$program" run "$seq" --out "$work/out" --quiet || fail "kill $i: again"
-  "$program" run "$seq" --out "$work/out" --force --quiet || fail "kill $i: --force"
+  [[ ! -d $work/out ]] || as earlier >/dev/null || as expected || fail "kill $i left a part"
+  [[ -d $work/out ]] || ((i % 2)) || fail "kill $i: the earlier results are lost"
+  "$program" run "$seq" --out "$work/out" --force --quiet || fail "kill $i: again"
   as expected || fail "kill $i: other bytes"
-  [[ $(ls "$work") != *partial* ]] || fail "kill $i: leftovers"
-  rm -rf "$work/out"
+  [[ ! -d $work/out/online && $(ls "$work") != *partial* ]] || fail "kill $i: leftovers"
 done
-rm -rf "$work"/out*
 echo "$left of them left a folder"
 ((left > 0)) || fail "no kill hit a run"
-
-echo "--- kill -9 of --force: the earlier results or the new ones, whole"
-"$program" run "$seq" --out "$work/earlier" --end 4 --write-online --quiet
-kept=0
-for ((i = 0; i < kills; ++i)); do
-  rm -rf "$work"/out*
-  cp -r "$work/earlier" "$work/out"
-  kill_run --force
-  if as earlier; then kept=$((kept + 1)); else as expected || fail "kill $i of --force"; fi
-  "$program" run "$seq" --out "$work/out" --force --quiet || fail "kill $i of --force: again"
-  as expected || fail "kill $i of --force: other bytes"
-  [[ ! -d $work/out/online && $(ls "$work") != *partial* ]] || fail "kill $i of --force: leftovers"
-done
-echo "$kept of them left the earlier results"
-((kept > 0)) || fail "no kill of --force left the earlier results"
 
 echo "--- input that vanishes in the middle"
 cp -r "$seq" "$work/vanishing"
