@@ -104,46 +104,35 @@ inline void check_refused(const Outcome& outcome, int code, const std::string& w
 }
 
 /// Output of `dynains ARGUMENTS` on a pseudo-terminal. Throws unless the exit code is 0.
-inline std::string show_on_terminal(Arguments arguments) {
+inline std::string show_on_terminal(const Arguments& arguments) {
   const int screen = ::posix_openpt(O_RDWR | O_NOCTTY);
   if (screen < 0 || ::grantpt(screen) != 0 || ::unlockpt(screen) != 0) {
     throw std::runtime_error("no pseudo terminal");
   }
-  std::vector<char*> argv;
-  arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
   const std::string terminal = ::ptsname(screen);
-  const pid_t id = ::fork();
-  if (id < 0) throw std::runtime_error("fork failed");
-  if (id == 0) {
+  Process process(arguments, [&] {
     const int to = ::open(terminal.c_str(), O_RDWR | O_NOCTTY);
-    ::dup2(to, STDOUT_FILENO);
-    ::dup2(to, STDERR_FILENO);
-    ::close(to);
-    ::close(screen);
-    ::execv(DYNAINS_PROGRAM, argv.data());
-    ::_exit(127);
-  }
+    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(to, stream);
+    for (const int descriptor : {to, screen}) ::close(descriptor);
+  });
   // read() fails if no process has the other end open: after the child has ended, and also before
   // it has opened the terminal.
   std::string shown;
-  int status = 0;
-  bool ended = false;
+  siginfo_t end{};
   while (true) {
     char part[256];
     const ssize_t count = ::read(screen, part, sizeof(part));
     if (count > 0) {
       shown.append(part, static_cast<std::size_t>(count));
-    } else if (ended) {
+    } else if (end.si_pid != 0) {
       break;
     } else {
-      ended = ::waitpid(id, &status, WNOHANG) == id;
+      ::waitid(P_PID, static_cast<id_t>(process.id()), &end, WEXITED | WNOHANG | WNOWAIT);
       ::usleep(1000);
     }
   }
   ::close(screen);
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) throw std::runtime_error(shown);
+  if (process.wait().code != 0) throw std::runtime_error(shown);
   return shown;
 }
 

@@ -1,8 +1,7 @@
 // Prints a fingerprint of all answers of the remover on a small scene, for each preset.
-#include <cstdint>
 #include <cstdio>
-#include <cstring>
 
+#include "io/fingerprint.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 
@@ -10,25 +9,6 @@ namespace {
 
 using namespace dynains;
 using namespace dynains::test;
-
-/// FNV-1a, 64 bits.
-class Fingerprint {
- public:
-  template <class T>
-  void add(const T& value) {
-    unsigned char bytes[sizeof(T)];
-    std::memcpy(bytes, &value, sizeof(T));
-    for (const unsigned char byte : bytes) value_ = (value_ ^ byte) * 0x100000001B3U;
-  }
-  template <class T>
-  void add_all(const std::vector<T>& values) {
-    for (const T& value : values) add(value);
-  }
-  unsigned long long value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xCBF29CE484222325U;
-};
 
 /// A floor and boxes. Every second box moves. Coordinates are exact in float, so that neither
 /// rounding nor libm has an influence.
@@ -67,18 +47,22 @@ int main() {
     const std::vector<Scan> scans = scene();
     const Run result = run(remover, scans);
     Fingerprint fingerprint;
+    const auto add_bytes = [&](const auto& values) {
+      fingerprint.add(values.data(), values.size() * sizeof(values[0]));
+    };
     for (const std::vector<Verdict>* verdicts : {&result.newest, &result.final}) {
       for (const Verdict& verdict : *verdicts) {
-        fingerprint.add_all(verdict.labels);
-        fingerprint.add_all(verdict.instances);
-        fingerprint.add_all(verdict.beliefs);
+        add_bytes(verdict.labels);
+        add_bytes(verdict.instances);
+        add_bytes(verdict.beliefs);
       }
     }
     remover.map().for_each([&](const Eigen::Vector3d& point) {
       for (int axis = 0; axis < 3; ++axis) fingerprint.add(point[axis]);
     });
     const Share moving = share(scans, result.final, PointLabel::kDynamic);
-    std::printf("%016llx %zu moving points, map of %zu\n", fingerprint.value(), moving.labelled,
+    std::printf("%016llx %zu moving points, map of %zu\n",
+                static_cast<unsigned long long>(fingerprint.value()), moving.labelled,
                 remover.map().size());
   }
   return 0;

@@ -16,7 +16,7 @@ for compiler in g++ clang++ clang++-14; do
   [[ $seen != *"$path;"* ]] || continue
   seen+="$path;"
   compilers=$((compilers + 1))
-  compile=("$compiler" -std=c++17 -ffp-contract=off -I"$root/include" -I"$root/tests" -isystem "$1")
+  compile=("$compiler" -std=c++17 -ffp-contract=off -I"$root/include" -I"$root/src" -I"$root/tests" -isystem "$1")
   "${compile[@]}" -O1 -c "$root/tests/reliability/determinism.cpp" -o "$work/program.o"
   for level in -O0 "-O3 -DNDEBUG"; do
     remover=$library
