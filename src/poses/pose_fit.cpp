@@ -3,12 +3,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <utility>
 
 #include "dynains/median.hpp"
-#include "dynains/threads/background.hpp"
 #include "given_motion.hpp"
+#include "in_two_threads.hpp"
 #include "landmarks.hpp"
 #include "scan_registration.hpp"
 #include "way_search.hpp"
@@ -237,58 +236,38 @@ std::vector<std::size_t> starts_of_chains(std::size_t scans) {
   return starts;
 }
 
-/// Motions from one scan to others behind it, ever farther apart.
-class Chain {
- public:
-  Chain(const Recording& recording, std::size_t number, std::size_t first)
-      : recording_(&recording), number_(number), first_(first) {}
-
-  const std::vector<RegisteredMotion>& motions() const { return motions_; }
-
-  /// Registers the next scan. `elsewhere`: a motion from one scan to the next at another place.
-  void begin(const std::optional<Pose>& elsewhere) {
-    a_ = read(first_);
-    add(1, first_guesses(motion_between(*recording_, first_, first_ + 1), elsewhere),
-        kFarthestStep);
-  }
-
-  /// Registers scans ever farther away, from the motion found before.
-  void finish() {
-    constexpr std::size_t kLongest = 9;  // scans
-    constexpr double kFar = 3.0;         // m, at points kLever away
-    for (std::size_t step = 3; step <= kLongest && !motions_.empty(); step *= 3) {
-      const Pose T = motions_.back().T_first_second;
-      if (extent_of(T) > kFar || first_ + step >= recording_->size()) break;
-      const Pose guess = T * T * T;
-      if (!add(step, {guess}, kFarthestFromGuess)) break;
-      const Pose& found = motions_.back().T_first_second;
-      if ((found.translation() - guess.translation()).norm() < kFarthestFromGuess) continue;
-      motions_.pop_back();
-      break;
-    }
-    a_.reset();
-  }
-
- private:
-  std::unique_ptr<ChainScan> read(std::size_t i) const {
-    return std::make_unique<ChainScan>(sampled_points(recording_->read_scan(i)));
-  }
-  bool add(std::size_t step, const std::vector<Pose>& guesses, double farthest) {
-    const std::size_t second = first_ + step;
-    const auto found = register_both_ways(
-        *a_, *read(second), motion_between(*recording_, first_, second), guesses, farthest);
+/// Motions from scan `first` to others behind it, ever farther apart. `elsewhere`: a motion from
+/// one scan to the next at another place.
+std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t number,
+                                       std::size_t first, const std::optional<Pose>& elsewhere) {
+  constexpr std::size_t kLongest = 9;  // scans
+  constexpr double kFar = 3.0;         // m, at points kLever away
+  const auto read = [&](std::size_t i) {
+    return ChainScan(sampled_points(recording.read_scan(i)));
+  };
+  const ChainScan a = read(first);
+  std::vector<RegisteredMotion> motions;
+  const auto add = [&](std::size_t second, const std::vector<Pose>& guesses, double farthest) {
+    const auto found = register_both_ways(a, read(second), motion_between(recording, first, second),
+                                          guesses, farthest);
     if (!found) return false;
-    motions_.push_back(
-        {number_, first_, second, found->T_a_b, found->difference, found->deviation});
+    motions.push_back({number, first, second, found->T_a_b, found->difference, found->deviation});
     return true;
+  };
+  add(first + 1, first_guesses(motion_between(recording, first, first + 1), elsewhere),
+      kFarthestStep);
+  for (std::size_t step = 3; step <= kLongest && !motions.empty(); step *= 3) {
+    const Pose T = motions.back().T_first_second;
+    if (extent_of(T) > kFar || first + step >= recording.size()) break;
+    const Pose guess = T * T * T;
+    if (!add(first + step, {guess}, kFarthestFromGuess)) break;
+    const Pose& found = motions.back().T_first_second;
+    if ((found.translation() - guess.translation()).norm() < kFarthestFromGuess) continue;
+    motions.pop_back();
+    break;
   }
-
-  const Recording* recording_;
-  std::size_t number_;
-  std::size_t first_;
-  std::unique_ptr<ChainScan> a_;  // the first scan
-  std::vector<RegisteredMotion> motions_;
-};
+  return motions;
+}
 
 }  // namespace
 
@@ -298,26 +277,18 @@ std::vector<RegisteredMotion> register_motions(
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording.size());
-  std::optional<Chain> before;
   std::optional<Pose> elsewhere;
-  Background other;
-  const auto finish = [&] {
-    if (before) before->finish();
-  };
-  const auto take = [&] {
-    if (before) motions.insert(motions.end(), before->motions().begin(), before->motions().end());
-    return suffice(motions);
-  };
-  for (std::size_t number = 0; number < starts.size(); ++number) {
-    Chain chain(recording, number, starts[number]);
-    run_both(
-        &other, [&] { chain.begin(elsewhere); }, finish);
-    if (take()) return motions;
-    if (!chain.motions().empty()) elsewhere = chain.motions().front().T_first_second;
-    before.emplace(std::move(chain));
+  for (std::size_t number = 0; number < starts.size(); number += 2) {
+    const auto chains =
+        in_two_threads(std::min<std::size_t>(2, starts.size() - number), [&](std::size_t k) {
+          return chain_at(recording, number + k, starts[number + k], elsewhere);
+        });
+    for (const std::vector<RegisteredMotion>& chain : chains) {
+      motions.insert(motions.end(), chain.begin(), chain.end());
+      if (!chain.empty()) elsewhere = chain.front().T_first_second;
+    }
+    if (suffice(motions)) break;
   }
-  finish();
-  take();
   return motions;
 }
 
