@@ -49,7 +49,7 @@ std::vector<Pose> guesses() {
 /// near `places` (m, frame of the city). Adds the names of these sessions.
 PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& places,
                         const Eigen::Vector3d& origin, std::set<std::string>& names) {
-  constexpr double kNear = kReach + 8.0;  // m
+  constexpr double near = kReach + SessionAligner::kMostTranslation;  // m
   const SessionGrid& grid = city.grid();
   std::map<TileIndex, std::size_t> counts;
   PointBuffer points;
@@ -59,7 +59,7 @@ PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& pl
       const Eigen::Vector3d corner = tile_corner(grid, tile);
       const auto is_near = [&](const Eigen::Vector3d& place) {
         const Eigen::Array2d from_corner = (place - corner).head<2>().array();
-        return (from_corner > -kNear).all() && (from_corner < grid.tile + kNear).all();
+        return (from_corner > -near).all() && (from_corner < grid.tile + near).all();
       };
       if (!std::any_of(places.begin(), places.end(), is_near) || counts[tile]++ >= kNewest)
         continue;

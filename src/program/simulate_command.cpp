@@ -1,3 +1,4 @@
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -15,13 +16,14 @@
 namespace dynains::program {
 namespace {
 
-constexpr const char* kFolder = "kitti";
-constexpr const char* kLog = "mcap";
+enum class Format { kKitti, kMcap };
+constexpr std::array<const char*, 2> value_names(Format) { return {"kitti", "mcap"}; }
+
 constexpr const char* kLogName = "drive.mcap";
 
 struct SimulateOptions {
   std::string out;
-  std::string format = kFolder;
+  Format format = Format::kKitti;
   bool force = false;
   bool quiet = false;
   ParameterValues flags;  // that were given
@@ -37,7 +39,7 @@ simulation::Config make_config(const SimulateOptions& options) {
     values.apply(config);
   }
   config.validate();
-  if (config.rolling_shutter && config.deskewed <= 0 && options.format == kFolder) {
+  if (config.rolling_shutter && config.deskewed <= 0 && options.format == Format::kKitti) {
     throw ConfigError(
         "--rolling-shutter needs --format mcap, or --deskewed: a folder as of "
         "KITTI has no times of points");
@@ -50,10 +52,10 @@ const OutputKind& simulation_output_kind() {
   return kind;
 }
 
-OutputListing listing_of(const simulation::Simulator& simulator, const std::string& format) {
+OutputListing listing_of(const simulation::Simulator& simulator, Format format) {
   const simulation::Config& config = simulator.config();
   OutputListing listing;
-  if (format != kFolder) {
+  if (format == Format::kMcap) {
     listing.files = {kLogName};
     return listing;
   }
@@ -71,7 +73,7 @@ OutputListing listing_of(const simulation::Simulator& simulator, const std::stri
 /// Everything that is needed to make this sequence again.
 nlohmann::ordered_json describe(const SimulateOptions& options, const simulation::Config& config) {
   nlohmann::ordered_json json = begin_marker(simulation_output_kind());
-  json["format"] = options.format;
+  json["format"] = plain_value(options.format);
   simulation::Config::visit(
       config, [&](const auto& parameter) { json[parameter.name] = plain_value(parameter.value); });
   return json;
@@ -85,8 +87,9 @@ bool write_scans(simulation::Simulator& simulator, const std::filesystem::path& 
     progress.update(done);
     return InterruptGuard::signal() == 0;
   };
-  return options.format == kFolder ? simulation::write_sequence(simulator, folder, count)
-                                   : simulation::write_log(simulator, folder / kLogName, count);
+  return options.format == Format::kKitti
+             ? simulation::write_sequence(simulator, folder, count)
+             : simulation::write_log(simulator, folder / kLogName, count);
 }
 
 void simulate(const SimulateOptions& options) {
@@ -98,7 +101,8 @@ void simulate(const SimulateOptions& options) {
   if (!write_scans(simulator, out.path(), options)) throw Interrupted{InterruptGuard::signal()};
   out.finish(describe(options, config));
   const std::filesystem::path folder = options.out;
-  const std::filesystem::path sequence = options.format == kFolder ? folder : folder / kLogName;
+  const std::filesystem::path sequence =
+      options.format == Format::kKitti ? folder : folder / kLogName;
   if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
@@ -112,11 +116,8 @@ void add_simulate_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command.add_flag("--force", options->force, "replace an earlier simulation in OUT");
-  command
-      .add_option("--format", options->format,
-                  "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap [kitti]")
-      ->check(CLI::IsMember({kFolder, kLog}))
-      ->type_name("kitti|mcap");
+  SettingFlags{command}(Parameter{"format", options->format, Bounds(), "",
+                                  "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap"});
   command.add_flag("-q,--quiet", options->quiet, "print errors only");
   add_parameter_flags(command, simulation::Config(), "Parameters", options->flags);
   command.footer(

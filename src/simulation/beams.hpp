@@ -13,15 +13,16 @@ namespace dynains::simulation {
 
 /// Constants of a sensor type; angles in radians.
 struct SensorTraits {
-  int columns = 0;         ///< per turn; beams per scan for the rosette
-  double height = 0;       ///< m, usual height over ground
-  double max_range = 0;    ///< m
-  double min_range = 0;    ///< m
-  double dark_range = 0;   ///< m, where 10 % reflectivity is found nine times out of ten
-  double yaw = 0;          ///< sensor x axis from the vehicle's forward direction
-  double width = 2 * kPi;  ///< of the rings, around the x axis
-  bool dome = false;       ///< without rings: all around instead of a rosette
-  int lasers = 0;          ///< in turn, for beams without rings
+  int columns = 0;          ///< per turn; beams per scan for the rosette
+  double height = 0;        ///< m, usual height over ground
+  double max_range = 0;     ///< m
+  double min_range = 0;     ///< m
+  double dark_range = 0;    ///< m, where 10 % reflectivity is found nine times out of ten
+  double yaw = 0;           ///< sensor x axis from the vehicle's forward direction
+  double width = 2 * kPi;   ///< of the rings, around the x axis
+  bool dome = false;        ///< without rings: all around instead of a rosette
+  int lasers = 0;           ///< in turn, for beams without rings
+  std::size_t packet = 12;  ///< columns that are sent together
 };
 
 struct SensorModel : SensorTraits {

@@ -9,10 +9,8 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr std::size_t kPacketColumns = 12;
-constexpr std::size_t kPacketBeams = 96;  // of sensors without rings
-constexpr float kPulse = 1.5F;            // m; nearer surfaces make one return
-constexpr float kBetween = 0.25F;         // m from both surfaces: a point of neither
+constexpr float kPulse = 1.5F;     // m; nearer surfaces make one return
+constexpr float kBetween = 0.25F;  // m from both surfaces: a point of neither
 
 float power_of(const Surface& surface, float share) {
   return share * surface.reflectivity / std::max(surface.range * surface.range, 0.01F);
@@ -36,8 +34,8 @@ Surface one_return(const Surface& own, const Surface& other, float share) {
 
 bool Returns::is_lost(std::size_t column, std::uint64_t seed) const {
   if (config_.packet_loss <= 0) return false;
-  const std::size_t packet = column / (model_.elevations.empty() ? kPacketBeams : kPacketColumns);
-  return unit_float(mix(mix(seed, 15), packet)) < static_cast<float>(config_.packet_loss);
+  return unit_float(mix(mix(seed, 15), column / model_.packet)) <
+         static_cast<float>(config_.packet_loss);
 }
 
 float Returns::bias_of(int laser) const {
