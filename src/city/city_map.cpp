@@ -55,7 +55,7 @@ class Candidates {
     for (const std::uint32_t block : members) {
       bool touches = false;
       for_each_touching(points_.keys[block], [&](VoxelKey key) {
-        touches = touches || standing_.find(key) != VoxelHashTable<>::kNone;
+        touches = touches || standing_.find(key) != kNoIndex;
       });
       contacts += touches ? 1.0F : 0.0F;
       for (const auto& [session, i] : points_.values[block]) {
@@ -86,7 +86,7 @@ CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, st
     return session_voxel(grid, history.points(session)[i]);
   };
   const auto is_in = [](const VoxelHashTable<>& voxels, VoxelKey key) {
-    return voxels.find(key) != VoxelHashTable<>::kNone;
+    return voxels.find(key) != kNoIndex;
   };
   history.for_each_standing(
       a, [&](std::size_t session, std::size_t i) { before.insert(voxel(session, i)); });

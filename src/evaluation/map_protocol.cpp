@@ -48,7 +48,7 @@ class RadiusLookup {
   /// `key`: that of `p` in grid().
   bool contains(const Eigen::Vector3d& p, VoxelKey key) const {
     const std::uint32_t cell = cells_.index().find(key);
-    if (cell == VoxelHashTable<>::kNone) return false;
+    if (cell == kNoIndex) return false;
     const Span<const std::uint32_t> near = cells_.points(cell);
     return std::any_of(near.begin(), near.end(), [&](std::uint32_t i) {
       return (points_[i] - p).squaredNorm() <= squared_radius_;
@@ -110,7 +110,7 @@ class MapProtocol::Impl {
     finish_first_pass();
     detail::for_each_point(scan, grid_, gate_,
                            [&](std::size_t i, const Eigen::Vector3d& p, VoxelKey key) {
-                             if (near_mixed_.find(key) == VoxelHashTable<>::kNone) return;
+                             if (near_mixed_.find(key) == kNoIndex) return;
                              approach({p, settings_.truth(scan.truth[i])}, key);
                            });
   }
@@ -172,7 +172,7 @@ class MapProtocol::Impl {
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
       detail::for_each_around(groups_.key(cell), [&](VoxelKey key) {
         const std::uint32_t number = measured_.find(key);
-        if (number != VoxelHashTable<>::kNone) truths_[cell] |= measured_truths_[number];
+        if (number != kNoIndex) truths_[cell] |= measured_truths_[number];
       });
       if (!detail::is_mixed(truths_[cell])) continue;
       detail::for_each_around(groups_.key(cell), [&](VoxelKey key) { near_mixed_.insert(key); });
@@ -183,7 +183,7 @@ class MapProtocol::Impl {
   void approach(const VoxelPoint& point, VoxelKey key) {
     detail::for_each_around(key, [&](VoxelKey at) {
       const std::uint32_t cell = groups_.index().find(at);
-      if (cell == VoxelHashTable<>::kNone || !detail::is_mixed(truths_[cell])) return;
+      if (cell == kNoIndex || !detail::is_mixed(truths_[cell])) return;
       // Skips voxels whose map points have nearer measured points already: most, in dense maps.
       if (grid_.squared_distance(point.p_world, at) >= farthest_[cell]) return;
       double farthest = 0;

@@ -47,9 +47,7 @@ class VoxelProtocol::Impl {
 
   void resolve(const LabelledScan& scan) {
     nearest_.resize(forks_.size(), std::numeric_limits<double>::infinity());
-    const auto is_forked = [this](VoxelKey key) {
-      return forked_.find(key) != VoxelHashTable<>::kNone;
-    };
+    const auto is_forked = [this](VoxelKey key) { return forked_.find(key) != kNoIndex; };
     voxelise(scan, is_forked, [this](const ScanVoxel& voxel) { compare(voxel); });
   }
 
@@ -58,7 +56,7 @@ class VoxelProtocol::Impl {
     const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
     for (std::size_t number = 0; number < voxels_.size(); ++number) {
       const Voxel& voxel = voxels_[number];
-      if (voxel.fork == VoxelHashTable<>::kNone) {  // the estimate has the same point
+      if (voxel.fork == kNoIndex) {  // the estimate has the same point
         detail::count(score, voxel.shared.truth(), true);
         continue;
       }
@@ -117,11 +115,11 @@ class VoxelProtocol::Impl {
   /// which layers differ gives each layer a separate cell, `forks_[fork + layer]`.
   struct Voxel {
     Cell shared;
-    std::uint32_t fork = VoxelHashTable<>::kNone;
+    std::uint32_t fork = kNoIndex;
   };
 
   const Cell& cell(const Voxel& voxel, std::size_t layer) const {
-    return voxel.fork == VoxelHashTable<>::kNone ? voxel.shared : forks_[voxel.fork + layer];
+    return voxel.fork == kNoIndex ? voxel.shared : forks_[voxel.fork + layer];
   }
 
   std::optional<VoxelPoint> point(const Voxel& voxel, std::size_t layer) const {
@@ -181,11 +179,11 @@ class VoxelProtocol::Impl {
       keys_.push_back(found.key);
     }
     Voxel& voxel = voxels_[number];
-    if (voxel.fork == VoxelHashTable<>::kNone && found.layers == all_layers_) {
+    if (voxel.fork == kNoIndex && found.layers == all_layers_) {
       voxel.shared.add(found.point);
       return;
     }
-    if (voxel.fork == VoxelHashTable<>::kNone) {
+    if (voxel.fork == kNoIndex) {
       voxel.fork = static_cast<std::uint32_t>(layers_) * forked_.insert(found.key);
       forks_.resize(forks_.size() + layers_, voxel.shared);
     }

@@ -45,7 +45,7 @@ const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& p
   const std::size_t coarsest = with_clutter_ ? 0 : level;
   for (std::size_t k = level + 1; k-- > coarsest;) {
     const std::uint32_t number = levels_[k].numbers.find(voxel_at(point, kCellEdges[k]));
-    if (number == VoxelHashTable<>::kNone) continue;
+    if (number == kNoIndex) continue;
     const Cell& cell = levels_[k].cells[number];
     if (!cell.is_fitted) cell.surface = surface_of(cell);
     cell.is_fitted = true;

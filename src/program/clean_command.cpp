@@ -52,7 +52,7 @@ class MapVotes {
       // The first point is the centre of its voxel.
       if (!origin_ && point.allFinite()) origin_ = point.array() - 0.5 * voxel;
       const std::optional<VoxelKey> key = key_of(point);
-      voxels_.push_back(key ? table_.insert(*key) : VoxelHashTable<>::kNone);
+      voxels_.push_back(key ? table_.insert(*key) : kNoIndex);
     }
     counts_.resize(table_.size());
   }
@@ -62,14 +62,13 @@ class MapVotes {
   /// Adds a point of a scan, in the world frame.
   void add(const Eigen::Vector3d& point, bool is_moving) {
     const std::optional<VoxelKey> key = key_of(point);
-    const std::uint32_t voxel = key ? table_.find(*key) : VoxelHashTable<>::kNone;
-    if (voxel != VoxelHashTable<>::kNone)
-      ++(is_moving ? counts_[voxel].moving : counts_[voxel].rest);
+    const std::uint32_t voxel = key ? table_.find(*key) : kNoIndex;
+    if (voxel != kNoIndex) ++(is_moving ? counts_[voxel].moving : counts_[voxel].rest);
   }
 
   /// Verdict on point `i` of the map.
   Verdict verdict(std::size_t i) const {
-    if (voxels_[i] == VoxelHashTable<>::kNone) return Verdict::kUnseen;
+    if (voxels_[i] == kNoIndex) return Verdict::kUnseen;
     const Counts& counts = counts_[voxels_[i]];
     if (counts.moving > counts.rest) return Verdict::kMoving;
     return counts.rest > 0 ? Verdict::kStatic : Verdict::kUnseen;

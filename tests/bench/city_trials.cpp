@@ -169,8 +169,7 @@ void judge_map(const City& city, std::vector<Day>& days, Result& result) {
           Count& gone = session == last ? result.gone_last : result.gone;
           gone.kept += stands ? 1 : 0;
         } else if (instance_of(point.label) == 0) {
-          result.fixed.add(standing.find(session_voxel(city.grid(), point)) !=
-                           VoxelHashTable<>::kNone);
+          result.fixed.add(standing.find(session_voxel(city.grid(), point)) != kNoIndex);
         }
       }
     }
@@ -194,7 +193,7 @@ void judge_map(const City& city, std::vector<Day>& days, Result& result) {
             const VoxelKey voxel = session_voxel(city.grid(), point);
             const std::size_t before = seen.size();
             if (seen.insert(voxel) != before) continue;
-            result.fixed_far.add(standing_of[tile].find(voxel) != VoxelHashTable<>::kNone);
+            result.fixed_far.add(standing_of[tile].find(voxel) != kNoIndex);
           }
         });
   }

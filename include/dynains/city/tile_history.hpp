@@ -14,7 +14,6 @@
 #include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/simd/bits.hpp"
-#include "dynains/voxels/touching_voxels.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -75,7 +74,7 @@ class TileHistory {
     for (const SessionPoint& point : session.points) {
       const std::uint32_t block = blocks_.add(block_of(session_voxel(grid_, point)));
       std::uint32_t& newest = blocks_.values[block].newest_part;
-      if (newest == kNone || parts_[newest].session != number) {
+      if (newest == kNoIndex || parts_[newest].session != number) {
         parts_.push_back({number, block, newest});
         newest = static_cast<std::uint32_t>(parts_.size() - 1);
       }
@@ -103,7 +102,7 @@ class TileHistory {
     for (std::size_t i = 0; i < tested_.cells.size(); ++i) {
       const auto [free, hit] = visibility.bits(tested_.begin[i], tested_.begin[i + 1]);
       if ((free | hit) == 0) continue;
-      for (std::uint32_t p = blocks_.values[tested_.cells[i]].newest_part; p != kNone;
+      for (std::uint32_t p = blocks_.values[tested_.cells[i]].newest_part; p != kNoIndex;
            p = parts_[p].next) {
         Part& part = parts_[p];
         const std::uint64_t samples = part.samples;
@@ -155,7 +154,6 @@ class TileHistory {
   }
 
  private:
-  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
   static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
   static constexpr int kCubeBits = 3;                                   // cubes of 8 blocks
 
@@ -170,7 +168,7 @@ class TileHistory {
   struct Block {
     CellSamples samples;
     bool is_tested = true;  // whether any part is not removed
-    std::uint32_t newest_part = kNone;
+    std::uint32_t newest_part = kNoIndex;
   };
   /// The voxels that one session fills in a block, and the evidence about them.
   struct Part {
@@ -180,7 +178,7 @@ class TileHistory {
     float level = 0.0F;         // log-odds of being free
     float own_level = 0.0F;     // sum of its own session, never below zero
     float most_own_level = 0.0F;
-    std::uint32_t component = kNone;  // kNone: ground
+    std::uint32_t component = kNoIndex;  // kNoIndex: ground
     std::uint32_t removed_by = kNever;
     std::uint8_t own_hits = 0;  // references of its own session that hit
     bool was_free = false;      // after a session before its own
@@ -243,7 +241,7 @@ class TileHistory {
   void remove_parts(std::uint32_t by) {
     for (std::uint32_t i = 0; i < sessions_[by].parts_end; ++i) {
       Part& part = parts_[i];
-      const bool is_undivided = by == part.session && part.component != kNone;
+      const bool is_undivided = by == part.session && part.component != kNoIndex;
       if (part.level >= level_ && !is_undivided && part.removed_by == kNever) part.removed_by = by;
     }
   }
@@ -257,7 +255,8 @@ class TileHistory {
     const std::uint32_t end = sessions_[by].parts_end;
     for (std::uint32_t i = 0; i < end; ++i) {
       const Part& part = parts_[i];
-      if (part.component == kNone || (part.removed_by != by && part.removed_by != kNever)) continue;
+      if (part.component == kNoIndex || (part.removed_by != by && part.removed_by != kNever))
+        continue;
       Count& count = counts[part.component];
       count.free += part.level > 0.0F ? 1.0F : 0.0F;
       count.hit += part.level < 0.0F ? 1.0F : 0.0F;
@@ -265,7 +264,7 @@ class TileHistory {
     }
     for (std::uint32_t i = 0; i < end; ++i) {
       Part& part = parts_[i];
-      if (part.component == kNone || part.removed_by != kNever) continue;
+      if (part.component == kNoIndex || part.removed_by != kNever) continue;
       const Count& count = counts[part.component];
       const Limits& limits = by == part.session ? kNotStanding : kLeft;
       const bool has_left = count.free > 0.0F && count.free >= limits.per_hit * count.hit &&

@@ -12,7 +12,6 @@
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/verdict.hpp"
-#include "dynains/voxels/touching_voxels.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {

@@ -87,7 +87,7 @@ class InstanceLinker {
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     out.cells.clear();
     find_cells(samples, cell_, T_origin_sensor, place_);
-    table_.assign(kTable, kEmpty);
+    table_.assign(kTable, kNoIndex);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
       const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
@@ -100,7 +100,7 @@ class InstanceLinker {
         std::uint32_t& slot = slot_of(cell);
         // A collision in the table may count a cell twice. Collisions are rare, and the count needs
         // no more accuracy.
-        if (slot != kEmpty && out.cells[slot].place == cell.place &&
+        if (slot != kNoIndex && out.cells[slot].place == cell.place &&
             out.cells[slot].instance == i) {
           continue;
         }
@@ -114,7 +114,7 @@ class InstanceLinker {
   /// Links each instance of two consecutive scans to the instance of the other scan with the
   /// largest overlap.
   void link(TrackedInstances& before, TrackedInstances& now) {
-    table_.assign(kTable, kEmpty);
+    table_.assign(kTable, kNoIndex);
     for (std::uint32_t i = 0; i < before.cells.size(); ++i) slot_of(before.cells[i]) = i;
     shared_.assign(before.instances.size(), 0);
     std::size_t at = 0;
@@ -122,7 +122,7 @@ class InstanceLinker {
       touched_.clear();
       for (; at < now.cells.size() && now.cells[at].instance == i; ++at) {
         const std::uint32_t slot = slot_of(now.cells[at]);
-        if (slot == kEmpty || before.cells[slot].place != now.cells[at].place) continue;
+        if (slot == kNoIndex || before.cells[slot].place != now.cells[at].place) continue;
         const std::uint32_t other = before.cells[slot].instance;
         if (shared_[other]++ == 0) touched_.push_back(other);
       }
@@ -135,7 +135,6 @@ class InstanceLinker {
 
  private:
   static constexpr std::size_t kTable = 1U << 14;
-  static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
   static constexpr std::uint32_t kLeastSamples = 2;  // a single sample may overlap by chance
 
   // The hash does not include the instance, so that equal cells of two scans share a slot.

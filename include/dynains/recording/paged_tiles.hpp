@@ -37,7 +37,7 @@ struct VoxelTile {
   /// Null: the voxel has no value.
   const Value* find(VoxelKey key) const {
     const std::uint32_t number = numbers.find(key);
-    return number == VoxelHashTable<>::kNone ? nullptr : &values[number];
+    return number == kNoIndex ? nullptr : &values[number];
   }
   std::size_t size() const { return keys.size(); }
   std::size_t memory_bytes() const {

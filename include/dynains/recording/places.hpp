@@ -17,7 +17,6 @@
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/world_cells.hpp"
 #include "dynains/verdict.hpp"
-#include "dynains/voxels/touching_voxels.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {

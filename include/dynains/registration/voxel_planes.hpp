@@ -119,7 +119,7 @@ class VoxelPlanes {
     for (std::size_t i = 0; i < block.count;) {
       std::size_t end = i + 1;
       while (end < block.count && numbers[end] == numbers[i]) ++end;
-      if (numbers[i] != kNone) add(block, i, end, keys[i], numbers[i]);
+      if (numbers[i] != kNoIndex) add(block, i, end, keys[i], numbers[i]);
       i = end;
     }
     block.count = 0;
@@ -133,10 +133,10 @@ class VoxelPlanes {
     find_keys(block, keys);
     for (std::size_t i = 0; i < block.count; ++i) {
       numbers[i] = table_.find(keys[i]);
-      if (numbers[i] != kNone) __builtin_prefetch(&planes_[numbers[i]]);
+      if (numbers[i] != kNoIndex) __builtin_prefetch(&planes_[numbers[i]]);
     }
     for (std::size_t i = 0; i < block.count; ++i) {
-      if (numbers[i] == kNone) continue;
+      if (numbers[i] == kNoIndex) continue;
       Plane& plane = planes_[numbers[i]];
       if (!plane.is_fitted) plane = fit(keys[i], moments_[numbers[i]]);
       if (plane.is_flat) visit(i, plane);
@@ -155,8 +155,6 @@ class VoxelPlanes {
   static constexpr double kEdgeOn = 0.04;      // the same, of a plane that contains the beam
   static constexpr double kGrazing = 0.3;      // sine of the angle between beam and plane
   static constexpr double kLeastLength = 0.2;  // m, standard deviation along the beam
-
-  static constexpr std::uint32_t kNone = VoxelHashTable<>::kNone;
 
   // The points of a voxel, relative to its centre.
   struct Moments {
@@ -181,9 +179,9 @@ class VoxelPlanes {
     }
   }
 
-  // Number of a voxel, which may be new; kNone if the map is full. Prefetches its moments.
+  // Number of a voxel, which may be new; kNoIndex if the map is full. Prefetches its moments.
   std::uint32_t number_for(VoxelKey key) {
-    if (size() == kMostVoxels && table_.find(key) == kNone) return kNone;
+    if (size() == kMostVoxels && table_.find(key) == kNoIndex) return kNoIndex;
     const std::uint32_t number = table_.insert(key);
     if (number == size()) {
       keys_.push_back(key);

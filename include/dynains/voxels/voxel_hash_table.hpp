@@ -1,4 +1,5 @@
-// Keys and hashes of voxels of a regular grid, and a hash table that numbers them.
+// Keys and hashes of voxels of a regular grid, a hash table that numbers them, and components of
+// touching ones.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +9,9 @@
 #include "dynains/points.hpp"
 
 namespace dynains {
+
+/// Number of a key that a table does not hold, and end of a list of indices.
+inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFU;
 
 /// The three indices of a voxel in its grid as one number, ordered by x, then y, then z. Each index
 /// lies in [-2^20, 2^20).
@@ -70,12 +74,9 @@ Int mixed_hash(const Int& a, const Int& b, const Int& c) {
 template <class Key = VoxelKey>
 class VoxelHashTable {
  public:
-  /// Number of a key that is not in the table.
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-
   struct Slot {
     Key key = Key();
-    std::uint32_t number = kNone;
+    std::uint32_t number = kNoIndex;
   };
 
   /// Reserves memory for `expected` keys.
@@ -84,7 +85,7 @@ class VoxelHashTable {
   /// Number of keys. The keys are numbered from 0 in the order of insertion.
   std::size_t size() const { return size_; }
 
-  /// Number of a key, or kNone.
+  /// Number of a key, or kNoIndex.
   std::uint32_t find(const Key& key) const { return slots_[slot_of(key, voxel_hash(key))].number; }
 
   /// Number of a key; adds a new key with the number size(). `hash`: voxel_hash(key).
@@ -93,7 +94,7 @@ class VoxelHashTable {
     Slot& slot = slots_[slot_of(key, hash)];
     Slot& first = slots_[first_of(hash)];
     const std::uint32_t number =
-        slot.number == kNone ? static_cast<std::uint32_t>(size_++) : slot.number;
+        slot.number == kNoIndex ? static_cast<std::uint32_t>(size_++) : slot.number;
     slot = first;
     first = {key, number};
     return number;
@@ -104,9 +105,6 @@ class VoxelHashTable {
   /// It holds the last inserted key among the keys whose search begins there, or Key() if it is
   /// empty.
   const Slot& first_slot(std::uint32_t hash) const { return slots_[first_of(hash)]; }
-
-  /// Fetches the memory where a search for a key begins.
-  void prefetch(const Key& key) const { __builtin_prefetch(&slots_[first_of(voxel_hash(key))]); }
 
   /// Reserves memory for `count` keys in total.
   void reserve(std::size_t count) {
@@ -127,7 +125,7 @@ class VoxelHashTable {
   // The slot of a key, or the empty slot where the key would be inserted.
   std::size_t slot_of(const Key& key, std::uint32_t hash) const {
     std::size_t at = first_of(hash);
-    while (slots_[at].number != kNone && !(slots_[at].key == key)) {
+    while (slots_[at].number != kNoIndex && !(slots_[at].key == key)) {
       at = (at + 1) & (slots_.size() - 1);
     }
     return at;
@@ -139,13 +137,49 @@ class VoxelHashTable {
     old.swap(slots_);
     --shift_;
     for (const Slot& slot : old) {
-      if (slot.number != kNone) slots_[slot_of(slot.key, voxel_hash(slot.key))] = slot;
+      if (slot.number != kNoIndex) slots_[slot_of(slot.key, voxel_hash(slot.key))] = slot;
     }
   }
 
   int shift_ = 27;  // 32 - log2 of the number of slots; 27 before the first slots exist
   std::size_t size_ = 0;
   std::vector<Slot> slots_;
+};
+
+/// Calls `visit(key)` for a voxel and the 26 that touch it.
+template <class Visitor>
+void for_each_touching(VoxelKey key, Visitor&& visit) {
+  for (int i = 0; i < 27; ++i) visit(key + voxel_key_step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1));
+}
+
+/// Finds components of touching voxels. Later calls reuse the memory.
+class ComponentSearch {
+ public:
+  /// Calls `visit(members)` for each component; members are numbers in `keys`. `numbers` has the
+  /// number of each key.
+  template <class Visitor>
+  void for_each(const std::vector<VoxelKey>& keys, const VoxelHashTable<>& numbers,
+                Visitor&& visit) {
+    is_done_.assign(keys.size(), false);
+    for (std::uint32_t first = 0; first < keys.size(); ++first) {
+      if (is_done_[first]) continue;
+      is_done_[first] = true;
+      members_.assign(1, first);
+      for (std::size_t i = 0; i < members_.size(); ++i) {
+        for_each_touching(keys[members_[i]], [&](VoxelKey key) {
+          const std::uint32_t next = numbers.find(key);
+          if (next == kNoIndex || is_done_[next]) return;
+          is_done_[next] = true;
+          members_.push_back(next);
+        });
+      }
+      visit(members_);
+    }
+  }
+
+ private:
+  std::vector<bool> is_done_;
+  std::vector<std::uint32_t> members_;
 };
 
 }  // namespace dynains

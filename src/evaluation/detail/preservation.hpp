@@ -63,7 +63,7 @@ bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
   const auto compare = [&](VoxelKey at) {
     if (grid.squared_distance(raw.p_world, at) > nearest + rounding) return;
     const std::uint32_t number = index.find(at);
-    if (number == VoxelHashTable<>::kNone) return;
+    if (number == kNoIndex) return;
     const std::optional<VoxelPoint> candidate = point_at(number);
     if (!candidate) return;
     const double distance = (candidate->p_world - raw.p_world).squaredNorm();
