@@ -6,7 +6,7 @@
 #include <string>
 #include <type_traits>
 
-#include "dynains/clusters/comparison.hpp"
+#include "dynains/clusters/cluster_set.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/ground/ground_config.hpp"

@@ -4,11 +4,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "dynains/clusters/comparison.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/simd/bits.hpp"
@@ -101,6 +101,14 @@ struct ClusterView {
     return ranges.subspan(first_range[k] - first_range[0], first_range[k + 1] - first_range[k]);
   }
 };
+
+/// Which clusters of a window are compared.
+enum class Comparison {
+  kEnds,       ///< with points in both the oldest and the newest scan of the window (Eq. 11)
+  kAnyBefore,  ///< with points in the newest scan and in any other
+};
+
+constexpr std::array<const char*, 2> value_names(Comparison) { return {"ends", "any_before"}; }
 
 /// Counting sort of a window by cluster and scan. The order leaves out clusters that are not
 /// compared.
