@@ -145,17 +145,13 @@ class InstanceLinker {
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
                       TrackedInstances::Shape& shape) const {
     if (begin == end) return;
-    float low[3] = {points.x[begin], points.y[begin], points.z[begin]};
-    float high[3] = {low[0], low[1], low[2]};
+    Eigen::AlignedBox3f box;
     for (std::uint32_t p = begin; p < end; ++p) {
-      const float at[3] = {points.x[p], points.y[p], points.z[p]};
-      for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = std::min(low[axis], at[axis]);
-        high[axis] = std::max(high[axis], at[axis]);
-      }
+      box.extend(Eigen::Vector3f(points.x[p], points.y[p], points.z[p]));
     }
-    shape.length = std::hypot(high[0] - low[0], high[1] - low[1]);
-    shape.height = high[2] - low[2];
+    const Eigen::Vector3f size = box.sizes();
+    shape.length = std::hypot(size.x(), size.y());
+    shape.height = size.z();
     shape.carried =
         end - begin >= kLeastSamples && shape.length <= max_length_ && shape.height <= max_height_;
   }

@@ -21,7 +21,7 @@ struct ScanInstances {
   std::size_t count = 0;
 };
 
-/// Calls `visit(index, x, y, z)` for about `wanted` points of a scan, 3 to 50 m from the sensor.
+/// Calls `visit(index, x, y, z)` for at most `wanted` points of a scan, 3 to 50 m from the sensor.
 /// They are spread evenly over its order, at pseudo-random distances, since beams repeat at regular
 /// ones.
 template <class Visit>
@@ -41,11 +41,11 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
   }
 }
 
-/// About 3,000 points of a scan (m, sensor frame). Tells which of them are on objects that are
+/// At most kMost points of a scan (m, sensor frame). Tells which of them are on objects that are
 /// small enough to be vehicles or persons.
 class AlignmentPoints {
  public:
-  static constexpr std::size_t kMost = 3072;
+  static constexpr std::size_t kMost = 3000;
 
   /// Points on instances of at most this horizontal diagonal and height (m) are on objects.
   AlignmentPoints(double longest_object, double highest_object)
@@ -58,17 +58,16 @@ class AlignmentPoints {
   }
 
   void select(const GroundSplit& split, const ScanInstances& instances) {
-    constexpr std::size_t kWanted = 3000;
     points_.clear();
     instance_of_.clear();
-    boxes_.assign(instances.count, Box());
-    visit_some(split, kWanted, [&](std::size_t i, double x, double y, double z) {
+    boxes_.assign(instances.count, Eigen::AlignedBox3d());
+    visit_some(split, kMost, [&](std::size_t i, double x, double y, double z) {
       points_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
       const bool has_instance = i >= split.ground_count && !instances.of_point.empty();
       const std::uint32_t instance =
           has_instance ? instances.of_point[i - split.ground_count] : kNoCluster;
       instance_of_.push_back(instance);
-      if (instance != kNoCluster) boxes_[instance].add(x, y, z);
+      if (instance != kNoCluster) boxes_[instance].extend(Eigen::Vector3d(x, y, z));
     });
   }
 
@@ -77,33 +76,15 @@ class AlignmentPoints {
   bool is_on_object(std::size_t point) const {
     const std::uint32_t instance = instance_of_[point];
     if (instance == kNoCluster) return false;
-    const Box& box = boxes_[instance];
-    return box.length() <= longest_object_ && box.height() <= highest_object_;
+    const Eigen::Vector3d size = boxes_[instance].sizes();
+    return std::hypot(size.x(), size.y()) <= longest_object_ && size.z() <= highest_object_;
   }
 
  private:
-  /// Around points, m.
-  struct Box {
-    double least[3] = {kFar, kFar, kFar};
-    double most[3] = {-kFar, -kFar, -kFar};
-
-    void add(double x, double y, double z) {
-      const double point[3] = {x, y, z};
-      for (int k = 0; k < 3; ++k) {
-        least[k] = std::min(least[k], point[k]);
-        most[k] = std::max(most[k], point[k]);
-      }
-    }
-    double length() const { return std::hypot(most[0] - least[0], most[1] - least[1]); }
-    double height() const { return most[2] - least[2]; }
-
-    static constexpr double kFar = 1e9;
-  };
-
   double longest_object_, highest_object_;
   PointBuffer points_;
   std::vector<std::uint32_t> instance_of_;  // by point
-  std::vector<Box> boxes_;                  // by instance, of its selected points
+  std::vector<Eigen::AlignedBox3d> boxes_;  // by instance, around its selected points
 };
 
 /// A vector and a square matrix. Plain loops, because Eigen's results depend on the instruction
