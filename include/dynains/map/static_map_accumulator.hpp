@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -45,8 +44,8 @@ class ChunkedVector {
 
  private:
   void add_chunk() {
-    constexpr std::size_t kMostChunks = std::numeric_limits<std::uint32_t>::max() / kChunk;
-    if (chunks_.size() == kMostChunks) throw std::length_error("2^32 - 1 elements are too many");
+    if (chunks_.size() == kNoIndex / kChunk)
+      throw std::length_error("2^32 - 1 elements are too many");
     chunks_.emplace_back(new T[kChunk]);
   }
 
@@ -63,32 +62,31 @@ struct BlockIndex {
   }
 };
 
-/// Hash table that numbers blocks in the order of their insertion, and stores their data.
+/// Voxels of the map that are stored together, and the list of their points.
+struct MapBlock {
+  BlockIndex index;
+  std::uint64_t occupied;  ///< one bit per voxel
+  std::uint32_t first;     ///< first point of the block, or kNoIndex
+  std::uint32_t next;      ///< next block of the bucket, or kNoIndex
+};
+
+/// Hash table that numbers blocks in the order of their insertion. Blocks never move in memory.
 ///
 /// Linear hashing (Litwin, 1980): each new block splits one bucket, so the time of an insertion
 /// does not grow with the table. VoxelHashTable instead rebuilds the whole table, which takes tens
 /// of milliseconds for half a million keys.
-template <class Data>
 class BlockTable {
  public:
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-
-  struct Block {
-    Data data;
-    BlockIndex index;
-    std::uint32_t next;  // next block of the bucket, or kNone
-  };
-
   std::uint32_t size() const { return blocks_.size(); }
-  Block& operator[](std::uint32_t block) { return blocks_[block]; }
-  const Block& operator[](std::uint32_t block) const { return blocks_[block]; }
+  const MapBlock& operator[](std::uint32_t block) const { return blocks_[block]; }
 
-  /// Number of a block; adds a new block with `data`. Throws std::length_error beyond 2^32 - 2
+  /// The block of an index; adds a block without points. Throws std::length_error beyond 2^32 - 2
   /// blocks, and std::bad_alloc.
-  std::uint32_t find_or_add(const BlockIndex& index, const Data& data) {
+  MapBlock& find_or_add(const BlockIndex& index) {
     const std::uint32_t hash = hash_of(index);
-    const std::uint32_t found = find(index, hash);
-    return found == kNone ? add(index, data, hash) : found;
+    std::uint32_t block = buckets_.size() == 0 ? kNoIndex : buckets_[bucket_of(hash)];
+    while (block != kNoIndex && !(blocks_[block].index == index)) block = blocks_[block].next;
+    return blocks_[block == kNoIndex ? add(index, hash) : block];
   }
 
   std::size_t memory_bytes() const { return blocks_.memory_bytes() + buckets_.memory_bytes(); }
@@ -106,34 +104,26 @@ class BlockTable {
     return bucket < buckets_.size() ? bucket : bucket - round_begin_;
   }
 
-  // Number of a block, or kNone.
-  std::uint32_t find(const BlockIndex& index, std::uint32_t hash) const {
-    if (buckets_.size() == 0) return kNone;
-    std::uint32_t block = buckets_[bucket_of(hash)];
-    while (block != kNone && !(blocks_[block].index == index)) block = blocks_[block].next;
-    return block;
-  }
-
   // The table has one bucket per block: a search visits one or two blocks on average.
-  std::uint32_t add(const BlockIndex& index, const Data& data, std::uint32_t hash) {
+  std::uint32_t add(const BlockIndex& index, std::uint32_t hash) {
     split_bucket();
     std::uint32_t& first = buckets_[bucket_of(hash)];
-    first = blocks_.push_back({data, index, first});
+    first = blocks_.push_back({index, 0, kNoIndex, first});
     return first;
   }
 
   void split_bucket() {
     if (buckets_.size() == 2 * round_begin_) round_begin_ *= 2;
-    const std::uint32_t added = buckets_.push_back(kNone);
+    const std::uint32_t added = buckets_.push_back(kNoIndex);
     if (added == 0) return;
     std::uint32_t* link = &buckets_[added - round_begin_];
     std::uint32_t* moved = &buckets_[added];
-    while (*link != kNone) {
-      Block& block = blocks_[*link];
+    while (*link != kNoIndex) {
+      MapBlock& block = blocks_[*link];
       if (bucket_of(hash_of(block.index)) == added) {
         *moved = *link;
         *link = block.next;
-        block.next = kNone;
+        block.next = kNoIndex;
         moved = &block.next;
       } else {
         link = &block.next;
@@ -142,8 +132,8 @@ class BlockTable {
   }
 
   std::uint32_t round_begin_ = 1;
-  ChunkedVector<std::uint32_t, 1024> buckets_;  // by bucket: its first block, or kNone
-  ChunkedVector<Block, 512> blocks_;
+  ChunkedVector<std::uint32_t, 1024> buckets_;  // by bucket: its first block, or kNoIndex
+  ChunkedVector<MapBlock, 512> blocks_;
 };
 
 }  // namespace dynains::detail
@@ -239,7 +229,7 @@ class StaticMapAccumulator {
       const BlockIndex& index = blocks_[block].index;
       const Eigen::Vector3d corner(index.x * block_size(0), index.y * block_size(1),
                                    index.z * block_size(2));
-      for (std::uint32_t i = blocks_[block].data.first; i != Blocks::kNone; i = points_[i].next) {
+      for (std::uint32_t i = blocks_[block].first; i != kNoIndex; i = points_[i].next) {
         const Point& point = points_[i];
         visit(Eigen::Vector3d(corner.x() + static_cast<double>(point.x),
                               corner.y() + static_cast<double>(point.y),
@@ -254,15 +244,8 @@ class StaticMapAccumulator {
 
   struct Point {
     float x, y, z;       // m, relative to the corner of the block
-    std::uint32_t next;  // next point of the block, or Blocks::kNone
+    std::uint32_t next;  // next point of the block, or kNoIndex
   };
-
-  struct BlockContent {
-    std::uint64_t occupied;  // one bit per voxel
-    std::uint32_t first;     // first point of the block, or Blocks::kNone
-  };
-  using Blocks = detail::BlockTable<BlockContent>;
-  using Block = Blocks::Block;  // never moves in memory
 
   // Size of recent_, a direct-mapped cache of blocks by the low bits of their indices. With
   // voxels of 0.2 m, these bits repeat every 51.2 m, and every 6.4 m in height.
@@ -335,11 +318,11 @@ class StaticMapAccumulator {
     for (std::size_t i = 0; i < count; ++i) {
       if (!keep.empty() && keep[i] == 0) continue;
       const BlockIndex index = {batch.block[0][i], batch.block[1][i], batch.block[2][i]};
-      Block*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
+      detail::MapBlock*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
       if (known == nullptr || !(known->index == index)) {
-        known = &blocks_[blocks_.find_or_add(index, {0, Blocks::kNone})];
+        known = &blocks_.find_or_add(index);
       }
-      BlockContent& block = known->data;
+      detail::MapBlock& block = *known;
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
       block.first =
@@ -351,9 +334,9 @@ class StaticMapAccumulator {
   Config config_;
   double voxel_;
   bool keep_all_;
-  Blocks blocks_;
+  detail::BlockTable blocks_;
   detail::ChunkedVector<Point, 512> points_;
-  std::vector<Block*> recent_;  // by cache slot: the last block, or null
+  std::vector<detail::MapBlock*> recent_;  // by cache slot: the last block, or null
 };
 
 }  // namespace dynains
