@@ -21,6 +21,9 @@ constexpr PointLabel label_of(Cause cause) {
   return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
 }
 
+/// Number of the group of points that have a label without evidence: of kGround and those before.
+constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::uint32_t>(label); }
+
 /// Holds the verdict on one scan, by input point, and writes it by group of points, because random
 /// access to several arrays dominates the cost. One writer serves all scans in turn, so that
 /// open scans need no arrays of their own.
@@ -83,15 +86,12 @@ class VerdictWriter {
   /// Writes the verdict by evidence on all points. The group of each input point is computed first,
   /// so that the arrays are written sequentially.
   void write_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
-    verdicts_.resize(kFirstGroup + evidence.groups.size());
-    verdicts_[kInvalidPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
-    verdicts_[kInvalidPoints].label = PointLabel::kInvalid;
-    verdicts_[kFarPoints] = GroupVerdict({Cause::kNotJudged, 0.0F});
-    verdicts_[kFarPoints].label = PointLabel::kOutOfRange;
-    verdicts_[kGroundPoints] = GroupVerdict({Cause::kGround, 0.0F});
-    for (std::size_t g = 0; g < evidence.groups.size(); ++g) {
-      verdicts_[kFirstGroup + g] = GroupVerdict(evidence.groups[g]);
+    verdicts_.resize(kFirstGroup);
+    for (const PointLabel label : {PointLabel::kInvalid, PointLabel::kOutOfRange}) {
+      verdicts_[fixed_group(label)].label = label;
     }
+    verdicts_[fixed_group(PointLabel::kGround)] = GroupVerdict({Cause::kGround, 0.0F});
+    verdicts_.insert(verdicts_.end(), evidence.groups.begin(), evidence.groups.end());
     order_groups(scan, evidence.group_of);
     expand_groups(scan.unjudged.size());
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
@@ -112,7 +112,7 @@ class VerdictWriter {
   // Verdict on the points of a group, packed in eight bytes.
   struct GroupVerdict {
     GroupVerdict() = default;
-    explicit GroupVerdict(const PointVerdict& verdict)
+    GroupVerdict(const PointVerdict& verdict)
         : belief(verdict.belief),
           label(label_of(verdict.cause)),
           cause(verdict.cause),
@@ -122,11 +122,7 @@ class VerdictWriter {
     Cause cause = Cause::kNotJudged;
     std::uint8_t is_kept = 1;
   };
-  // Group numbers in group_of_input_: three with fixed verdicts, then the groups of the evidence.
-  static constexpr std::uint32_t kInvalidPoints = 0;
-  static constexpr std::uint32_t kFarPoints = 1;
-  static constexpr std::uint32_t kGroundPoints = 2;
-  static constexpr std::uint32_t kFirstGroup = 3;
+  static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
 
   // Writes the verdict on a single point, by index in the split.
   void write(std::size_t point, const PointVerdict& verdict) {
@@ -155,11 +151,10 @@ class VerdictWriter {
 
   void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups) {
     ensure_capacity(group_of_input_, scan.unjudged.size());
-    group_of_input_.assign(scan.unjudged.size(), kGroundPoints);
+    group_of_input_.assign(scan.unjudged.size(), fixed_group(PointLabel::kGround));
     std::uint32_t* const group_of = group_of_input_.data();
-    scan.unjudged.for_each([&](std::size_t i, PointLabel label) {
-      group_of[i] = label == PointLabel::kInvalid ? kInvalidPoints : kFarPoints;
-    });
+    scan.unjudged.for_each(
+        [&](std::size_t i, PointLabel label) { group_of[i] = fixed_group(label); });
     const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
