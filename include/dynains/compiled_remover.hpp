@@ -78,7 +78,7 @@ struct DefaultStages {
 /// Removes moving instances from a stream of scans, one scan at a time.
 ///
 /// Owns every buffer. After warm-up, a push allocates memory only when the map grows. Objects are
-/// independent of each other. `push`, `flush`, `reset`, `reserve` and `reserve_like` throw
+/// independent of each other. `push`, `flush`, `reset` and `reserve_like` throw
 /// UsageError while another of these calls runs on the same object. The map and the spans of a
 /// verdict must not be read during such a call, except by the sink of `flush`; other threads need a
 /// lock that also covers the calls. Objects are movable. A moved-from object can be assigned to or
@@ -118,9 +118,6 @@ class BasicDynaInsRemover {
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {
     reserve_view(detail::CloudView(example), scans);
   }
-
-  /// Calls reserve_like() with a synthetic scan of `points` points and 64 rings.
-  void reserve(std::size_t points);
 
   /// Processes one scan.
   ///

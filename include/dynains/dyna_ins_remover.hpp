@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
@@ -65,12 +64,6 @@ void BasicDynaInsRemover<Stages>::reserve_view(const detail::CloudView& example,
                                                std::size_t scans) {
   const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
   pipeline().reserve_like(example, scans);
-}
-
-template <class Stages>
-void BasicDynaInsRemover<Stages>::reserve(std::size_t points) {
-  const std::vector<float> xyz = detail::synthetic_scan(points);
-  reserve_like(RawPoints<float>{xyz.data(), points});
 }
 
 template <class Stages>

@@ -163,12 +163,10 @@ TEST_CASE("reserved memory changes no result, and can be reserved before the fir
   static const std::vector<Scan> scans = drive(oncoming(), 8, 5.0);
   DynaInsRemover remover(config);
   // Less memory than the scans need, more than they need, and as much as they need.
-  const std::size_t points = GENERATE(std::size_t{0}, std::size_t{1000}, std::size_t{200000});
-  if (points > 0) {
-    remover.reserve(points);
-  } else {
-    remover.reserve_like(scans[0].points, GENERATE(std::size_t{0}, std::size_t{3}, std::size_t{8}));
-  }
+  std::vector<Eigen::Vector3f> example = scans[0].points;
+  example.resize(GENERATE(std::size_t{1000}, std::size_t{200000}, scans[0].points.size()),
+                 Eigen::Vector3f(20.0F, 3.0F, 0.5F));
+  remover.reserve_like(example, GENERATE(std::size_t{0}, std::size_t{3}, std::size_t{8}));
   const Run reserved = run(remover, scans);
   DynaInsRemover unprepared(config);
   const Run plain = run(unprepared, scans);
@@ -176,9 +174,9 @@ TEST_CASE("reserved memory changes no result, and can be reserved before the fir
   CHECK(remover.map().size() == map_size);
   CHECK(reserved.newest == plain.newest);
   CHECK(reserved.final == plain.final);
-  CHECK_THROWS_AS(remover.reserve(1000), UsageError);
+  CHECK_THROWS_AS(remover.reserve_like(example), UsageError);
   remover.reset();
-  CHECK_NOTHROW(remover.reserve(1000));
+  CHECK_NOTHROW(remover.reserve_like(example));
   CHECK(run(remover, scans).final == plain.final);
   CHECK(remover.map().size() == map_size);
 }

@@ -32,30 +32,6 @@
 
 namespace dynains::detail {
 
-/// Synthetic scan of a street between two walls: interleaved x, y, z of `points` points in m,
-/// sensor frame, ring by ring. About half of the points are ground.
-inline std::vector<float> synthetic_scan(std::size_t points) {
-  constexpr double kHeight = 1.7, kHalfStreet = 12.0, kFarthest = 60.0;  // m
-  constexpr std::size_t kRings = 64;
-  const std::size_t in_ring = points / kRings + 1;
-  std::vector<float> xyz;
-  xyz.reserve(3 * points);
-  for (std::size_t i = 0; i < points; ++i) {
-    const double azimuth =
-        2.0 * M_PI * static_cast<double>(i % in_ring) / static_cast<double>(in_ring);
-    const std::size_t ring = i / in_ring;
-    const double share = static_cast<double>(ring) / static_cast<double>(kRings);
-    const double slope = 0.1 - 0.5 * share;  // vertical per horizontal distance of the beam
-    const double to_wall = std::min(kHalfStreet / std::abs(std::sin(azimuth)), kFarthest);
-    const double to_ground = slope < 0.0 ? -kHeight / slope : kFarthest;
-    const double range = std::min(to_wall, to_ground);
-    xyz.push_back(static_cast<float>(range * std::cos(azimuth)));
-    xyz.push_back(static_cast<float>(range * std::sin(azimuth)));
-    xyz.push_back(static_cast<float>(range * slope));
-  }
-  return xyz;
-}
-
 /// Scope of the warm-up: scans pushed within it are not inserted into the map, which may be on
 /// disk. The destructor removes these scans from the pipeline.
 template <class Pipeline>
