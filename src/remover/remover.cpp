@@ -1,4 +1,8 @@
+#include <memory>
+
 #include "dynains/compiled_remover.hpp"
 #include "dynains/dyna_ins_remover.hpp"
 
+template std::unique_ptr<dynains::detail::ScanDecision> dynains::detail::make_free_space_decision(
+    const FreeSpaceConfig&, Background*);
 template class dynains::BasicDynaInsRemover<>;

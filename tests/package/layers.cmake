@@ -10,7 +10,7 @@ set(layers
   "^(map|recording)/"
   "^config\\.hpp$"
   "^pipeline/"
-  "^(compiled_remover|dyna_ins_remover)\\.hpp$"
+  "^(compiled_remover|dyna_ins_remover|own_stages)\\.hpp$"
   "^(adapters|io|evaluation)/"
   "^(poses|odometry|simulation)/"
   "^city/")

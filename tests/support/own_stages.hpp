@@ -2,6 +2,6 @@
 // compiled it with full optimization.
 #pragma once
 
-#include "dynains/dyna_ins_remover.hpp"
+#include "dynains/own_stages.hpp"
 
 extern template class dynains::BasicDynaInsRemover<>;

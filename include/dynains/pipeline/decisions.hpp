@@ -1,4 +1,4 @@
-// Implementations of Config::decision: window and free_space.
+// Decisions on scans: their interface, and that by windows.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -15,7 +15,6 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/evidence/free_space_evidence.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/stage_checks.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
@@ -358,60 +357,10 @@ class WindowDecision final : public ScanDecision {
   InstanceIds instance_ids_;
 };
 
-/// Decision by free space. Each scan is clustered alone. Instance ids follow the associations of
-/// instances between scans (FreeSpaceEvidence::predecessors()).
-class FreeSpaceDecision final : public ScanDecision {
- public:
-  FreeSpaceDecision(const FreeSpaceConfig& config, Background* other) : evidence_(config) {
-    evidence_.share_work(other);
-  }
-
-  std::size_t window_length() const override { return 1; }
-  std::size_t latency() const override { return evidence_.lookahead_scans(); }
-  bool needs_sensor() const override { return true; }
-  void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
-  void reserve(std::size_t scans) override { evidence_.reserve(scans); }
-  void clear() override { instance_ids_.clear(); }
-
-  void observe(ScanRing& scans, const ScanWindow& window) override {
-    const ScanSlot& newest = scans.newest();
-    evidence_.set_time(newest.time);
-    evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
-                      window.newest_cluster_of(), window.cluster_count());
-    propagate_ids(scans);
-  }
-
-  void judge(const ScanSlot& scan, bool is_final) override {
-    evidence_.judge(scan.scan, is_final);
-    if (!is_final) evidence_.make_reference(scan.split);
-  }
-  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
-    writer.write_groups(newest, evidence_.verdict(false, newest.split));
-  }
-  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
-    const EvidenceVerdict verdict = evidence_.verdict(true, scan.split);
-    writer.write_groups(scan, verdict);
-    writer.flag_groups(scan, verdict);
-  }
-
-  std::optional<PoseResidual> pose_residual() const override { return evidence_.pose_residual(); }
-  std::optional<EpochReason> misfit() const override { return evidence_.misfit(); }
-  SurfaceCounts surfaces() const override { return evidence_.surfaces(); }
-
- private:
-  void propagate_ids(ScanRing& scans) {
-    ScanSlot& newest = scans.newest();
-    Span<const std::uint32_t> old_ids;
-    if (newest.scan > 0) {
-      const ScanSlot& before = scans[newest.scan - 1];
-      if (before.epoch == newest.epoch) old_ids = before.ids;
-    }
-    instance_ids_.propagate(evidence_.predecessors(), old_ids, newest.ids);
-  }
-
-  FreeSpaceEvidence evidence_;
-  InstanceIds instance_ids_;
-};
+/// Creates the decision by free space. free_space_decision.hpp defines it, and the library
+/// dynains::remover contains it. `other`: see make_decision().
+template <class Config>
+std::unique_ptr<ScanDecision> make_free_space_decision(const Config& config, Background* other);
 
 /// Creates the implementation of `config.decision`. `other`: its second thread, which outlives it;
 /// null for none.
@@ -419,7 +368,7 @@ template <class Stages>
 std::unique_ptr<ScanDecision> make_decision(const PipelineConfig<Stages>& config,
                                             Background* other) {
   if (config.decision == Decision::kWindow) return std::make_unique<WindowDecision<Stages>>(config);
-  return std::make_unique<FreeSpaceDecision>(config.evidence, other);
+  return make_free_space_decision(config.evidence, other);
 }
 
 }  // namespace dynains::detail

@@ -1,0 +1,81 @@
+// Decision by free space, one of the implementations of Config::decision.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "dynains/evidence/free_space_evidence.hpp"
+#include "dynains/pipeline/decisions.hpp"
+#include "dynains/pipeline/scan_ring.hpp"
+#include "dynains/pipeline/verdict_writer.hpp"
+#include "dynains/plausibility.hpp"
+#include "dynains/points.hpp"
+#include "dynains/sensor/sensor_model.hpp"
+#include "dynains/threads/background.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains::detail {
+
+/// Decision by free space. Each scan is clustered alone. Instance ids follow the associations of
+/// instances between scans (FreeSpaceEvidence::predecessors()).
+class FreeSpaceDecision final : public ScanDecision {
+ public:
+  FreeSpaceDecision(const FreeSpaceConfig& config, Background* other) : evidence_(config) {
+    evidence_.share_work(other);
+  }
+
+  std::size_t window_length() const override { return 1; }
+  std::size_t latency() const override { return evidence_.lookahead_scans(); }
+  bool needs_sensor() const override { return true; }
+  void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
+  void reserve(std::size_t scans) override { evidence_.reserve(scans); }
+  void clear() override { instance_ids_.clear(); }
+
+  void observe(ScanRing& scans, const ScanWindow& window) override {
+    const ScanSlot& newest = scans.newest();
+    evidence_.set_time(newest.time);
+    evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
+                      window.newest_cluster_of(), window.cluster_count());
+    propagate_ids(scans);
+  }
+
+  void judge(const ScanSlot& scan, bool is_final) override {
+    evidence_.judge(scan.scan, is_final);
+    if (!is_final) evidence_.make_reference(scan.split);
+  }
+  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
+    writer.write_groups(newest, evidence_.verdict(false, newest.split));
+  }
+  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
+    const EvidenceVerdict verdict = evidence_.verdict(true, scan.split);
+    writer.write_groups(scan, verdict);
+    writer.flag_groups(scan, verdict);
+  }
+
+  std::optional<PoseResidual> pose_residual() const override { return evidence_.pose_residual(); }
+  std::optional<EpochReason> misfit() const override { return evidence_.misfit(); }
+  SurfaceCounts surfaces() const override { return evidence_.surfaces(); }
+
+ private:
+  void propagate_ids(ScanRing& scans) {
+    ScanSlot& newest = scans.newest();
+    Span<const std::uint32_t> old_ids;
+    if (newest.scan > 0) {
+      const ScanSlot& before = scans[newest.scan - 1];
+      if (before.epoch == newest.epoch) old_ids = before.ids;
+    }
+    instance_ids_.propagate(evidence_.predecessors(), old_ids, newest.ids);
+  }
+
+  FreeSpaceEvidence evidence_;
+  InstanceIds instance_ids_;
+};
+
+template <class Config>
+std::unique_ptr<ScanDecision> make_free_space_decision(const Config& config, Background* other) {
+  return std::make_unique<FreeSpaceDecision>(config, other);
+}
+
+}  // namespace dynains::detail
