@@ -32,23 +32,6 @@
 
 namespace dynains::detail {
 
-/// Scope of the warm-up: scans pushed within it are not inserted into the map, which may be on
-/// disk. The destructor removes these scans from the pipeline.
-template <class Pipeline>
-class WarmUp {
- public:
-  explicit WarmUp(Pipeline& pipeline) : pipeline_(pipeline) { pipeline_.build_map_ = false; }
-  WarmUp(const WarmUp&) = delete;
-  WarmUp& operator=(const WarmUp&) = delete;
-  ~WarmUp() {
-    pipeline_.build_map_ = pipeline_.config_.build_map;
-    pipeline_.forget_scans();
-  }
-
- private:
-  Pipeline& pipeline_;
-};
-
 /// Runs `work` and adds its time to `milliseconds`.
 template <class Work>
 void timed(double& milliseconds, Work&& work) {
@@ -104,7 +87,55 @@ class Pipeline final : private NewestVerdictMaker {
   const SensorModel& sensor() const { return frame_.sensor(); }
   double next_time() const { return scans_.next_time(); }
 
-  FrameResult push(const CloudView& cloud, const Pose& T_world_sensor, double time);
+  FrameResult push(const CloudView& cloud, const Pose& T_world_sensor, double time) {
+    StageTimes times;
+    ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
+    timed(times.ingest, [&] { ingest(cloud, newest); });
+    PushTransaction transaction(scans_, newest);
+    unwritten_ = nullptr;
+    if (is_sensor_wanted()) {
+      if (finishes_later_) finish_due(times);  // before the stages are adapted
+      timed(times.ingest, [&] { find_sensor(newest); });
+    }
+    const auto cluster = [&] {
+      newest.split.input = std::move(split_input_);
+      timed(times.ground, [&] {
+        ground_.segment(ingest_.points(), ingest_.input(), newest.split);
+        newest.mark_unjudged(ingest_.points().size());
+      });
+      timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
+      timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
+    };
+    if (finishes_later_) {
+      run_both(other_.get(), cluster, [&] { finish_due(times); });
+    } else {
+      cluster();
+    }
+    timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
+    timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
+    timed(times.verdict, [&] {
+      newest.cluster_of.assign(window_.newest_cluster_of());
+      newest.input.assign(Span<const std::uint32_t>(newest.split.input.data(), newest.split.count));
+      split_input_ = std::move(newest.split.input);
+    });
+    transaction.commit();
+    if (!finishes_later_) finish_due(times);
+    const std::optional<ScanVerdict> finished = take_finished();
+    if (finished && finished->scan == newest.scan) {
+      newest_ = *finished;
+    } else {
+      unwritten_ = &newest;
+    }
+    FrameResult result = {{newest.scan, newest.time, newest.T_world_sensor, *this},
+                          finished,
+                          times,
+                          pose_residual(),
+                          time_doubt(),
+                          newest.began_epoch ? newest.began_epoch : decision_->misfit(),
+                          Plausibility()};
+    result.plausibility = plausibility(newest, result);
+    return result;
+  }
 
   /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
   std::optional<ScanVerdict> finish_oldest() {
@@ -116,7 +147,34 @@ class Pipeline final : private NewestVerdictMaker {
 
   void start_epoch() { scans_.start_epoch(); }
 
-  void reserve_like(const CloudView& example, std::size_t scans);
+  void reserve_like(const CloudView& example, std::size_t scans) {
+    if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
+    if (scans == 0) return;
+    // Margin: scans of one sensor differ slightly in size.
+    const std::size_t points = example.size() + example.size() / 16;
+    for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
+    newest_writer_.touch(points);
+    final_writer_.touch(points);
+    // Scans of the warm-up are not inserted into the map, which may be on disk.
+    struct WarmUp {
+      Pipeline& pipeline;
+      ~WarmUp() {
+        pipeline.build_map_ = pipeline.config_.build_map;
+        pipeline.forget_scans();
+      }
+    };
+    const WarmUp warm_up{*this};
+    build_map_ = false;
+    // After four scans, each kind of decision has compared a scan with a reference.
+    const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
+    for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
+      push(example, Pose::Identity(), next_time());
+      newest_verdict();
+    }
+    for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
+    final_writer_.ensure_capacity_like(newest_writer_);
+    decision_->reserve(scans);
+  }
 
   void reset() {
     map_.clear();
@@ -124,7 +182,6 @@ class Pipeline final : private NewestVerdictMaker {
   }
 
  private:
-  friend class WarmUp<Pipeline>;
   static constexpr std::size_t kFewestSlots = 2;  // ids are propagated from the previous scan
 
   static const Config& validated(const Config& config) {
@@ -132,18 +189,133 @@ class Pipeline final : private NewestVerdictMaker {
     return config;
   }
 
-  void ingest(const CloudView& cloud, ScanSlot& next);
-  bool is_sensor_wanted() const;
-  void find_sensor(ScanSlot& newest);
-  Eigen::Matrix3d level(ScanSlot& scan) const;
-  const ScanVerdict& newest_verdict() override;
-  ScanVerdict finish_oldest(StageTimes& times);
-  void finish_due(StageTimes& times);
+  // Filters the input points. If the sensor is known, the valid points are rotated into the level
+  // frame.
+  void ingest(const CloudView& cloud, ScanSlot& next) {
+    const JudgedRegion region = {static_cast<float>(config_.min_range),
+                                 static_cast<float>(config_.max_range),
+                                 config_.sensor_origin().template cast<float>()};
+    if (frame_.rotates_scans()) {
+      const Eigen::Matrix3d R_level_sensor = level(next);
+      ingest_.read(cloud, region, &R_level_sensor, next.unjudged);
+    } else {
+      ingest_.read(cloud, region, nullptr, next.unjudged);
+    }
+  }
+
+  bool is_sensor_wanted() const {
+    if (sensor().known()) return false;
+    return decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
+           needs_sensor(clusterer_);
+  }
+
+  // Estimates the sensor model from the newest scan and adapts the stages to it. Stages use
+  // SensorModel::typical() until a scan has enough points.
+  void find_sensor(ScanSlot& newest) {
+    frame_.estimate(ingest_.points(), newest.split.points);
+    if (sensor().known() && newest.scan > 0) {
+      newest.epoch = scans_.start_epoch();
+      newest.began_epoch = EpochReason::kSensor;
+    }
+    const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
+    try {
+      adapt_stage(ground_, model);
+      adapt_stage(clusterer_, model);
+      decision_->adapt(model);
+    } catch (...) {
+      frame_.forget();  // the next scan adapts all stages
+      throw;
+    }
+    if (frame_.rotates_scans()) ingest_.turn(level(newest));
+  }
+
+  // Levels the pose of the scan. Returns the rotation for its points.
+  Eigen::Matrix3d level(ScanSlot& scan) const {
+    const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
+    scan.T_world_level = rotated(scan.T_world_level, R_level_sensor);
+    return R_level_sensor;
+  }
+
+  const ScanVerdict& newest_verdict() override {
+    if (unwritten_ == nullptr) return newest_;
+    newest_writer_.begin(*unwritten_);
+    decision_->write_newest(*unwritten_, newest_writer_);  // Eq. 2
+    newest_ = newest_writer_.verdict(*unwritten_);
+    unwritten_ = nullptr;
+    return newest_;
+  }
+
+  // The scan becomes final even if the map throws, because the ring reuses its slot.
+  ScanVerdict finish_oldest(StageTimes& times) {
+    const ScanSlot& scan = scans_.finish_oldest();
+    timed(times.judge, [&] { decision_->judge(scan, true); });
+    timed(times.verdict, [&] {
+      final_writer_.begin(scan);
+      decision_->write_final(scan, final_writer_);
+    });
+    if (build_map_) {
+      const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
+      timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });
+    }
+    return final_writer_.verdict(scan);
+  }
+
+  // Finishes the oldest scan if its verdict is due and no other one waits for take_finished().
+  void finish_due(StageTimes& times) {
+    if (scans_.open() <= latency() || is_finished_known()) return;
+    try {
+      finished_ = finish_oldest(times);
+    } catch (...) {
+      finishing_error_ = std::current_exception();
+    }
+  }
+
   bool is_finished_known() const { return finished_ || finishing_error_; }
-  std::optional<ScanVerdict> take_finished();
-  std::optional<PoseResidual> pose_residual();
-  TimeDoubt time_doubt();
-  Plausibility plausibility(const ScanSlot& newest, const FrameResult& result);
+  std::optional<ScanVerdict> take_finished() {
+    if (finishing_error_) std::rethrow_exception(std::exchange(finishing_error_, nullptr));
+    return std::exchange(finished_, std::nullopt);
+  }
+
+  // The residual of the newest scan, with its motion in the frame of the pushed cloud.
+  std::optional<PoseResidual> pose_residual() {
+    std::optional<PoseResidual> residual = decision_->pose_residual();
+    if (residual) {
+      residual->previous_scan = scans_.newest().scan - 1;
+      residual->previous_time = scans_[residual->previous_scan].time;
+    }
+    const Eigen::Vector3d origin = config_.sensor_origin();
+    if (residual && (frame_.rotates_scans() || !origin.isZero(0.0))) {
+      Pose T_cloud_level = Pose::Identity();
+      T_cloud_level.linear() = transposed(sensor().R_level_sensor());
+      T_cloud_level.translation() = origin;
+      const Pose T_level_sensor = inverted(T_cloud_level);
+      for (auto* T : {&residual->T_previous_newest, &residual->T_previous_aligned}) {
+        *T = composed(composed(T_cloud_level, *T), T_level_sensor);
+      }
+      residual->covariance = transported_covariance(residual->covariance, T_cloud_level);
+    }
+    return residual;
+  }
+
+  // After a push: the doubt about the times of the last scans.
+  TimeDoubt time_doubt() {
+    const ScanSlot& newest = scans_.newest();
+    if (newest.scan == 0) return TimeDoubt::kNone;
+    return rate_.add(newest.time - scans_[newest.scan - 1].time, config_.max_gap);
+  }
+
+  // Adds the newest scan to the running window.
+  Plausibility plausibility(const ScanSlot& newest, const FrameResult& result) {
+    PlausibilityCheck::Scan scan;
+    scan.scan = newest.scan;
+    scan.points = newest.unjudged.size();
+    scan.judged = newest.split.count;
+    scan.surfaces = decision_->surfaces();
+    if (result.pose_residual) scan.residual = result.pose_residual->translation;
+    scan.is_misfit =
+        result.began_epoch == EpochReason::kJump || result.began_epoch == EpochReason::kMisfit;
+    return plausibility_.add(scan);
+  }
 
   // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
@@ -180,216 +352,5 @@ class Pipeline final : private NewestVerdictMaker {
   std::optional<ScanVerdict> finished_;
   std::exception_ptr finishing_error_;
 };
-
-template <class Stages>
-FrameResult Pipeline<Stages>::push(const CloudView& cloud, const Pose& T_world_sensor,
-                                   double time) {
-  StageTimes times;
-  ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
-  timed(times.ingest, [&] { ingest(cloud, newest); });
-  PushTransaction transaction(scans_, newest);
-  unwritten_ = nullptr;
-  if (is_sensor_wanted()) {
-    if (finishes_later_) finish_due(times);  // before the stages are adapted
-    timed(times.ingest, [&] { find_sensor(newest); });
-  }
-  const auto cluster = [&] {
-    newest.split.input = std::move(split_input_);
-    timed(times.ground, [&] {
-      ground_.segment(ingest_.points(), ingest_.input(), newest.split);
-      newest.mark_unjudged(ingest_.points().size());
-    });
-    timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
-    timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
-  };
-  if (finishes_later_) {
-    run_both(other_.get(), cluster, [&] { finish_due(times); });
-  } else {
-    cluster();
-  }
-  timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
-  timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
-  timed(times.verdict, [&] {
-    newest.cluster_of.assign(window_.newest_cluster_of());
-    newest.input.assign(Span<const std::uint32_t>(newest.split.input.data(), newest.split.count));
-    split_input_ = std::move(newest.split.input);
-  });
-  transaction.commit();
-  if (!finishes_later_) finish_due(times);
-  const std::optional<ScanVerdict> finished = take_finished();
-  if (finished && finished->scan == newest.scan) {
-    newest_ = *finished;
-  } else {
-    unwritten_ = &newest;
-  }
-  FrameResult result = {{newest.scan, newest.time, newest.T_world_sensor, *this},
-                        finished,
-                        times,
-                        pose_residual(),
-                        time_doubt(),
-                        newest.began_epoch ? newest.began_epoch : decision_->misfit(),
-                        Plausibility()};
-  result.plausibility = plausibility(newest, result);
-  return result;
-}
-
-template <class Stages>
-const ScanVerdict& Pipeline<Stages>::newest_verdict() {
-  if (unwritten_ == nullptr) return newest_;
-  newest_writer_.begin(*unwritten_);
-  decision_->write_newest(*unwritten_, newest_writer_);  // Eq. 2
-  newest_ = newest_writer_.verdict(*unwritten_);
-  unwritten_ = nullptr;
-  return newest_;
-}
-
-/// Finishes the oldest scan if its verdict is due and no other one waits for take_finished().
-template <class Stages>
-void Pipeline<Stages>::finish_due(StageTimes& times) {
-  if (scans_.open() <= latency() || is_finished_known()) return;
-  try {
-    finished_ = finish_oldest(times);
-  } catch (...) {
-    finishing_error_ = std::current_exception();
-  }
-}
-
-template <class Stages>
-std::optional<ScanVerdict> Pipeline<Stages>::take_finished() {
-  if (finishing_error_) std::rethrow_exception(std::exchange(finishing_error_, nullptr));
-  return std::exchange(finished_, std::nullopt);
-}
-
-/// The scan becomes final even if the map throws, because the ring reuses its slot.
-template <class Stages>
-ScanVerdict Pipeline<Stages>::finish_oldest(StageTimes& times) {
-  const ScanSlot& scan = scans_.finish_oldest();
-  timed(times.judge, [&] { decision_->judge(scan, true); });
-  timed(times.verdict, [&] {
-    final_writer_.begin(scan);
-    decision_->write_final(scan, final_writer_);
-  });
-  if (build_map_) {
-    const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-    timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });
-  }
-  return final_writer_.verdict(scan);
-}
-
-/// Filters the input points. If the sensor is known, the valid points are rotated into the level
-/// frame.
-template <class Stages>
-void Pipeline<Stages>::ingest(const CloudView& cloud, ScanSlot& next) {
-  const JudgedRegion region = {static_cast<float>(config_.min_range),
-                               static_cast<float>(config_.max_range),
-                               config_.sensor_origin().template cast<float>()};
-  if (frame_.rotates_scans()) {
-    const Eigen::Matrix3d R_level_sensor = level(next);
-    ingest_.read(cloud, region, &R_level_sensor, next.unjudged);
-  } else {
-    ingest_.read(cloud, region, nullptr, next.unjudged);
-  }
-}
-
-template <class Stages>
-bool Pipeline<Stages>::is_sensor_wanted() const {
-  if (sensor().known()) return false;
-  return decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
-         needs_sensor(clusterer_);
-}
-
-/// Estimates the sensor model from the newest scan and adapts the stages to it. Stages use
-/// SensorModel::typical() until a scan has enough points.
-template <class Stages>
-void Pipeline<Stages>::find_sensor(ScanSlot& newest) {
-  frame_.estimate(ingest_.points(), newest.split.points);
-  if (sensor().known() && newest.scan > 0) {
-    newest.epoch = scans_.start_epoch();
-    newest.began_epoch = EpochReason::kSensor;
-  }
-  const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
-  try {
-    adapt_stage(ground_, model);
-    adapt_stage(clusterer_, model);
-    decision_->adapt(model);
-  } catch (...) {
-    frame_.forget();  // the next scan adapts all stages
-    throw;
-  }
-  if (frame_.rotates_scans()) ingest_.turn(level(newest));
-}
-
-/// Levels the pose of the scan. Returns the rotation for its points.
-template <class Stages>
-Eigen::Matrix3d Pipeline<Stages>::level(ScanSlot& scan) const {
-  const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
-  scan.T_world_level = rotated(scan.T_world_level, R_level_sensor);
-  return R_level_sensor;
-}
-
-/// The residual of the newest scan, with its motion in the frame of the pushed cloud.
-template <class Stages>
-std::optional<PoseResidual> Pipeline<Stages>::pose_residual() {
-  std::optional<PoseResidual> residual = decision_->pose_residual();
-  if (residual) {
-    residual->previous_scan = scans_.newest().scan - 1;
-    residual->previous_time = scans_[residual->previous_scan].time;
-  }
-  const Eigen::Vector3d origin = config_.sensor_origin();
-  if (residual && (frame_.rotates_scans() || !origin.isZero(0.0))) {
-    Pose T_cloud_level = Pose::Identity();
-    T_cloud_level.linear() = transposed(sensor().R_level_sensor());
-    T_cloud_level.translation() = origin;
-    const Pose T_level_sensor = inverted(T_cloud_level);
-    for (auto* T : {&residual->T_previous_newest, &residual->T_previous_aligned}) {
-      *T = composed(composed(T_cloud_level, *T), T_level_sensor);
-    }
-    residual->covariance = transported_covariance(residual->covariance, T_cloud_level);
-  }
-  return residual;
-}
-
-/// After a push: the doubt about the times of the last scans.
-template <class Stages>
-TimeDoubt Pipeline<Stages>::time_doubt() {
-  const ScanSlot& newest = scans_.newest();
-  if (newest.scan == 0) return TimeDoubt::kNone;
-  return rate_.add(newest.time - scans_[newest.scan - 1].time, config_.max_gap);
-}
-
-/// Adds the newest scan to the running window.
-template <class Stages>
-Plausibility Pipeline<Stages>::plausibility(const ScanSlot& newest, const FrameResult& result) {
-  PlausibilityCheck::Scan scan;
-  scan.scan = newest.scan;
-  scan.points = newest.unjudged.size();
-  scan.judged = newest.split.count;
-  scan.surfaces = decision_->surfaces();
-  if (result.pose_residual) scan.residual = result.pose_residual->translation;
-  scan.is_misfit =
-      result.began_epoch == EpochReason::kJump || result.began_epoch == EpochReason::kMisfit;
-  return plausibility_.add(scan);
-}
-
-template <class Stages>
-void Pipeline<Stages>::reserve_like(const CloudView& example, std::size_t scans) {
-  if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
-  if (scans == 0) return;
-  // Margin: scans of one sensor differ slightly in size.
-  const std::size_t points = example.size() + example.size() / 16;
-  for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
-  newest_writer_.touch(points);
-  final_writer_.touch(points);
-  const WarmUp<Pipeline> warm_up(*this);
-  // After four scans, each kind of decision has compared a scan with a reference.
-  const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
-  for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
-    push(example, Pose::Identity(), next_time());
-    newest_verdict();
-  }
-  for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
-  final_writer_.ensure_capacity_like(newest_writer_);
-  decision_->reserve(scans);
-}
 
 }  // namespace dynains::detail
