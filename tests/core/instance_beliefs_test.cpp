@@ -453,12 +453,8 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     points.grow(3 + detail::kPackWidth);
     detail::Visibility visibility;
     views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest(), visibility);
-    CHECK(visibility.is_free(0));
-    CHECK_FALSE(visibility.is_hit(0));
-    CHECK(visibility.is_hit(1));
-    CHECK_FALSE(visibility.is_free(1));
-    CHECK_FALSE(visibility.is_hit(2));
-    CHECK_FALSE(visibility.is_free(2));
+    CHECK(visibility.bits(0, 3).free == 1);
+    CHECK(visibility.bits(0, 3).hit == 2);
     const std::uint64_t newest_scan = views.newest().scan;
     REQUIRE(views.find(newest_scan, 1) != nullptr);
     views.forget();

@@ -263,11 +263,11 @@ TEST_CASE("bits of visibility are counted over any range") {
   for (int round = 0; round < 2000; ++round) {
     const std::size_t begin = random.index(kCount);
     const std::size_t end = begin + random.index(std::min<std::size_t>(kCount - begin, 130) + 1);
-    std::uint32_t free = 0;
-    std::uint32_t hit = 0;
+    std::uint64_t free = 0;
+    std::uint64_t hit = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      free += visibility.is_free(i) ? 1 : 0;
-      hit += visibility.is_hit(i) ? 1 : 0;
+      free += visibility.bits(i, i + 1).free;
+      hit += visibility.bits(i, i + 1).hit;
     }
     const detail::Visibility::Count counted = visibility.count(begin, end);
     REQUIRE(counted.free == free);
@@ -303,12 +303,12 @@ TEST_CASE(
   T_reference_sample.translation().x() = -5.0;
   detail::Visibility visibility;
   detail::test_visibility(image, T_reference_sample, samples, count, 0.25F, 0.01F, visibility);
-  const std::vector<int> free = {1, 0, 0, 0, 0, 1, 0, 0};
-  const std::vector<int> hit = {0, 1, 1, 1, 0, 0, 0, 0};
+  const std::vector<std::uint64_t> free = {1, 0, 0, 0, 0, 1, 0, 0};
+  const std::vector<std::uint64_t> hit = {0, 1, 1, 1, 0, 0, 0, 0};
   for (std::size_t i = 0; i < count; ++i) {
     INFO("sample " << i);
-    CHECK(visibility.is_free(i) == (free[i] != 0));
-    CHECK(visibility.is_hit(i) == (hit[i] != 0));
+    CHECK(visibility.bits(i, i + 1).free == free[i]);
+    CHECK(visibility.bits(i, i + 1).hit == hit[i]);
   }
 }
 

@@ -46,15 +46,13 @@ class Visibility {
   Count count(std::size_t begin, std::size_t end) const {
     // A word that begins with the byte of a bit contains at least 56 bits from this bit on.
     constexpr std::size_t kAtOnce = 56;
-    constexpr std::uint64_t kAll = (std::uint64_t{1} << kAtOnce) - 1;
     Count sum = {0, 0};
-    for (; end - begin > kAtOnce; begin += kAtOnce) {
-      sum.free += count_ones(word_from(free_, begin) & kAll);
-      sum.hit += count_ones(word_from(hit_, begin) & kAll);
-    }
-    const std::uint64_t left = (std::uint64_t{1} << (end - begin)) - 1;
-    sum.free += count_ones(word_from(free_, begin) & left);
-    sum.hit += count_ones(word_from(hit_, begin) & left);
+    const auto add = [&](const Bits& some) {
+      sum.free += count_ones(some.free);
+      sum.hit += count_ones(some.hit);
+    };
+    for (; end - begin > kAtOnce; begin += kAtOnce) add(bits(begin, begin + kAtOnce));
+    add(bits(begin, end));
     return sum;
   }
   struct Bits {
@@ -77,9 +75,6 @@ class Visibility {
       }
     }
   }
-
-  bool is_free(std::size_t sample) const { return (free_[sample / 8] >> sample % 8 & 1U) != 0; }
-  bool is_hit(std::size_t sample) const { return (hit_[sample / 8] >> sample % 8 & 1U) != 0; }
 
  private:
   static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
