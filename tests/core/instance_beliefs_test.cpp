@@ -71,7 +71,10 @@ struct Scan {
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
-  bool removes(bool is_large = false) const { return updater.removes_whole(beliefs, 0, is_large); }
+  bool removes(bool is_large = false) {
+    beliefs.merged[0] = is_large ? 1 : 0;
+    return updater.removes_whole(beliefs, 0);
+  }
 
   InstanceBeliefUpdater updater;
   InstanceSamples samples;

@@ -49,10 +49,9 @@ class FreeSpaceEvidence {
         ground_sampler_(config),
         references_(config),
         pose_correction_(config.pose_tolerance, config.track_length, config.track_height),
-        newest_tester_(config),
-        older_tester_(config),
+        updater_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
-        track_belief_(updater().increment()),
+        track_belief_(updater_.increment()),
         judge_(config),
         dynamic_grid_(config),
         moved_ground_(config),
@@ -234,13 +233,6 @@ class FreeSpaceEvidence {
     std::uint64_t scan = 0;
     std::vector<Verdict> supervoxels;
   };
-  // Working memory of a thread that tests samples.
-  struct Tester {
-    explicit Tester(const FreeSpaceConfig& config) : updater(config) {}
-    detail::InstanceBeliefUpdater updater;
-    detail::Visibility visibility;
-  };
-  const detail::InstanceBeliefUpdater& updater() const { return newest_tester_.updater; }
 
   void forget_scans() {
     references_.forget();
@@ -274,7 +266,7 @@ class FreeSpaceEvidence {
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
     newest_number_of_point_ = std::move(number_of_point);
     record.number_of_point.assign(newest_number_of_point_);
-    updater().begin(evidence.samples, evidence.beliefs);
+    updater_.begin(evidence.samples, evidence.beliefs);
     record.counted.assign(evidence.samples.supervoxel_count(),
                           detail::DynamicOccupancyGrid::Count::kNone);
     predecessors_.assign(instance_count, kNoCluster);
@@ -297,9 +289,9 @@ class FreeSpaceEvidence {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > record.since_begin) break;
       const detail::ReferenceScan* const reference = references_.find(scan - back, record.epoch);
-      if (reference != nullptr) test(newest_tester_, record, *reference, -lag);
+      if (reference != nullptr) test(record, *reference, -lag, newest_visibility_);
     }
-    updater().begin_later_references(record.evidence.beliefs);
+    updater_.begin_later_references(record.evidence.beliefs);
     update_own_log_odds(record);
   }
 
@@ -309,25 +301,26 @@ class FreeSpaceEvidence {
   }
 
   // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
-  void test(Tester& tester, Record& record, const detail::ReferenceScan& reference, int lag) const {
+  // `memory`: of the thread.
+  void test(Record& record, const detail::ReferenceScan& reference, int lag,
+            detail::Visibility& memory) const {
     record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
-                                       record.T_world_sensor, reference, tester.visibility));
+                                       record.T_world_sensor, reference, memory));
     detail::InstanceEvidence& evidence = record.evidence;
-    const detail::Visibility& visibility =
-        references_.test(evidence.samples.points, evidence.samples.size(), record.T_world_sensor,
-                         reference, tester.visibility);
+    const detail::Visibility& visibility = references_.test(
+        evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference, memory);
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_beams);
     const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
                                                       static_cast<float>(T_sensor_reference(1, 3)),
                                                       static_cast<float>(T_sensor_reference(2, 3))};
-    tester.updater.update(evidence.samples, visibility, position, evidence.beliefs,
-                          [&](std::size_t instance) {
-                            if (!config_.use_tracks) return;
-                            Instance& tracked = evidence.tracked.instances[instance];
-                            (lag < 0 ? tracked.past : tracked.future).farthest_hit =
-                                static_cast<std::int16_t>(std::abs(lag));
-                          });
+    updater_.update(evidence.samples, visibility, position, evidence.beliefs,
+                    [&](std::size_t instance) {
+                      if (!config_.use_tracks) return;
+                      Instance& tracked = evidence.tracked.instances[instance];
+                      (lag < 0 ? tracked.past : tracked.future).farthest_hit =
+                          static_cast<std::int16_t>(std::abs(lag));
+                    });
   }
 
   // Delay (scans) between a new image and the tests of the older scans of a phase against it. The
@@ -350,7 +343,7 @@ class FreeSpaceEvidence {
       if (back > reference.scan) break;
       Record& older = record_of(reference.scan - back);
       if (older.epoch != reference.epoch) continue;
-      test(older_tester_, older, reference, lag);
+      test(older, reference, lag, older_visibility_);
       update_own_log_odds(older);
     }
   }
@@ -361,7 +354,7 @@ class FreeSpaceEvidence {
     for (std::size_t instance = 0; instance < evidence.tracked.instances.size(); ++instance) {
       Instance& tracked = evidence.tracked.instances[instance];
       const detail::InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-      tracked.own = judge_.own_log_odds(evidence, updater(), instance);
+      tracked.own = judge_.own_log_odds(evidence, updater_, instance);
       tracked.seen = {static_cast<float>(counts.moved), static_cast<float>(counts.decided)};
     }
   }
@@ -392,7 +385,7 @@ class FreeSpaceEvidence {
     // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
     constexpr std::uint64_t kFirstScans = 5;
     const bool may_presume = !is_final && record.since_begin >= kFirstScans;
-    judge_.judge(record.evidence, updater(), may_presume, judged.supervoxels);
+    judge_.judge(record.evidence, updater_, may_presume, judged.supervoxels);
   }
 
   void judge_by_dynamic_grid(Judged& judged) {
@@ -435,7 +428,8 @@ class FreeSpaceEvidence {
   detail::ReferenceScans references_;
   detail::PoseCorrection pose_correction_;
   std::optional<double> time_;  // of the newest scan, s
-  Tester newest_tester_, older_tester_;
+  detail::InstanceBeliefUpdater updater_;
+  detail::Visibility newest_visibility_, older_visibility_;
   Background* other_ = nullptr;
   detail::InstanceLinker linker_;
   detail::TrackBelief track_belief_;

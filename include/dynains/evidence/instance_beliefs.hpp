@@ -191,11 +191,11 @@ class InstanceBeliefUpdater {
            belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
-  /// Whether an instance is dynamic as a whole: enough of its decided samples are free. `is_large`:
-  /// larger than one object; large_removal_ratio of its samples must be free.
-  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance, bool is_large) const {
+  /// Whether an instance is dynamic as a whole: enough of its decided samples are free,
+  /// large_removal_ratio of them if it is larger than one object.
+  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance) const {
     const Counts& counts = beliefs.counts[instance];
-    const float ratio = is_large ? large_removal_ratio_ : removal_ratio_;
+    const float ratio = beliefs.merged[instance] != 0 ? large_removal_ratio_ : removal_ratio_;
     return counts.moved > 0 &&
            static_cast<float>(counts.moved) >= ratio * static_cast<float>(counts.decided);
   }

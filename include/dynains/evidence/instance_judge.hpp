@@ -75,7 +75,7 @@ class InstanceJudge {
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
     constexpr float kStill = -0.1F;  // increments of p_free, chosen on random worlds
     float increments = counts.stands_still() ? kStill : 0.0F;
-    if (removes_whole(evidence, updater, instance)) {
+    if (updater.removes_whole(evidence.beliefs, instance)) {
       increments = 2 * counts.moved >= counts.decided ? 2.0F : 1.0F;
     }
     return increments * updater.increment();
@@ -117,12 +117,6 @@ class InstanceJudge {
  private:
   static constexpr std::size_t kLeastGroup = 4;  // samples
 
-  bool removes_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
-                     std::size_t instance) const {
-    const bool is_large = use_tracks_ && !evidence.tracked.shapes[instance].carried;
-    return updater.removes_whole(evidence.beliefs, instance, is_large);
-  }
-
   // Writes static verdicts for supervoxels [first, last) and lists the free ones in `free_`.
   // Returns the largest log-odds of them.
   float judge_alone(const InstanceBeliefs& beliefs, const InstanceBeliefUpdater& updater,
@@ -147,7 +141,7 @@ class InstanceJudge {
   // the track of the instance if these are larger.
   Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
                        bool may_presume, std::size_t instance, float& level) const {
-    if (removes_whole(evidence, updater, instance) && track_agrees(evidence, instance)) {
+    if (updater.removes_whole(evidence.beliefs, instance) && track_agrees(evidence, instance)) {
       return Cause::kWithInstance;
     }
     if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
