@@ -127,7 +127,6 @@ class InstanceSampler {
     }
   };
   using SupervoxelTable = VoxelHashTable<Supervoxel>;
-  static constexpr int kHalf = 16;  // bits
   // Ranks are hashes of rounded coordinates. The rounding removes the last bits, which depend on
   // the rotation of the sensor frame.
   static constexpr float kPlacesPerMetre = 64.0F;
@@ -157,8 +156,8 @@ class InstanceSampler {
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       rank.store(&rank_[at.begin]);
-      const Int xy = is_sampled & ((floor(px * per_metre) << kHalf) +
-                                   (floor(py * per_metre) & Int((1 << kHalf) - 1)));
+      const Int xy = is_sampled & ((floor(px * per_metre) << kHalfBits) +
+                                   (floor(py * per_metre) & Int((1 << kHalfBits) - 1)));
       const Int z = is_sampled & floor(pz * per_metre);
       const Int kept_instance = select(is_sampled, instance, Int(-1));
       xy.store(&xy_[at.begin]);
@@ -203,7 +202,7 @@ class InstanceSampler {
   }
 
   static VoxelKey place_of(const Supervoxel& cell) {
-    return voxel_key(cell.xy >> kHalf, static_cast<std::int16_t>(cell.xy), cell.z);
+    return voxel_key(cell.xy >> kHalfBits, static_cast<std::int16_t>(cell.xy), cell.z);
   }
 
   // Counting sort of the supervoxels by instance; the samples follow their supervoxels.

@@ -97,10 +97,9 @@ class SurroundingGround {
 
   // Index of the cell of a point, never a cell at the border of the grid.
   std::size_t index_of(float x, float y) const {
-    constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
     const float last = 2.0F * half_ - 2.0F;
     const auto line = [&](float coordinate) {
-      const float place = coordinate * kPerMetre + half_;
+      const float place = coordinate / static_cast<float>(kCell) + half_;
       return static_cast<std::size_t>(
           static_cast<std::int32_t>(std::min(std::max(place, 1.0F), last)));
     };
@@ -173,8 +172,8 @@ class MovedGround {
       : removes_footprint_(config.footprint > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
-        footprint_(removes_footprint_ ? std::max(config.footprint, kLeastCell) : kUnusedCell,
-                   config.evidence_range),
+        footprint_(std::max(config.footprint, kLeastCell),
+                   removes_footprint_ ? config.evidence_range : 0.0),
         around_(config.evidence_range) {}
 
   void adapt(const SensorModel& sensor) {
@@ -217,7 +216,6 @@ class MovedGround {
 
  private:
   static constexpr double kLeastCell = 0.1;       // m, smallest cell of the footprint
-  static constexpr double kUnusedCell = 1.0;      // m, cell for a footprint of 0
   static constexpr std::uint32_t kLeastFree = 2;  // "free" references of a moved voxel
   static constexpr float kLeastRatio = 0.3F;      // "free" to "hit" references of a moved voxel
 

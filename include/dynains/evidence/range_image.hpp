@@ -101,17 +101,16 @@ class RangeImage {
   // is faster than an extraction of single numbers from packs.
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int16_t* nearest) {
-    constexpr std::size_t kBlock = 128;
     const ImageLocator locator(grid);
     static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres);
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
-      std::int32_t cell[kBlock];
-      std::int32_t range[kBlock];
-      for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
-        const std::size_t size = std::min(kBlock, points.size() - begin);
+      std::int32_t cell[detail::kStepPoints];
+      std::int32_t range[detail::kStepPoints];
+      for (std::size_t begin = 0; begin < points.size(); begin += detail::kStepPoints) {
+        const std::size_t size = std::min(detail::kStepPoints, points.size() - begin);
         detail::for_slices<Packs>(size, [&](auto place) {
           const Float x = place.load(points.x.data() + begin);
           const Float y = place.load(points.y.data() + begin);

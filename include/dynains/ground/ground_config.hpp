@@ -13,7 +13,6 @@ namespace dynains {
 struct GroundConfig {
   /// Number of innermost rings in which the height and the flatness of a patch are checked.
   static constexpr std::size_t kCheckedRings = 4;
-  static constexpr int kMaxLowest = 64;
 
   double sensor_height = 0.0;         ///< m, sensor origin over the ground; 0: estimated from scans
   double ground_min_range = 1.0;      ///< m, inner edge of the first ring
@@ -61,7 +60,7 @@ struct GroundConfig {
                       "outer edge of the last ring of ground patches"});
     visitor(Parameter{"ground_iterations", self.ground_iterations, closed(1, 10), "",
                       "plane fits per patch"});
-    visitor(Parameter{"ground_lowest_points", self.ground_lowest_points, closed(1, kMaxLowest), "",
+    visitor(Parameter{"ground_lowest_points", self.ground_lowest_points, closed(1, 64), "",
                       "lowest points of a patch that seed its plane"});
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                       "patches with fewer points are not ground"});

@@ -233,8 +233,8 @@ class GroundSegmenter {
   void take_back_overhangs(const PatchCounts& begin, PatchCounts& rest, GroundSplit& split,
                            std::size_t& count) {
     using Zones = detail::ConcentricZones;
-    constexpr int kOutermost = Zones::kRings.back() * Zones::kSectors.back();
-    for (std::size_t p = kPatches - static_cast<std::size_t>(kOutermost); p-- > 0;) {
+    const std::int32_t outermost = Zones::kRings.back() * Zones::kSectors.back();
+    for (std::size_t p = kPatches - static_cast<std::size_t>(outermost); p-- > 0;) {
       const std::size_t found = begin[p + 1] - begin[p];
       if (found == 0 || !overhangs(p)) continue;
       copy(split, begin[p], found, sorted_, begin_[p] + rest[p]);
@@ -300,8 +300,8 @@ class GroundSegmenter {
 
   // Height (m, sensor frame) below which points of the patch are noise.
   float floor_of(std::size_t patch) const {
-    constexpr std::size_t kFirstZoneRings = detail::ConcentricZones::kRings[0];
-    const bool is_in_first_zone = zones_.ring(patch) < kFirstZoneRings;
+    const bool is_in_first_zone =
+        zones_.ring(patch) < static_cast<std::size_t>(detail::ConcentricZones::kRings.front());
     return is_in_first_zone ? static_cast<float>(-(1.0 + config_.ground_below) * height_)
                             : -std::numeric_limits<float>::infinity();
   }

@@ -39,8 +39,8 @@ class Ingest {
     points_.grow(count + kPackWidth);
     grow(input_, count + kPackWidth);
     count_ = 0;
-    for (std::size_t begin = 0; begin < count; begin += kChunk) {
-      const std::size_t length = std::min(kChunk, count - begin);
+    for (std::size_t begin = 0; begin < count; begin += kStepPoints) {
+      const std::size_t length = std::min(kStepPoints, count - begin);
       cloud.copy(begin, length, points_.x.data() + count_, points_.y.data() + count_,
                  points_.z.data() + count_);
       if (!region.origin.isZero(0.0F)) subtract(region.origin, length);
@@ -63,9 +63,6 @@ class Ingest {
   const std::vector<std::uint32_t>& input() const { return input_; }
 
  private:
-  // Points per step: fits the L1 cache.
-  static constexpr std::size_t kChunk = 128;
-
   // Moves the appended points, except beams without a return, which stay at the origin.
   void subtract(const Eigen::Vector3f& origin, std::size_t length) {
     float* const x = points_.x.data() + count_;

@@ -72,8 +72,8 @@ class ScanRing {
   std::uint64_t open() const { return pushed_ - finished_; }
   /// Default time of the next scan, s: 0.1 s after the previous scan.
   double next_time() const {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    return pushed_ == 0 ? 0.0 : std::max(last_time_ + 0.1, std::nextafter(last_time_, kInfinity));
+    const double after = std::nextafter(last_time_, std::numeric_limits<double>::infinity());
+    return pushed_ == 0 ? 0.0 : std::max(last_time_ + 0.1, after);
   }
 
   ScanSlot& operator[](std::uint64_t scan) { return slots_[scan % slots_.size()]; }

@@ -309,7 +309,6 @@ class PlaneAligner {
   static constexpr double kUpright = 0.7;        // most z of the unit normal of a wall
   // Weights of the first estimate. They decide only in directions without information.
   static constexpr PoseStep kAttraction = {0.2, 0.2, 0.2, 100.0, 100.0, 100.0};
-  static constexpr double kFirstError = 1.0;   // m, standard deviation of the first estimate
   static constexpr double kLeastWeight = 8.0;  // of errors of the sensor: 0.4 deg, at 2 cm
   static constexpr double kNone = 1e9;         // weight of an unknown that stays
   static constexpr double kMemory = 0.97;      // of the weight of the elevation, by scan
@@ -490,10 +489,11 @@ class PlaneAligner {
     return covariance;
   }
 
-  // Where the surfaces tell nothing, attractions keep the first estimate and its error.
+  // Where the surfaces tell nothing, attractions keep the first estimate and its error, a standard
+  // deviation of 1 m.
   static void add_first_error(const Equations::Matrix& inverse, PoseCovariance& covariance) {
     for (std::size_t k = 0; k < 6; ++k) {
-      const double kept = kAttraction[k] * kFirstError / (k < 3 ? 1.0 : kLever);
+      const double kept = kAttraction[k] / (k < 3 ? 1.0 : kLever);
       for (std::size_t i = 0; i < 6; ++i) {
         for (std::size_t j = 0; j < 6; ++j) {
           covariance[i][j] += kept * kept * inverse[i][k] * inverse[j][k];

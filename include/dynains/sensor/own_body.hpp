@@ -49,7 +49,6 @@ class NearestReturns {
   }
 
   void add(PointsView points) {
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
     near_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const float x = points.x[i], y = points.y[i];
@@ -57,7 +56,7 @@ class NearestReturns {
     }
     const BeamAngles angles = beam_angles(near_);
     nearest_.assign(by_direction_.size(), {});
-    nearest_ground_.assign(kColumns, kInfinity);
+    nearest_ground_.assign(kColumns, std::numeric_limits<float>::infinity());
     for (std::size_t i = 0; i < near_.size(); ++i) {
       const Eigen::Vector3f p(near_.x[i], near_.y[i], near_.z[i]);
       const float range = p.norm();

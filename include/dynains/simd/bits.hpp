@@ -10,8 +10,8 @@ namespace dynains::detail {
 /// Bits of a word. Loops take so many numbers at a time, with one bit for each.
 inline constexpr std::size_t kWordBits = 64;
 
-/// Each byte is 1. The product with a byte repeats that byte eight times.
-inline constexpr std::uint64_t kInEachByte = 0x0101010101010101U;
+/// Bits of half a number of 32 bits.
+inline constexpr int kHalfBits = 16;
 
 /// Eight bytes for each value of a byte.
 using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
@@ -31,7 +31,7 @@ constexpr std::uint32_t count_ones(std::uint64_t bits) {
   bits -= bits >> 1U & 0x5555555555555555U;
   bits = (bits & 0x3333333333333333U) + (bits >> 2U & 0x3333333333333333U);
   bits = (bits + (bits >> 4U)) & 0x0F0F0F0F0F0F0F0FU;
-  return static_cast<std::uint32_t>(bits * kInEachByte >> 56U);
+  return static_cast<std::uint32_t>(bits * 0x0101010101010101U >> 56U);
 }
 
 /// Calls `body(index)` for each set bit in ascending order.

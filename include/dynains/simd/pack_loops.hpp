@@ -56,6 +56,9 @@ template <class Packs, class Kernel>
                                                                  Kernel&& kernel);
 #endif
 
+/// Points per step of loops that pass over them twice: they fit the L1 cache.
+inline constexpr std::size_t kStepPoints = 128;
+
 /// The numbers 0, 1, 2, ...
 template <class Int>
 Int pack_indices() {

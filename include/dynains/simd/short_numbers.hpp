@@ -50,7 +50,6 @@ class ShortNumbers {
   }
 
  private:
-  static constexpr int kHalf = 16;  // bits
   struct Run {
     std::uint32_t begin;
     std::uint32_t upper;  // the lower bits are zero
@@ -63,12 +62,12 @@ class ShortNumbers {
     std::uint16_t* const lower = lower_.data();
     for (std::size_t i = 0; i < count; ++i) lower[i] = static_cast<std::uint16_t>(from[i]);
     const auto begin_run = [&](std::size_t i) {
-      runs_.push_back({static_cast<std::uint32_t>(i), from[i] >> kHalf << kHalf});
+      runs_.push_back({static_cast<std::uint32_t>(i), from[i] >> kHalfBits << kHalfBits});
     };
     if (count > 0) begin_run(0);
     for (std::size_t begin = 1; begin < count; begin += kWordBits) {
       const std::size_t size = std::min(kWordBits, count - begin);
-      const std::uint64_t begins = find_changes<Packs, kHalf>(size, from + begin);
+      const std::uint64_t begins = find_changes<Packs, kHalfBits>(size, from + begin);
       for_each_bit(begins, [&](std::size_t i) { begin_run(begin + i); });
     }
   }
