@@ -3,7 +3,8 @@
 # that precede its own in the list.
 set(layers
   "^((simd|threads)/.*|errors|median|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
-  "^(sensor|voxels)/"
+  "^voxels/"
+  "^sensor/"
   "^(ground|clusters|belief)/"
   "^registration/"
   "^(descriptors|evidence)/"
@@ -33,8 +34,8 @@ function(find_layer header result)
 endfunction()
 
 set(basic_layer 0)
-set(stage_layers_end 6)
-set(facade_layer 8)
+set(stage_layers_end 7)
+set(facade_layer 9)
 set(upward "")
 file(GLOB_RECURSE headers RELATIVE ${INCLUDE_DIR}/dynains ${INCLUDE_DIR}/dynains/*.hpp)
 foreach(header IN LISTS headers)
