@@ -53,9 +53,10 @@ Eigen::Isometry3d at(const Poses& poses, double time) {
   return interpolate(poses[before], poses[before + 1], index - static_cast<double>(before));
 }
 
-void write_times(const fs::path& folder, std::size_t count) {
-  std::ofstream file(folder / "times.txt");
-  for (std::size_t i = 0; i < count; ++i) file << kPeriod * static_cast<double>(i) << '\n';
+std::vector<double> times_of(const Poses& poses) {
+  std::vector<double> times;
+  for (std::size_t i = 0; i < poses.size(); ++i) times.push_back(kPeriod * static_cast<double>(i));
+  return times;
 }
 
 /// Rows time x y z qx qy qz qw, or with the quaternion as w x y z.
@@ -92,8 +93,9 @@ struct Kind {
 /// A trajectory with `period` (s) whose clock differs by `offset` (s).
 Kind timed(const std::string& name, Answer expected, double period, double offset) {
   return {name, expected, [period, offset](const fs::path& folder, const Poses& poses) {
-            write_times(folder, poses.size());
-            std::vector<double> times;
+            std::vector<double> times = times_of(poses);
+            write_times(folder / "times.txt", times);
+            times.clear();
             Poses rows;
             const double last = kPeriod * static_cast<double>(poses.size() - 1);
             for (double time = 0.0; time < last + 1e-9; time += period) {
@@ -133,11 +135,7 @@ std::vector<Kind> kinds() {
       spoilt("centimetres", [](const Eigen::Isometry3d& T) { return scaled(T, 100.0); }),
       {"w x y z", Answer::kOption,
        [](const fs::path& folder, const Poses& poses) {
-         std::vector<double> times;
-         for (std::size_t i = 0; i < poses.size(); ++i) {
-           times.push_back(kPeriod * static_cast<double>(i));
-         }
-         write_timed(folder, times, poses, true);
+         write_timed(folder, times_of(poses), poses, true);
        }},
       spoilt("left-handed",
              [](const Eigen::Isometry3d& T) {

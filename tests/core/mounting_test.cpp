@@ -10,6 +10,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/random.hpp"
 #include "support/recordings.hpp"
 
@@ -214,11 +215,9 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
                           {2.5, 5, -25}, {0.7, 0, -30}, {2.0, -10, 0}};
   for (std::size_t i = 0; i < 2 * value_names(sim::Scene()).size(); ++i) {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
-    sim::Config config;
-    config.scene = static_cast<sim::Scene>(i % value_names(sim::Scene()).size());
-    config.sensor = static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size());
-    config.scans = 1;
-    config.seed = 11 + i;
+    sim::Config config = dynains::test::drive_of(
+        static_cast<sim::Scene>(i % value_names(sim::Scene()).size()),
+        static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size()), 1, 11 + i);
     config.sensor_height = mount.height;
     config.mounting_pitch = mount.pitch;
     config.mounting_roll = mount.roll;

@@ -93,11 +93,7 @@ TEST_CASE("Right poses of a sparse sensor that comes to rest are no other record
 }
 
 TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it moves") {
-  simulation::Config config;
-  config.scene = simulation::Scene::kHighway;
-  config.sensor = simulation::Sensor::kMid360;
-  config.scans = 30;
-  config.seed = 603;
+  auto config = drive_of(simulation::Scene::kHighway, simulation::Sensor::kMid360, 30, 603);
   const auto standing = [&](double metres_per_second) {
     config.ego_speed = metres_per_second;
     return diagnose(

@@ -238,11 +238,7 @@ TEST_CASE("check and run propose the mounting of a sensor that lies on its side"
 }
 
 TEST_CASE("check names ways of the poses that are too long, and the factor") {
-  simulation::Config config;
-  config.sensor = simulation::Sensor::kOs1_64;
-  config.scans = 30;
-  config.seed = 41;
-  const Drive drive(config);
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 30, 41));
   for (const double factor : {1.1, 0.9}) {
     drive.with_poses([&](std::size_t, const Pose& T) {
       Pose scaled = T;

@@ -29,6 +29,11 @@ struct Fixture {
   }
   nlohmann::json report() const { return nlohmann::json::parse(read_text(out + "/report.json")); }
   std::size_t labels() const { return count_entries(out + "/labels"); }
+  void await_first_scan() const {
+    for (int i = 0; i < 60000 && !fs::exists(out + ".partial/labels/000000.label"); ++i) {
+      ::usleep(1000);
+    }
+  }
 
   TemporaryFolder folder;
   std::string seq;
@@ -152,26 +157,6 @@ TEST_CASE("A map of LAS holds classes and attributes of its points") {
     CHECK((points.positions[i] - expected.positions[i]).cwiseAbs().maxCoeff() < 0.00052);
   }
   CHECK(points.time.size() == points.positions.size());
-}
-
-TEST_CASE("Flags of attributes of the map that do not fit together are refused") {
-  const Fixture fixture(3);
-  const auto refusal = [&](const Arguments& flags) {
-    const Outcome outcome = fixture.run(flags);
-    CHECK(outcome.code != 0);
-    CHECK_FALSE(fs::exists(fixture.out));
-    return outcome.err;
-  };
-  const std::string map = fixture.folder / "map.las";
-  CHECK_THAT(refusal({"--crs", "EPSG:25832"}), ContainsSubstring("--crs needs --map FILE.las"));
-  CHECK_THAT(refusal({"--map", map, "--crs", "nowhere"}),
-             ContainsSubstring("found nowhere") || ContainsSubstring("this build has no PROJ"));
-  CHECK_THAT(refusal({"--map-attributes", "--build-map", "false"}),
-             ContainsSubstring("--map-attributes needs --build-map true"));
-  CHECK_THAT(refusal({"--map", fixture.out + "/dynamic_points.ply"}),
-             ContainsSubstring("the moving points go there"));
-  CHECK_THAT(refusal({"--map", fixture.folder / "map.laz"}),
-             ContainsSubstring("ends in .ply, .pcd or .las"));
 }
 
 TEST_CASE("Flags --map and --map-voxel") {
@@ -331,6 +316,10 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--map", "a.ply", "--build-map", "false"}, "--map needs --build-map true"},
       {{"--map", fixture.out + "/dynamic_points.ply"}, "the moving points go there"},
       {{"--map", fixture.out + "/clean/a.ply"}, "other results go into that folder"},
+      {{"--map", fixture.folder / "map.laz"}, "ends in .ply, .pcd or .las"},
+      {{"--map-attributes", "--build-map", "false"}, "--map-attributes needs --build-map true"},
+      {{"--crs", "EPSG:25832"}, "--crs needs --map FILE.las"},
+      {{"--map", fixture.folder / "map.las", "--crs", "nowhere"}, "coordinate reference system"},
   };
   for (const Case& wrong : cases) {
     const Outcome outcome = fixture.run(wrong.flags);
@@ -449,9 +438,7 @@ TEST_CASE("Maps far from the origin lose nothing") {
 TEST_CASE("Ctrl-C: run finishes the current scan, keeps the results so far, exits with code 130") {
   Fixture fixture(400);
   Process process({"run", fixture.seq, "--out", fixture.out});
-  for (int i = 0; i < 60000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
-    ::usleep(1000);
-  }
+  fixture.await_first_scan();
   ::kill(process.id(), SIGINT);
   const Outcome outcome = process.wait();
   CAPTURE(outcome.err);
@@ -475,9 +462,7 @@ TEST_CASE("A signal that is ignored at the start does not end a run") {
   const int signal = GENERATE(SIGINT, SIGTERM);
   Process process({"run", fixture.seq, "--out", fixture.out},
                   [signal] { std::signal(signal, SIG_IGN); });
-  for (int i = 0; i < 60000 && !fs::exists(fixture.out + ".partial/labels/000000.label"); ++i) {
-    ::usleep(1000);
-  }
+  fixture.await_first_scan();
   ::kill(process.id(), signal);
   CHECK(process.wait().code == 0);
   CHECK(fixture.report()["complete"] == true);

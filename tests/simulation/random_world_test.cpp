@@ -6,21 +6,13 @@
 #include "dynains/simulation/config.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 
 namespace dynains::simulation {
 namespace {
 
 std::uint32_t kind_of(std::uint32_t label) { return label & 0xffff; }
 std::uint32_t instance_of(std::uint32_t label) { return label >> 16; }
-
-Config world(Scene scene, Sensor sensor, int scans) {
-  Config config;
-  config.scene = scene;
-  config.sensor = sensor;
-  config.scans = scans;
-  config.seed = 5;
-  return config;
-}
 
 double elevation_of(const SimulatedScan& scan, std::size_t i) {
   const float* p = &scan.xyzi[4 * i];
@@ -53,7 +45,7 @@ TEST_CASE("a seed is a world, and worlds differ in scene, sensor and carrier") {
 }
 
 TEST_CASE("static things have lasting instance ids if asked, and are otherwise the same") {
-  Config config = world(Scene::kMixed, Sensor::kVlp16, 4);
+  Config config = test::drive_of(Scene::kMixed, Sensor::kVlp16, 4, 5);
   config.clutter = 1;
   const SimulatedScan without = Simulator(config).scan(0);
   config.static_instances = true;
@@ -80,7 +72,7 @@ TEST_CASE("static things have lasting instance ids if asked, and are otherwise t
 }
 
 TEST_CASE("a Mid-360 looks all around, from 7 degrees down to 52 degrees up") {
-  Config config = world(Scene::kHall, Sensor::kMid360, 1);
+  Config config = test::drive_of(Scene::kHall, Sensor::kMid360, 1, 5);
   config.dropout = 0;
   const SimulatedScan scan = Simulator(config).scan(0);
   CHECK(scan.labels.size() > 17000);
@@ -96,7 +88,7 @@ TEST_CASE("a Mid-360 looks all around, from 7 degrees down to 52 degrees up") {
 }
 
 TEST_CASE("lost packets take their share of the columns, whole columns each") {
-  Config config = world(Scene::kHall, Sensor::kVlp16, 1);
+  Config config = test::drive_of(Scene::kHall, Sensor::kVlp16, 1, 5);
   config.dropout = 0;
   const double all = static_cast<double>(Simulator(config).scan(0).labels.size());
   config.packet_loss = 0.3;
@@ -105,7 +97,7 @@ TEST_CASE("lost packets take their share of the columns, whole columns each") {
 }
 
 TEST_CASE("each beam has its own constant range error") {
-  Config config = world(Scene::kHall, Sensor::kVlp16, 2);
+  Config config = test::drive_of(Scene::kHall, Sensor::kVlp16, 2, 5);
   config.dropout = 0;
   config.range_noise = 0;
   Simulator exact(config);
@@ -134,7 +126,7 @@ TEST_CASE("each beam has its own constant range error") {
 }
 
 TEST_CASE("a wide beam mixes surfaces at edges only") {
-  Config config = world(Scene::kStatic, Sensor::kOs1_64, 1);
+  Config config = test::drive_of(Scene::kStatic, Sensor::kOs1_64, 1, 5);
   config.dropout = 0;
   config.range_noise = 0;
   const SimulatedScan thin = Simulator(config).scan(0);
@@ -173,7 +165,7 @@ std::map<std::uint32_t, Eigen::Vector2d> poles_of(const SimulatedScan& scan) {
 }
 
 TEST_CASE("de-skewing takes the motion within a scan away as far as it is known") {
-  Config config = world(Scene::kStatic, Sensor::kOs1_64, 1);
+  Config config = test::drive_of(Scene::kStatic, Sensor::kOs1_64, 1, 5);
   config.ego_speed = 20;
   config.static_instances = true;
   const auto instant = poles_of(Simulator(config).scan(0));
@@ -197,7 +189,7 @@ TEST_CASE("de-skewing takes the motion within a scan away as far as it is known"
 }
 
 TEST_CASE("the drift of written poses grows with the way") {
-  Config config = world(Scene::kStatic, Sensor::kVlp16, 100);
+  Config config = test::drive_of(Scene::kStatic, Sensor::kVlp16, 100, 5);
   config.ego_speed = 10;
   config.pose_drift = 0.5;
   double early = 0, late = 0;

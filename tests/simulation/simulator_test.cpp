@@ -5,32 +5,23 @@
 #include <map>
 #include <set>
 
+#include "io/fingerprint.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 
 namespace dynains::simulation {
 
+using test::drive_of;
+
 namespace {
 
-/// FNV-1a over all data that is written to disk.
+/// Of all data that is written to disk.
 std::uint64_t hash_of(const SimulatedScan& scan) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  auto add = [&hash](const void* data, std::size_t bytes) {
-    const auto* p = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < bytes; ++i) hash = (hash ^ p[i]) * 1099511628211ULL;
-  };
-  add(scan.xyzi.data(), scan.xyzi.size() * sizeof(float));
-  add(scan.labels.data(), scan.labels.size() * sizeof(std::uint32_t));
-  add(scan.T_world_sensor_noisy.matrix().data(), 16 * sizeof(double));
-  return hash;
-}
-
-Config small(Scene scene, Sensor sensor, int scans, std::uint64_t seed) {
-  Config config;
-  config.scene = scene;
-  config.sensor = sensor;
-  config.scans = scans;
-  config.seed = seed;
-  return config;
+  Fingerprint hash;
+  hash.add(scan.xyzi.data(), scan.xyzi.size() * sizeof(float));
+  hash.add(scan.labels.data(), scan.labels.size() * sizeof(std::uint32_t));
+  hash.add(scan.T_world_sensor_noisy.matrix().data(), 16 * sizeof(double));
+  return hash.value();
 }
 
 std::uint32_t class_of(std::uint32_t label) { return label & 0xffff; }
@@ -39,7 +30,7 @@ bool is_moving(std::uint32_t label) { return class_of(label) >= 252 && class_of(
 }  // namespace
 
 TEST_CASE("one configuration gives equal bits, in any order of scans") {
-  const Config config = small(Scene::kUrban, Sensor::kVlp16, 4, 3);
+  const Config config = drive_of(Scene::kUrban, Sensor::kVlp16, 4, 3);
   Simulator a(config), b(config);
   const std::uint64_t third = hash_of(b.scan(2));
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -54,7 +45,7 @@ TEST_CASE("one configuration gives equal bits, in any order of scans") {
 
 TEST_CASE(
     "with a rolling shutter, the points of a scan have increasing times and own sensor poses") {
-  Config config = small(Scene::kHighway, Sensor::kVlp16, 2, 3);
+  Config config = drive_of(Scene::kHighway, Sensor::kVlp16, 2, 3);
   config.range_noise = 0;
   config.dropout = 0;
   config.rolling_shutter = true;
@@ -86,7 +77,7 @@ TEST_CASE("every scene and every sensor gives points") {
     const std::size_t scene = number % scenes.size();
     const std::size_t sensor = number % sensors.size();
     INFO(scenes[scene] << ' ' << sensors[sensor]);
-    Simulator simulator(small(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
+    Simulator simulator(drive_of(static_cast<Scene>(scene), static_cast<Sensor>(sensor), 1, 5));
     const SimulatedScan scan = simulator.scan(0);
     // Most beams of the dome end in the sky.
     CHECK(scan.labels.size() > (static_cast<Sensor>(sensor) == Sensor::kMid360 ? 2000 : 5000));
@@ -104,7 +95,7 @@ TEST_CASE("every scene and every sensor gives points") {
 
 TEST_CASE("instant labels are moving above half a metre per second") {
   for (const Scene scene : {Scene::kUrban, Scene::kStopAndGo, Scene::kCrowd}) {
-    Config config = small(scene, Sensor::kVlp16, 40, 2);
+    Config config = drive_of(scene, Sensor::kVlp16, 40, 2);
     config.labelling = Labelling::kInstant;
     Simulator simulator(config);
     std::size_t moving = 0, standing = 0;
@@ -128,7 +119,7 @@ TEST_CASE("instant labels are moving above half a metre per second") {
 }
 
 TEST_CASE("ever labels never change, and are moving if the object moves at any time") {
-  Config config = small(Scene::kStopAndGo, Sensor::kVlp16, 80, 3);
+  Config config = drive_of(Scene::kStopAndGo, Sensor::kVlp16, 80, 3);
   Simulator ever(config);
   config.labelling = Labelling::kInstant;
   Simulator instant(config);
@@ -159,7 +150,7 @@ TEST_CASE("ever labels never change, and are moving if the object moves at any t
 }
 
 TEST_CASE("movers have their stated speed") {
-  Simulator simulator(small(Scene::kUrban, Sensor::kVlp16, 20, 7));
+  Simulator simulator(drive_of(Scene::kUrban, Sensor::kVlp16, 20, 7));
   std::size_t compared = 0;
   std::map<std::uint32_t, ObjectState> last;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
@@ -181,7 +172,7 @@ TEST_CASE("movers have their stated speed") {
 }
 
 TEST_CASE("nothing moves in the static scene") {
-  Simulator simulator(small(Scene::kStatic, Sensor::kVlp16, 20, 2));
+  Simulator simulator(drive_of(Scene::kStatic, Sensor::kVlp16, 20, 2));
   bool parked = false;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     const SimulatedScan scan = simulator.scan(i);
@@ -194,7 +185,7 @@ TEST_CASE("nothing moves in the static scene") {
 
 TEST_CASE("vehicles keep a distance from one another and from the ego vehicle") {
   for (const Scene scene : {Scene::kHighway, Scene::kHill, Scene::kStopAndGo}) {
-    Simulator simulator(small(scene, Sensor::kVlp16, 60, 3));
+    Simulator simulator(drive_of(scene, Sensor::kVlp16, 60, 3));
     for (std::size_t i = 0; i < simulator.size(); i += 4) {
       const SimulatedScan scan = simulator.scan(i);
       for (const ObjectState& state : scan.objects) {
@@ -215,7 +206,7 @@ TEST_CASE("vehicles keep a distance from one another and from the ego vehicle") 
 }
 
 TEST_CASE("points of an object lie within its box") {
-  Simulator simulator(small(Scene::kUrban, Sensor::kHdl64, 3, 6));
+  Simulator simulator(drive_of(Scene::kUrban, Sensor::kHdl64, 3, 6));
   const SimulatedScan scan = simulator.scan(1);
   std::map<std::uint32_t, const ObjectState*> states;
   for (const ObjectState& state : scan.objects) states[state.instance] = &state;
@@ -237,7 +228,7 @@ TEST_CASE("points of an object lie within its box") {
 }
 
 TEST_CASE("range noise has the configured deviation") {
-  Config config = small(Scene::kStatic, Sensor::kVlp16, 1, 4);
+  Config config = drive_of(Scene::kStatic, Sensor::kVlp16, 1, 4);
   config.dropout = 0;
   config.range_noise = 0;
   const SimulatedScan exact = Simulator(config).scan(0);
@@ -264,7 +255,7 @@ TEST_CASE("range noise has the configured deviation") {
 }
 
 TEST_CASE("poses are rigid and smooth, with the configured noise") {
-  Config config = small(Scene::kHill, Sensor::kVlp16, 60, 2);
+  Config config = drive_of(Scene::kHill, Sensor::kVlp16, 60, 2);
   config.pose_noise_translation = 0.03;
   config.pose_noise_rotation = 0.1;
   Simulator simulator(config);
@@ -299,7 +290,7 @@ TEST_CASE("a person turns the sensor by up to 40 degrees per second and sways, a
     double turn = 0, tilt = 0, bob = 0;
   };
   const auto sway_of = [](Gait gait) {
-    Config config = small(Scene::kHall, Sensor::kVlp16, 60, 4);
+    Config config = drive_of(Scene::kHall, Sensor::kVlp16, 60, 4);
     config.gait = gait;
     Simulator simulator(config);
     Sway sway;
@@ -329,7 +320,7 @@ TEST_CASE("a person turns the sensor by up to 40 degrees per second and sways, a
 }
 
 TEST_CASE("direction noise moves points across their beams by its deviation") {
-  Config config = small(Scene::kStatic, Sensor::kVlp16, 1, 2);
+  Config config = drive_of(Scene::kStatic, Sensor::kVlp16, 1, 2);
   const SimulatedScan exact = Simulator(config).scan(0);
   config.direction_noise = 0.1;
   const SimulatedScan noisy = Simulator(config).scan(0);
@@ -345,7 +336,7 @@ TEST_CASE("direction noise moves points across their beams by its deviation") {
 }
 
 TEST_CASE("the sensor is at its height over the ground") {
-  Config config = small(Scene::kStatic, Sensor::kHdl64, 1, 2);
+  Config config = drive_of(Scene::kStatic, Sensor::kHdl64, 1, 2);
   config.sensor_height = 2.2;
   const SimulatedScan scan = Simulator(config).scan(0);
   double lowest = 0;
