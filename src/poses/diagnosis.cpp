@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -324,14 +323,13 @@ struct Evidence {
     }
     if (known.pairs.size() < pairs.size()) {
       known.as_given = agreement_under(given_motion(recording), known.pairs);
-      known.standing = agreement_under(no_motion, known.pairs);
     }
     return known;
   }
   /// The misfit (m) of a reading, by registered motions. Infinite if it explains no more than no
   /// motion, or too few of the motions, if its unit or scale explains no more than turns alone, or
   /// if landmarks meet better under the given poses.
-  double misfit_of_motions(const Reading& reading) const {
+  double misfit_of(const Reading& reading) const {
     const BodyMotion motion = motion_under(recording, reading);
     const Evidence known = where_known(motion);
     const double error = error_at_points(known.motions, motion);
@@ -344,18 +342,6 @@ struct Evidence {
     const bool is_as_good = agreement_under(motion, known.pairs).gap <= known.as_given.gap;
     return is_explained && is_as_good ? error : kNever;
   }
-  /// The gap (m) under a reading, likewise.
-  double misfit_of_landmarks(const Reading& reading) const {
-    const BodyMotion motion = motion_under(recording, reading);
-    const Evidence known = where_known(motion);
-    const Agreement agreement = agreement_under(motion, known.pairs);
-    const bool is_explained =
-        fits(agreement, known.standing) && is_clearly_better(agreement, known.standing) &&
-        is_clearly_better(agreement, known.as_given) &&
-        (!changes_ways(reading) ||
-         is_clearly_better(agreement, agreement_under(turns_of(motion), known.pairs)));
-    return is_explained ? agreement.gap : kNever;
-  }
 
  private:
   bool changes_ways(const Reading& reading) const {
@@ -366,16 +352,15 @@ struct Evidence {
 
 /// The reading with the least misfit; a more complex one must be clearly better. Empty if none is
 /// clearly better than the given one, whose misfit is `as_given`.
-std::optional<Reading> best_reading(const std::vector<Reading>& readings, double as_given,
-                                    const std::function<double(const Reading&)>& misfit_of,
-                                    const std::function<bool(double, double)>& is_better) {
-  const std::vector<double> misfits =
-      in_two_threads(readings.size(), [&](std::size_t i) { return misfit_of(readings[i]); });
+std::optional<Reading> best_reading(const Evidence& evidence, const std::vector<Reading>& readings,
+                                    double as_given) {
+  const std::vector<double> misfits = in_two_threads(
+      readings.size(), [&](std::size_t i) { return evidence.misfit_of(readings[i]); });
   std::optional<Reading> best;
   double least = as_given;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const bool is_as_simple = best && best->complexity == readings[i].complexity;
-    if (!(is_as_simple ? misfits[i] < least : is_better(misfits[i], least))) continue;
+    if (!(is_as_simple ? misfits[i] < least : is_much_smaller(misfits[i], least))) continue;
     best = readings[i];
     least = misfits[i];
   }
@@ -419,13 +404,6 @@ PoseVerdict verdict_of_agreement(const Evidence& evidence) {
 
 /// `neighbours` is their agreement without motion.
 void judge_by_landmarks(const Evidence& evidence, const Agreement& neighbours, Diagnosis& d) {
-  const auto reading = best_reading(
-      usual_readings(evidence.recording), evidence.as_given.gap,
-      [&](const Reading& r) { return evidence.misfit_of_landmarks(r); },
-      [](double a, double b) {
-        return is_clearly_better({0.0, a, 0}, {0.0, b, 0});
-      });
-  if (reading) return propose(*reading, d);
   d.verdict = verdict_of_agreement(evidence);
   // Few objects in sight, as on a motorway, or few points: nothing explains scans clearly better,
   // and poses that stand are those of a sensor whose scans far apart agree as neighbours do.
@@ -455,9 +433,7 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
     if (!is_exact) {
       for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);
     }
-    const auto reading = best_reading(
-        readings, all.at_points, [&](const Reading& r) { return evidence.misfit_of_motions(r); },
-        is_much_smaller);
+    const auto reading = best_reading(evidence, readings, all.at_points);
     if (reading) return propose(*reading, d);
   }
   d.verdict = verdict_of_agreement(evidence);
