@@ -16,7 +16,6 @@
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/stage_checks.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/plausibility.hpp"
