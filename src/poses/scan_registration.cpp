@@ -61,10 +61,10 @@ void KnownTranslation::add_to(NormalEquations& equations, const Pose& T) const {
   equations.add(J, direction.dot(T.translation()) - place, ratio * ratio);
 }
 
-std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b, Pose T,
+std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b, const Pose& guess,
                                           const std::optional<KnownTranslation>& way) {
   constexpr double kFine = 0.1;  // m
-  T = refine(a, b, T, 1, 0.2, 1, 8, way);
+  Pose T = refine(a, b, guess, 1, 0.2, 1, 8, way);
   T = refine(a, b, T, 2, kFine, 1, 15, way);
   Linearization last = linearize(a, b, T, 2, kFine, 1);
   if (last.firm_count < kFewestMatches) return std::nullopt;

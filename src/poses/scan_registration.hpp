@@ -70,7 +70,7 @@ struct KnownTranslation {
 
 /// As register_scans(), by small steps from `guess`.
 std::optional<Registration> register_near(const SurfaceGrid& a,
-                                          const std::vector<Eigen::Vector3d>& b, Pose guess,
+                                          const std::vector<Eigen::Vector3d>& b, const Pose& guess,
                                           const std::optional<KnownTranslation>& way = {});
 
 }  // namespace dynains

@@ -86,7 +86,7 @@ SensorModel sensor_model(Sensor sensor, std::uint64_t seed) {
 }
 
 int BeamTable::row_of(double elevation) {
-  const double row = (elevation + kPi / 2) * (kColumns / 2 / kPi);
+  const double row = (elevation + kPi / 2) * (kColumns / (2 * kPi));
   return std::clamp(static_cast<int>(row), 0, kColumns / 2 - 1);
 }
 
