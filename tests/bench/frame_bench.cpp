@@ -1,4 +1,4 @@
-// The whole pipeline: cost of a frame as a function of points, of K and of the length of the run.
+// The whole pipeline: cost of a frame.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -32,17 +32,6 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-std::vector<test::Scan> every(const std::vector<test::Scan>& scans, std::size_t step) {
-  std::vector<test::Scan> result;
-  for (const test::Scan& scan : scans) {
-    result.push_back({scan.T_world_sensor, scan.time, {}, {}});
-    for (std::size_t i = 0; i < scan.points.size(); i += step) {
-      result.back().points.push_back(scan.points[i]);
-    }
-  }
-  return result;
-}
-
 // Back and forth on one lane, so that the map stops growing.
 void push_lap(DynaInsRemover& remover, const std::vector<test::Scan>& scans, double& time,
               std::vector<double>& milliseconds) {
@@ -59,27 +48,6 @@ void report(benchmark::State& state, const std::vector<double>& milliseconds) {
   state.counters["worst_ms"] = quantile(milliseconds, 1.0);
 }
 
-// Arguments: window K, and n to use every n-th point.
-void BM_Frame(benchmark::State& state) {
-  auto config = DynaInsRemover::Config::paper();
-  config.window = static_cast<int>(state.range(0));
-  const auto scans = every(street_scans(), static_cast<std::size_t>(state.range(1)));
-  DynaInsRemover remover(config);
-  double time = 0.0;
-  std::vector<double> milliseconds;
-  for (auto _ : state) push_lap(remover, scans, time, milliseconds);
-  report(state, milliseconds);
-  state.counters["points"] = static_cast<double>(scans.front().points.size());
-}
-BENCHMARK(BM_Frame)
-    ->Unit(benchmark::kMillisecond)
-    ->ArgNames({"K", "step"})
-    ->Args({2, 1})
-    ->Args({4, 1})
-    ->Args({8, 1})
-    ->Args({4, 2})
-    ->Args({4, 4});
-
 // The default configuration, with all additions to the paper.
 void BM_DefaultFrame(benchmark::State& state) {
   DynaInsRemover remover;
@@ -89,26 +57,6 @@ void BM_DefaultFrame(benchmark::State& state) {
   report(state, milliseconds);
 }
 BENCHMARK(BM_DefaultFrame)->Unit(benchmark::kMillisecond);
-
-// Median times of a lap near frame 100 and of a lap near frame 10,000 of one run, with a quarter of
-// the points.
-void BM_LongRun(benchmark::State& state) {
-  const auto scans = every(street_scans(), 4);
-  for (auto _ : state) {
-    DynaInsRemover remover(DynaInsRemover::Config::paper());
-    double time = 0.0;
-    std::vector<double> lap;
-    double early = 0.0;
-    while (time < 1000.0) {
-      lap.clear();
-      push_lap(remover, scans, time, lap);
-      if (time < 13.0) early = quantile(lap, 0.5);
-    }
-    state.counters["frame_100_ms"] = early;
-    state.counters["frame_10000_ms"] = quantile(lap, 0.5);
-  }
-}
-BENCHMARK(BM_LongRun)->Unit(benchmark::kSecond)->Iterations(1);
 
 }  // namespace
 }  // namespace dynains::bench

@@ -1,16 +1,13 @@
 // Trials of the remover on random worlds, in process: each world is simulated, judged and scored.
 // A setting is a list of parameters of the remover, `name=value,name=value`; `default` changes
 // none. All settings judge the same scans.
-//   world_trials [--from SEED] [--worlds N] [--scans N] [--set name=value,...]
-//                [--csv FILE] [--list] [SETTING...]
-// --set changes every world (parameters of `dynains simulate`); --list prints the worlds only.
+//   world_trials [--from SEED] [--worlds N] [--scans N] [SETTING...]
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <map>
@@ -35,9 +32,6 @@ struct Options {
   std::uint64_t from = 1;
   std::uint64_t worlds = 10;
   int scans = 60;
-  std::string set;
-  std::string csv;
-  bool list = false;
   std::vector<std::string> settings;
 };
 
@@ -60,8 +54,6 @@ program::ParameterValues values_of(const std::string& list) {
 simulation::Config world_of(std::uint64_t seed, const Options& options) {
   simulation::Config config = simulation::random_world(seed);
   config.scans = options.scans;
-  values_of(options.set).apply(config);
-  config.validate();
   return config;
 }
 
@@ -192,9 +184,6 @@ Options parse(int argc, char** argv) {
   app.add_option("--from", options.from, "first seed [1]");
   app.add_option("--worlds", options.worlds, "number of seeds [10]");
   app.add_option("--scans", options.scans, "scans of each world [60]");
-  app.add_option("--set", options.set, "name=value,...: parameters of every world");
-  app.add_option("--csv", options.csv, "file for the scores of each world and setting");
-  app.add_flag("--list", options.list, "print the worlds only");
   app.add_option("SETTING", options.settings, "name=value,...: parameters of the remover");
   try {
     app.parse(argc, argv);
@@ -209,16 +198,10 @@ void run(const Options& options) {
   const std::vector<std::string>& settings = options.settings;
   std::vector<DynaInsRemover::Config> configs(settings.size());
   for (std::size_t s = 0; s < settings.size(); ++s) values_of(settings[s]).apply(configs[s]);
-  std::ofstream csv;
-  if (!options.csv.empty()) csv.open(options.csv);
   std::map<std::string, std::vector<Scores>> worlds;
-  if (!options.list) print_header("world");
+  print_header("world");
   for (std::uint64_t seed = options.from; seed < options.from + options.worlds; ++seed) {
     const simulation::Config world = world_of(seed, options);
-    if (options.list) {
-      std::cout << name_of(world) << '\n';
-      continue;
-    }
     const Scans scans = test::simulate(world);
     InMap in_map;
     for (const auto& scan : scans) in_map.emplace_back(scan.labels.size(), std::uint8_t{0});
@@ -232,12 +215,8 @@ void run(const Options& options) {
       print_row(settings.size() == 1 ? name_of(world) : name_of(world) + ": " + settings[s],
                 scores);
       worlds[settings[s]].push_back(scores);
-      csv << seed << ',' << settings[s];
-      for (const double score : scores) csv << ',' << score;
-      csv << std::endl;
     }
   }
-  if (options.list) return;
   std::cout << '\n';
   print_header("over " + std::to_string(options.worlds) + " worlds");
   for (const std::string& setting : settings) print_summary(setting, worlds[setting]);
