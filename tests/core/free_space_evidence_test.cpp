@@ -202,7 +202,7 @@ TEST_CASE("evidence from a later scan is carried along the track to scans beside
   CHECK(causes() == Causes{Cause::kNoEvidence});
 }
 
-// In one scan, both are one instance.
+// In one scan, both are one instance, and one supervoxel at the border has few samples to see.
 TEST_CASE("an object that stood long before stays when an object that moved was merged with it") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookahead_scans = 0;
@@ -211,7 +211,7 @@ TEST_CASE("an object that stood long before stays when an object that moved was 
   Watch watch(config);
   for (int i = 0; i < 21; ++i) watch.see(car());
   watch.see(both(car(), passing));
-  CHECK(watch.removes(21));
+  CHECK(watch.causes(21) == Causes{Cause::kFreeSpace, Cause::kWithInstance, Cause::kOccupied});
   watch.see(car());
   CHECK(watch.predecessor() == 0);
   CHECK(watch.causes(22) == Causes{Cause::kOccupied});

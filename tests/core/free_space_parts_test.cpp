@@ -266,7 +266,7 @@ TEST_CASE("instances that are too long, too high or a single sample are not carr
   }
 }
 
-TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it") {
+TEST_CASE("belief along a track fades by 0.95 a scan, and is limited") {
   constexpr float kUnit = 0.8472979F;  // log-odds of 0.7
   const TrackBelief belief(kUnit);
   TrackedInstances before, now;
@@ -278,19 +278,10 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   now.instances[0].past.instance = 0;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx(0.95F * 2.0F * kUnit));
-  CHECK(now.instances[0].past.scans_since_motion == 1);
-  // It moved one scan ago. A hit up to nine scans back may be its own, an older one is not.
-  now.instances[0].past.farthest_hit = 9;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds > 0.0F);
-  now.instances[0].past.farthest_hit = 10;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds == 0.0F);
-  // Its own evidence outweighs the hit. The sum is limited to four units above zero and one below.
+  // The sum is limited to four units above zero and one below.
   now.instances[0].own = kUnit;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx((1.0F + 0.95F * 2.0F) * kUnit));
-  CHECK(now.instances[0].past.scans_since_motion == 0);
   now.instances[0].own = -9.0F * kUnit;
   belief.propagate(&TrackedInstances::Instance::past, &before, now);
   CHECK(now.instances[0].past.log_odds == Approx(-kUnit));
@@ -301,14 +292,8 @@ TEST_CASE("belief along a track fades by 0.95 a scan, and old hits contradict it
   before.instances[0].future.instance = 0;
   belief.propagate(&TrackedInstances::Instance::future, nullptr, now);
   before.instances[0].own = 0.0F;
-  before.instances[0].past.farthest_hit = 100;
-  before.instances[0].future.farthest_hit = 9;
   belief.propagate(&TrackedInstances::Instance::future, &now, before);
   CHECK(before.instances[0].future.log_odds == Approx(0.95F * 4.0F * kUnit));
-  CHECK(before.instances[0].future.scans_since_motion == 1);
-  before.instances[0].future.farthest_hit = 10;
-  belief.propagate(&TrackedInstances::Instance::future, &now, before);
-  CHECK(before.instances[0].future.log_odds == 0.0F);
 }
 
 TEST_CASE("samples along a track are summed on both sides, and fade by 0.95 a scan") {

@@ -65,9 +65,7 @@ struct Scan {
       std::fill_n(begin, seen[s].free, BeamResult::kFree);
       std::fill_n(begin + static_cast<std::ptrdiff_t>(seen[s].free), seen[s].hit, BeamResult::kHit);
     }
-    hits.clear();
-    updater.update(samples, visibility_of(visibility), reference, beliefs,
-                   [&](std::size_t instance) { hits.push_back(instance); });
+    updater.update(samples, visibility_of(visibility), reference, beliefs);
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
@@ -79,7 +77,6 @@ struct Scan {
   InstanceBeliefUpdater updater;
   InstanceSamples samples;
   InstanceBeliefs beliefs;
-  std::vector<std::size_t> hits;
 };
 
 TEST_CASE("a place that was hit needs more evidence, and starts again from zero") {
@@ -261,6 +258,7 @@ TEST_CASE("what is hit from its own side is not free because another side sees t
     for (int i = 0; i < 4; ++i) scan.see({{4, 0}, {4, 0}}, beside(angle));
     CHECK(scan.is_free(0) == scan.is_free(1));
     CHECK(scan.removes() == scan.is_free());
+    CHECK(scan.belief().hits == (scan.is_free() ? std::min(hits, 8) : 1));
     return scan.is_free();
   };
   CHECK(is_free(5, 90.0));
@@ -280,11 +278,23 @@ TEST_CASE("references that see little of an instance do not tell that it stands"
   }
 }
 
-TEST_CASE("an instance is still there where nearly all of its seen samples are hit") {
-  Scan scan(Instances{{10}, {10}, {10}, {10}});
-  // Second instance: too few samples are seen. Third: too many are free. Fourth: none is seen.
-  scan.see({{0, 3}, {0, 2}, {1, 5}, {0, 0}});
-  CHECK(scan.hits == std::vector<std::size_t>{0});
+TEST_CASE("a part that eight references hit and none saw free stays when its instance moves") {
+  const FreeSpaceConfig config;
+  const auto cause = [&](int hits, bool was_free, float track_log_odds) {
+    Scan scan(Instances{{8, 4}});
+    const bool with_instance = track_log_odds <= 0.0F;
+    scan.see({{with_instance ? 8U : 0U, 0}, {was_free ? 4U : 0U, 0}});
+    for (int i = 0; i < hits; ++i) scan.see({{0, 0}, {0, 4}});
+    TrackedInstances::Instance tracked;
+    tracked.past.log_odds = track_log_odds;
+    return last_cause(scan, config, tracked);
+  };
+  CHECK(cause(7, false, 0.0F) == Cause::kWithInstance);
+  CHECK(cause(8, false, 0.0F) == Cause::kOccupied);
+  CHECK(cause(8, true, 0.0F) == Cause::kWithInstance);
+  CHECK(cause(7, false, 9.0F) == Cause::kAlongTrack);
+  CHECK(cause(8, false, 9.0F) == Cause::kOccupied);
+  CHECK(cause(40, false, 9.0F) == Cause::kOccupied);
 }
 
 // Slow reference sum: recounts each supervoxel and instance for every reference.
@@ -325,7 +335,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
         all_seen < 0.25F * static_cast<float>(last - first) || all_free / all_seen <= 0.3F;
     add(supervoxels[s], share, stands, share >= 0.6F, share <= 0.3F);
     if (share <= 0.3F && hit >= std::min(2.0F, size)) {
-      supervoxels[s].occupied = 1;
+      supervoxels[s].hits = std::min<std::uint8_t>(supervoxels[s].hits + 1, 8);
     }
   }
 }
@@ -364,15 +374,14 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
                                     : BeamResult::kHit;
         }
       }
-      scan.updater.update(scan.samples, visibility_of(visibility), {}, scan.beliefs,
-                          [](std::size_t) {});
+      scan.updater.update(scan.samples, visibility_of(visibility), {}, scan.beliefs);
       add_slowly(scan.samples, visibility, supervoxels);
     }
     for (std::size_t s = 0; s < supervoxels.size(); ++s) {
       REQUIRE(scan.belief(s).level == supervoxels[s].level);
       REQUIRE(scan.belief(s).peak == supervoxels[s].peak);
       REQUIRE(scan.belief(s).contested == supervoxels[s].contested);
-      REQUIRE(scan.belief(s).occupied == supervoxels[s].occupied);
+      REQUIRE(scan.belief(s).hits == supervoxels[s].hits);
       REQUIRE(scan.belief(s).turns == supervoxels[s].turns);
     }
     for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -382,7 +391,7 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
         const std::uint32_t size = scan.samples.sample_begin[s + 1] - scan.samples.sample_begin[s];
         total += size;
         moved += scan.is_free(s) ? size : 0;
-        decided += scan.is_free(s) || supervoxels[s].occupied != 0 ? size : 0;
+        decided += scan.is_free(s) || supervoxels[s].hits != 0 ? size : 0;
       }
       REQUIRE(scan.beliefs.counts[i].total == total);
       REQUIRE(scan.beliefs.counts[i].moved == moved);

@@ -289,7 +289,7 @@ class FreeSpaceEvidence {
       const auto back = static_cast<std::uint64_t>(lag);
       if (back > record.since_begin) break;
       const detail::ReferenceScan* const reference = references_.find(scan - back, record.epoch);
-      if (reference != nullptr) test(record, *reference, -lag, newest_visibility_);
+      if (reference != nullptr) test(record, *reference, newest_visibility_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
     update_own_log_odds(record);
@@ -300,9 +300,8 @@ class FreeSpaceEvidence {
     return record.since_begin % lags_after_.size();
   }
 
-  // Tests all samples of a scan against one reference. `lag`: scans from the scan to the reference.
-  // `memory`: of the thread.
-  void test(Record& record, const detail::ReferenceScan& reference, int lag,
+  // Tests all samples of a scan against one reference. `memory`: of the thread.
+  void test(Record& record, const detail::ReferenceScan& reference,
             detail::Visibility& memory) const {
     record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
                                        record.T_world_sensor, reference, memory));
@@ -314,13 +313,7 @@ class FreeSpaceEvidence {
     const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
                                                       static_cast<float>(T_sensor_reference(1, 3)),
                                                       static_cast<float>(T_sensor_reference(2, 3))};
-    updater_.update(evidence.samples, visibility, position, evidence.beliefs,
-                    [&](std::size_t instance) {
-                      if (!config_.use_tracks) return;
-                      Instance& tracked = evidence.tracked.instances[instance];
-                      (lag < 0 ? tracked.past : tracked.future).farthest_hit =
-                          static_cast<std::int16_t>(std::abs(lag));
-                    });
+    updater_.update(evidence.samples, visibility, position, evidence.beliefs);
   }
 
   // Delay (scans) between a new image and the tests of the older scans of a phase against it. The
@@ -343,7 +336,7 @@ class FreeSpaceEvidence {
       if (back > reference.scan) break;
       Record& older = record_of(reference.scan - back);
       if (older.epoch != reference.epoch) continue;
-      test(older, reference, lag, older_visibility_);
+      test(older, reference, older_visibility_);
       update_own_log_odds(older);
     }
   }

@@ -99,10 +99,15 @@ struct InstanceBeliefs {
     float level = 0.0F;  ///< log-odds by the references of one side of time, >= 0
     float peak = 0.0F;   ///< maximum of `level` that hits cannot take back, over both sides of time
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
-    std::uint8_t occupied = 0;   ///< 1 after a reference with hits on enough samples
+    /// References with hits on enough samples, at most kFirmHits. Free samples without weight set
+    /// it back to 1.
+    std::uint8_t hits = 0;
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
 
     float highest() const { return std::max(peak, level); }
+    /// Whether it stays when its instance moves, since many references hit its place and none saw
+    /// it free. An object that moves leaves its place earlier.
+    bool stays() const { return hits >= kFirmHits && highest() <= 0.0F; }
   };
   /// Numbers of samples of an instance, or of a part of it.
   struct Counts {
@@ -112,11 +117,11 @@ struct InstanceBeliefs {
 
     /// Whether enough samples are known, and none of them moved.
     bool stands_still() const {
+      constexpr float kLeastKnown = 0.3F;  // ratio of known to all samples
       return moved == 0 && static_cast<float>(decided) >= kLeastKnown * static_cast<float>(total);
     }
   };
-  /// Least ratio of known to all samples of an instance for evidence that it stands still.
-  static constexpr float kLeastKnown = 0.3F;
+  static constexpr std::uint8_t kFirmHits = 8;  ///< references, chosen on random worlds
 
   std::vector<Belief> supervoxels;
   std::vector<Counts> counts;  ///< by instance
@@ -165,17 +170,14 @@ class InstanceBeliefUpdater {
   }
 
   /// Updates the beliefs by the visibility of `samples` from one reference. `reference`: its
-  /// position, m, in the sensor frame of the scan. Calls `on_hit(instance)` for each instance with
-  /// enough visible samples of which nearly all are hit.
-  template <class OnHit>
+  /// position, m, in the sensor frame of the scan.
   void update(const InstanceSamples& samples, const Visibility& visibility,
-              const InstanceViews::Position& reference, InstanceBeliefs& beliefs,
-              OnHit&& on_hit) const {
+              const InstanceViews::Position& reference, InstanceBeliefs& beliefs) const {
     beliefs.views.look_from(reference);
     // AVX2 processors have an instruction that counts bits.
     with_packs([&](auto) {
       for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-        const float weight = update_instance(samples, visibility, instance, beliefs, on_hit);
+        const float weight = update_instance(samples, visibility, instance, beliefs);
         for (std::uint32_t s = samples.supervoxel_begin[instance];
              s < samples.supervoxel_begin[instance + 1]; ++s) {
           update_supervoxel(samples, visibility, s, weight, beliefs);
@@ -201,15 +203,14 @@ class InstanceBeliefUpdater {
   }
 
  private:
-  static constexpr float kLeastVisible = 0.25F;       // ratio of visible samples of an instance
-  static constexpr float kPartWeight = 0.5F;          // of a reference that passes a small part
-  static constexpr std::uint8_t kTurnsByChance = 4;   // hit, free, hit, free, hit
-  static constexpr float kContradictingHits = 0.85F;  // ratio of hits to visible samples
+  static constexpr float kLeastVisible = 0.25F;      // ratio of visible samples of an instance
+  static constexpr float kPartWeight = 0.5F;         // of a reference that passes a small part
+  static constexpr std::uint8_t kTurnsByChance = 4;  // hit, free, hit, free, hit
 
   // Counts of one supervoxel with `samples` samples.
   Counts counts_of(const Belief& belief, std::uint32_t samples) const {
     const bool free = is_free(belief);
-    return {samples, free ? samples : 0, free || belief.occupied != 0 ? samples : 0};
+    return {samples, free ? samples : 0, free || belief.hits != 0 ? samples : 0};
   }
 
   // `weight`: of free samples, see update().
@@ -229,9 +230,8 @@ class InstanceBeliefUpdater {
   }
 
   // Updates what is known of an instance as a whole. Returns the weight of its free samples.
-  template <class OnHit>
   float update_instance(const InstanceSamples& samples, const Visibility& visibility,
-                        std::size_t instance, InstanceBeliefs& beliefs, OnHit&& on_hit) const {
+                        std::size_t instance, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
     const std::uint32_t end = begin + beliefs.counts[instance].total;
     const Visibility::Count all = visibility.count(begin, end);
@@ -243,12 +243,7 @@ class InstanceBeliefUpdater {
     const float weight = beliefs.views.is_contradicted(instance)   ? 0.0F
                          : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
                                                                    : 1.0F;
-    if (visible < std::max(2.0F, least)) return weight;
-    beliefs.views.add(instance, free_ratio);
-    const auto hits = static_cast<float>(all.hit);
-    if (free_ratio <= 1.0F - kContradictingHits && hits >= InstanceBeliefs::kLeastKnown * count) {
-      on_hit(instance);
-    }
+    if (visible >= std::max(2.0F, least)) beliefs.views.add(instance, free_ratio);
     return weight;
   }
 
@@ -257,13 +252,16 @@ class InstanceBeliefUpdater {
   // limits of FreeSpaceSum. `weight`: of free samples. Those of a reference that mostly hits an
   // instance, or sees little of it, may lie at an edge of a standing object, if the instance is not
   // larger than one object: they count half, and later hits take them back. A single hit sets
-  // `contested`, but not `occupied`.
+  // `contested`, but does not count in `hits`.
   void update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free_ratio >= FreeSpaceSum::kFreeRatio) {
-      if (weight <= 0.0F) return;
+      if (weight <= 0.0F) {
+        belief.hits = std::min<std::uint8_t>(belief.hits, 1);
+        return;
+      }
       belief.turns |= 1U;
       sum_.raise(belief.level, free_ratio, weight);
       if (weight >= 1.0F) belief.peak = std::max(belief.peak, belief.level);
@@ -273,7 +271,9 @@ class InstanceBeliefUpdater {
     belief.contested = 1;
     sum_.lower(belief.level);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
-    if (visible.hit >= std::min(2U, samples)) belief.occupied = 1;
+    if (visible.hit >= std::min(2U, samples) && belief.hits < InstanceBeliefs::kFirmHits) {
+      ++belief.hits;
+    }
   }
 
   float removal_ratio_;

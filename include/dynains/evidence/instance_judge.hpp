@@ -93,7 +93,9 @@ class InstanceJudge {
       const Cause whole = cause_of_whole(evidence, updater, may_presume, instance, level);
       if (is_dynamic(whole)) {
         const Verdict verdict = {whole, as_probability(std::max(level, updater.free_level()))};
-        std::fill(verdicts.begin() + first, verdicts.begin() + last, verdict);
+        for (std::uint32_t s = first; s < last; ++s) {
+          if (!evidence.beliefs.supervoxels[s].stays()) verdicts[s] = verdict;
+        }
       } else {
         // Only a part of the instance is dynamic; small groups of free samples may be noise.
         groups_.keep_large(samples, kLeastGroup, free_);

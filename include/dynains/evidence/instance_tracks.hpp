@@ -28,8 +28,6 @@ struct TrackedInstances {
     std::uint32_t instance = kNoCluster;  ///< linked instance of the adjacent scan, or kNoCluster
     float log_odds = 0.0F;                ///< of motion, by this scan and the scans on this side
     Seen seen;                            ///< in this scan and the scans on this side
-    int scans_since_motion = 0;           ///< scans to the nearest scan with positive own log-odds
-    std::int16_t farthest_hit = 0;        ///< scans to the farthest reference that hit it; 0: none
   };
   struct Instance {
     float own = 0.0F;  ///< log-odds of motion, by the evidence on this scan alone
@@ -201,10 +199,9 @@ class TrackBelief {
       Side& own_side = instance.*side;
       float inherited = 0.0F;
       own_side.seen = instance.seen;
-      own_side.scans_since_motion = 0;
       if (adjacent != nullptr && own_side.instance != kNoCluster) {
         const Side& parent = adjacent->instances[own_side.instance].*side;
-        inherited = inherit(parent, instance.own, own_side);
+        inherited = kFade * parent.log_odds;
         own_side.seen.moved += kFade * parent.seen.moved;
         own_side.seen.decided += kFade * parent.seen.decided;
       }
@@ -214,17 +211,6 @@ class TrackBelief {
 
  private:
   static constexpr float kFade = 0.95F;  // factor per scan
-
-  // Log-odds that an instance inherits from its linked instance, `parent`. Hits from references
-  // long before (or after) the motion of the track contradict this motion, and then the instance
-  // inherits nothing, unless its own log-odds are positive.
-  static float inherit(const Side& parent, float own, Side& side) {
-    constexpr int kSlack = 8;  // scans
-    const int since = parent.scans_since_motion + 1;
-    side.scans_since_motion = own > 0.0F ? 0 : since;
-    const bool contradicted = own <= 0.0F && side.farthest_hit > since + kSlack;
-    return contradicted ? 0.0F : kFade * parent.log_odds;
-  }
 
   float floor_;
   float ceiling_;
