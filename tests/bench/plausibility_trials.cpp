@@ -2,7 +2,7 @@
 // of poses, clouds and times. A fault counts as harmful if at least 5 % more of the static points
 // within 50 m are called moving than with right poses, or if nothing is judged. It is told if the
 // plausibility check of the remover says so, or if `dynains run` would refuse or warn before its
-// first scan; the cause is right if that text has the words of the kind.
+// first scan.
 //   plausibility_trials [FROM [WORLDS [SCANS [right|all]]]]
 // Prints a row for each world and kind with the largest shares of any window, then the counts.
 #include <unistd.h>
@@ -48,7 +48,6 @@ using FaultOfTime = std::function<double(double time, double period)>;
 
 struct Kind {
   std::string name;
-  std::vector<std::string> causes;  ///< words of a right text; none: any text is right
   Fault fault;
   FaultOfTime time = {};  ///< for points that are recorded as measured, and de-skewed by the run
 };
@@ -126,8 +125,6 @@ Pose noise(std::size_t i, double metres, double degrees) {
   return moved(t.x(), t.y(), t.z()) * turned(degrees * normal(random));
 }
 
-const std::vector<std::string> kMissing = {"may be missing", "clouds were lost", "poses jump"};
-
 std::vector<Kind> kinds() {
   const auto jump = [](double metres, double degrees) {
     return posed([=](const Scans& scans, std::size_t i) {
@@ -165,54 +162,49 @@ std::vector<Kind> kinds() {
     for (std::size_t k = 1; k < recorded.xyzi.size(); k += 4) recorded.xyzi[k] *= -1.0F;
     return recorded;
   };
-  const std::vector<std::string> body = {"--extrinsic"}, none;
-  return {{"right", none, right},
-          {"clouds of a body", {"rays do not begin"}, in_body(1.0F, 0.0F, 1.5F)},
-          {"jump of 3 m", {"poses jump"}, jump(3, 2)},
-          {"points in mm", {"units", "metres"}, scaled_points(1000.0F)},
-          {"points in cm", {"units", "metres"}, scaled_points(100.0F)},
-          {"points in feet", none, scaled_points(3.2808F)},
-          {"mirrored points", none, mirrored},
-          {"poses in mm", {"--pose-units mm"}, scaled_poses(1000.0)},
-          {"poses in km", none, scaled_poses(0.001)},
-          {"poses 10 % too long", {"--pose-scale"}, scaled_poses(1.1)},
-          {"inverse", {"--invert-poses"}, posed([](const Scans& scans, std::size_t i) {
-             return Pose((scans[0].T_world_sensor.inverse() * scans[i].T_world_sensor).inverse());
-           })},
-          {"yawed by 10 deg", body, of_body(turned(10))},
-          {"yawed by 90 deg", body, of_body(turned(90))},
-          {"yawed by 180 deg", body, of_body(turned(180))},
-          {"upside down", body, of_body(turned(180, Eigen::Vector3d::UnitX()))},
-          {"late by two scans",
-           {"--pose-shift", "--time-offset"},
-           posed([](const Scans& scans, std::size_t i) {
-             return scans[std::min(i + 2, scans.size() - 1)].T_world_sensor;
-           })},
-          {"poses held for three scans", none, held},
-          {"one cloud lost", kMissing, lost(1)},
-          {"three clouds lost", kMissing, lost(3)},
-          {"noise of 20 cm and 1 deg", {"inexact"}, posed([](const Scans& scans, std::size_t i) {
-             return Pose(scans[i].T_world_sensor * noise(i, 0.2, 1.0));
-           })},
-          {"no motion", none,
-           posed([](const Scans& scans, std::size_t) { return scans[0].T_world_sensor; })},
-          {"random points", none, random_points},
-          {"points with noise of 30 cm", none, noisy_points}};
+  return {
+      {"right", right},
+      {"clouds of a body", in_body(1.0F, 0.0F, 1.5F)},
+      {"jump of 3 m", jump(3, 2)},
+      {"points in mm", scaled_points(1000.0F)},
+      {"points in cm", scaled_points(100.0F)},
+      {"points in feet", scaled_points(3.2808F)},
+      {"mirrored points", mirrored},
+      {"poses in mm", scaled_poses(1000.0)},
+      {"poses in km", scaled_poses(0.001)},
+      {"poses 10 % too long", scaled_poses(1.1)},
+      {"inverse", posed([](const Scans& scans, std::size_t i) {
+         return Pose((scans[0].T_world_sensor.inverse() * scans[i].T_world_sensor).inverse());
+       })},
+      {"yawed by 10 deg", of_body(turned(10))},
+      {"yawed by 90 deg", of_body(turned(90))},
+      {"yawed by 180 deg", of_body(turned(180))},
+      {"upside down", of_body(turned(180, Eigen::Vector3d::UnitX()))},
+      {"late by two scans", posed([](const Scans& scans, std::size_t i) {
+         return scans[std::min(i + 2, scans.size() - 1)].T_world_sensor;
+       })},
+      {"poses held for three scans", held},
+      {"one cloud lost", lost(1)},
+      {"three clouds lost", lost(3)},
+      {"noise of 20 cm and 1 deg", posed([](const Scans& scans, std::size_t i) {
+         return Pose(scans[i].T_world_sensor * noise(i, 0.2, 1.0));
+       })},
+      {"no motion", posed([](const Scans& scans, std::size_t) { return scans[0].T_world_sensor; })},
+      {"random points", random_points},
+      {"points with noise of 30 cm", noisy_points}};
 }
 
 /// Kinds of clouds that are recorded as measured.
 std::vector<Kind> kinds_of_times() {
   const Fault right = kinds().front().fault;
-  const std::vector<std::string> times = {"--deskew", "times in s, ms, us or ns"};
-  return {
-      {"not de-skewed, no times", {}, right},
-      {"right times", {}, right, [](double time, double) { return time; }},
-      {"reversed times", times, right, [](double time, double period) { return period - time; }},
-      {"half times", times, right, [](double time, double) { return 0.5 * time; }},
-      {"double times", times, right, [](double time, double) { return 2.0 * time; }},
-      {"times of another unit", times, right, [](double time, double) { return 1e-4 * time; }},
-      {"times of noise", times, right,
-       [](double time, double period) { return std::fmod(7919.0 * time, period); }}};
+  return {{"not de-skewed, no times", right},
+          {"right times", right, [](double time, double) { return time; }},
+          {"reversed times", right, [](double time, double period) { return period - time; }},
+          {"half times", right, [](double time, double) { return 0.5 * time; }},
+          {"double times", right, [](double time, double) { return 2.0 * time; }},
+          {"times of another unit", right, [](double time, double) { return 1e-4 * time; }},
+          {"times of noise", right,
+           [](double time, double period) { return std::fmod(7919.0 * time, period); }}};
 }
 
 struct WrittenScans {
@@ -261,36 +253,28 @@ WrittenScans write_and_open(const Scans& scans, const Kind& kind,
 }
 
 /// The warnings and the refusal that `dynains run` prints before its first scan.
-struct Start {
-  std::string text;  ///< of warnings and a refusal
-  bool is_refused = false;
-};
-
-Start start_of_run(const Recording& recording) {
+std::string start_of_run(const Recording& recording) {
   const program::ScanRange range{0, recording.size() - 1};
-  Start said;
+  std::string said;
   try {
     program::check_ranges(recording, range, RemoverConfig(), false);
   } catch (const ConfigError& error) {
-    return {error.what(), true};
+    return error.what();
   }
-  for (const std::string& warning : recording.warnings()) said.text += warning + ' ';
+  for (const std::string& warning : recording.warnings()) said += warning + ' ';
   const program::StartCheck start = program::check_start(recording, range, RemoverConfig(), false);
-  for (const std::string& warning : start.warnings) said.text += warning + ' ';
-  said.text += start.refusal;
-  said.is_refused = !start.refusal.empty();
-  return said;
+  for (const std::string& warning : start.warnings) said += warning + ' ';
+  return said + start.refusal;
 }
 
 struct Outcome {
   double lost = 0.0;  // share of the static points
   Plausibility worst;
   Suspicion first = Suspicion::kNone;
-  std::uint64_t since = 0;
   bool has_jump = false;  // scans that begin an epoch against their poses
-  Start said;
+  std::string said;
 
-  bool is_told() const { return has_jump || first != Suspicion::kNone || !said.text.empty(); }
+  bool is_told() const { return has_jump || first != Suspicion::kNone || !said.empty(); }
 };
 
 /// Removes from the recording as a run would if it began; times are those of the simulated scans.
@@ -318,10 +302,7 @@ Outcome judge(const Scans& scans, const WrittenScans& written) {
     outcome.worst.raise_shares(frame.plausibility);
     outcome.has_jump = outcome.has_jump || frame.began_epoch == EpochReason::kJump ||
                        frame.began_epoch == EpochReason::kMisfit;
-    if (outcome.first == Suspicion::kNone && frame.plausibility.suspicion != Suspicion::kNone) {
-      outcome.first = frame.plausibility.suspicion;
-      outcome.since = frame.plausibility.since;
-    }
+    if (outcome.first == Suspicion::kNone) outcome.first = frame.plausibility.suspicion;
     if (frame.finished) count(*frame.finished);
   }
   remover.flush(count);
@@ -338,24 +319,14 @@ Outcome outcome_of(const Scans& scans, const Kind& kind, const std::filesystem::
     return outcome;
   } catch (const IoError& error) {
     Outcome outcome;
-    outcome.said = {error.what(), true};
+    outcome.said = error.what();
     return outcome;
   }
 }
 
 struct Counts {
-  int trials = 0, harmful = 0, told = 0, with_cause = 0, refused = 0, alarms = 0;
+  int trials = 0, harmful = 0, told = 0, alarms = 0;
 };
-
-bool has_right_cause(const Outcome& outcome, const std::vector<std::string>& causes) {
-  const std::string text = outcome.said.text +
-                           (outcome.first == Suspicion::kUnits ? " units" : "") +
-                           (outcome.first == Suspicion::kRays ? " rays do not begin" : "") +
-                           (outcome.has_jump ? " poses jump" : "");
-  return causes.empty() || std::any_of(causes.begin(), causes.end(), [&](const std::string& cause) {
-           return text.find(cause) != std::string::npos;
-         });
-}
 
 void take(const std::string& world, const Kind& kind, const Outcome& outcome, double usual,
           std::map<std::string, Counts>& counts) {
@@ -366,19 +337,14 @@ void take(const std::string& world, const Kind& kind, const Outcome& outcome, do
   ++sum.trials;
   sum.alarms += is_told ? 1 : 0;
   sum.harmful += is_harmful ? 1 : 0;
-  if (is_harmful && is_told) {
-    ++sum.told;
-    sum.with_cause += has_right_cause(outcome, kind.causes) ? 1 : 0;
-    sum.refused += outcome.said.is_refused ? 1 : 0;
-  }
+  sum.told += is_harmful && is_told ? 1 : 0;
   const Plausibility& worst = outcome.worst;
   std::cout << std::fixed << std::setprecision(3) << world << ' ' << std::left << std::setw(26)
             << kind.name << " lost " << outcome.lost << (is_harmful ? " harmful" : "") << " ground "
             << worst.ground_free << " instances " << worst.instance_free << " residual "
             << worst.residual << " misfits " << worst.misfits << " unjudged " << worst.not_judged
-            << " told " << static_cast<int>(outcome.first) << " since " << outcome.since
-            << (outcome.has_jump ? " jumps" : "")
-            << (outcome.said.is_refused ? " refused " : " said ") << outcome.said.text << std::endl;
+            << " told " << static_cast<int>(outcome.first) << (outcome.has_jump ? " jumps" : "")
+            << " said " << outcome.said << std::endl;
 }
 
 }  // namespace
@@ -423,10 +389,10 @@ int main(int argc, char** argv) {
     take(world, twice, outcome_of(skewed, twice, folder / "recording"), usual, counts);
   }
   std::filesystem::remove_all(folder);
-  std::cout << "| kind | trials | harmful | of them told | with the cause | refused | told in all "
-               "|\n|---|---|---|---|---|---|---|\n";
+  std::cout << "| kind | trials | harmful | of them told | told in all |\n"
+               "|---|---|---|---|---|\n";
   for (const auto& [kind, sum] : counts) {
     std::cout << "| " << kind << " | " << sum.trials << " | " << sum.harmful << " | " << sum.told
-              << " | " << sum.with_cause << " | " << sum.refused << " | " << sum.alarms << " |\n";
+              << " | " << sum.alarms << " |\n";
   }
 }

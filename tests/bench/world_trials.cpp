@@ -68,10 +68,8 @@ std::string name_of(const simulation::Config& config) {
 /// For each scan and point, a bit of each setting is set if the point is static.
 using InMap = test::StaticPoints;
 
-/// Sets the bits of `in_map`. Returns how far the corrected motions, one after the other, lead from
-/// the true poses at most, m; a scan without a corrected motion keeps the pushed one.
-double judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bit,
-             InMap& in_map) {
+/// Sets the bits of `in_map`.
+void judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bit, InMap& in_map) {
   const auto keep = [&](const ScanVerdict& verdict) {
     std::vector<std::uint8_t>& bits = in_map.at(verdict.scan);
     for (std::size_t i = 0; i < bits.size(); ++i) {
@@ -79,59 +77,22 @@ double judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned 
     }
   };
   DynaInsRemover remover(config);
-  double farthest = 0.0;
-  Pose T_world_previous = Pose::Identity(), T_corrected_previous = Pose::Identity();
   for (const simulation::SimulatedScan& scan : scans) {
     const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4};
-    const Pose T_world_newest = scan.T_world_sensor_noisy;
-    const FrameResult frame = remover.push(points, T_world_newest, scan.time);
+    const FrameResult frame = remover.push(points, scan.T_world_sensor_noisy, scan.time);
     if (frame.finished) keep(*frame.finished);
-    const Pose T_corrected_newest =
-        T_corrected_previous * (frame.pose_residual ? frame.pose_residual->T_previous_newest
-                                                    : T_world_previous.inverse() * T_world_newest);
-    farthest = std::max(
-        farthest, (T_corrected_newest.translation() - scan.T_world_sensor.translation()).norm());
-    T_world_previous = T_world_newest;
-    T_corrected_previous = T_corrected_newest;
   }
   remover.flush(keep);
-  return farthest;
 }
 
-/// Scores of one setting in one world; NaN where a world has none. More is better, except for the
-/// last one.
+/// Scores of one setting in one world; NaN where a world has none. More is better.
 using Scores = std::vector<double>;
 
-const std::vector<std::string>& score_names() {
-  static const std::vector<std::string> names = {"F1",     "SA",    "DA",      "objects",
-                                                 "movers", "cars",  "fences",  "poles",
-                                                 "plants", "walls", "pose, mm"};
-  return names;
-}
+const std::vector<std::string> kScoreNames = {"F1", "SA", "DA", "objects"};
 
-double points_kept(const evaluation::EvaluationRow& row,
-                   const std::vector<std::uint16_t>& classes) {
-  std::uint64_t points = 0, kept = 0;
-  for (const evaluation::ClassScore& one : row.classes) {
-    if (std::find(classes.begin(), classes.end(), one.id) == classes.end()) continue;
-    points += one.points;
-    kept += one.points_kept;
-  }
-  return evaluation::percent(kept, points);
-}
-
-Scores scores_of(const evaluation::EvaluationRow& row, double moved) {
-  return {100 * row.voxels.f1(),
-          row.points.static_accuracy(),
-          row.points.dynamic_accuracy(),
-          row.objects->kept(),
-          row.objects->removed(),
-          points_kept(row, {10, 13, 18}),
-          points_kept(row, {51}),
-          points_kept(row, {80, 81}),
-          points_kept(row, {70, 71}),
-          points_kept(row, {50, 52}),
-          1000.0 * moved};
+Scores scores_of(const evaluation::EvaluationRow& row) {
+  return {100 * row.voxels.f1(), row.points.static_accuracy(), row.points.dynamic_accuracy(),
+          row.objects->kept()};
 }
 
 void print_row(const std::string& name, const Scores& scores) {
@@ -148,16 +109,16 @@ void print_row(const std::string& name, const Scores& scores) {
 
 void print_header(const std::string& first) {
   std::cout << "| " << first << " |";
-  for (const std::string& name : score_names()) std::cout << ' ' << name << " |";
+  for (const std::string& name : kScoreNames) std::cout << ' ' << name << " |";
   std::cout << "\n|---|";
-  for (std::size_t i = 0; i < score_names().size(); ++i) std::cout << "---:|";
+  for (std::size_t i = 0; i < kScoreNames.size(); ++i) std::cout << "---:|";
   std::cout << std::endl;
 }
 
-/// Worst decile, median and mean over the worlds that have the score.
+/// Worst decile and mean over the worlds that have the score.
 void print_summary(const std::string& setting, const std::vector<Scores>& worlds) {
-  Scores decile, median, mean;
-  for (std::size_t k = 0; k < score_names().size(); ++k) {
+  Scores decile, mean;
+  for (std::size_t k = 0; k < kScoreNames.size(); ++k) {
     std::vector<double> values;
     for (const Scores& scores : worlds) {
       if (std::isfinite(scores[k])) values.push_back(scores[k]);
@@ -165,16 +126,11 @@ void print_summary(const std::string& setting, const std::vector<Scores>& worlds
     std::sort(values.begin(), values.end());
     double sum = 0;
     for (const double value : values) sum += value;
-    const auto quantile = [&values](double share) {
-      if (values.empty()) return std::nan("");
-      return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-    };
-    decile.push_back(quantile(k + 1 < score_names().size() ? 0.1 : 0.9));
-    median.push_back(quantile(0.5));
+    const std::size_t tenth = values.empty() ? 0 : (values.size() - 1) / 10;
+    decile.push_back(values.empty() ? std::nan("") : values[tenth]);
     mean.push_back(sum / static_cast<double>(values.size()));
   }
   print_row(setting + ", worst decile", decile);
-  print_row(setting + ", median", median);
   print_row(setting + ", mean", mean);
 }
 
@@ -205,13 +161,12 @@ void run(const Options& options) {
     const Scans scans = test::simulate(world);
     InMap in_map;
     for (const auto& scan : scans) in_map.emplace_back(scan.labels.size(), std::uint8_t{0});
-    std::vector<double> moved;
     for (std::size_t s = 0; s < settings.size(); ++s) {
-      moved.push_back(judge(scans, configs[s], static_cast<unsigned>(s), in_map));
+      judge(scans, configs[s], static_cast<unsigned>(s), in_map);
     }
     const evaluation::Evaluation result = test::evaluate(scans, in_map, settings);
     for (std::size_t s = 0; s < settings.size(); ++s) {
-      const Scores scores = scores_of(result.rows[2 + s], moved[s]);
+      const Scores scores = scores_of(result.rows[2 + s]);
       print_row(settings.size() == 1 ? name_of(world) : name_of(world) + ": " + settings[s],
                 scores);
       worlds[settings[s]].push_back(scores);
