@@ -118,6 +118,8 @@ TEST_CASE("Config files are refused by line") {
   CHECK_THAT(error("= 4\n"), ContainsSubstring("a.cfg:1: expected a line such as"));
   CHECK_THAT(error("use-belief = on\n\nuse_belief = off\n"),
              ContainsSubstring("a.cfg:3: use-belief stands on line 1 already"));
+  CHECK_THAT(error(std::string("tau-s = 0.6\nwindow = 4\0 5\n", 26)),
+             ContainsSubstring("a.cfg:2: expected a line of text, found a NUL byte"));
   TemporaryFolder folder;
   CHECK_THAT(message_of<IoError>([&] { read_config_file(folder / "none.cfg"); }),
              ContainsSubstring("none.cfg: cannot be read: No such file"));

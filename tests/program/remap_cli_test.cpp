@@ -51,9 +51,7 @@ struct RemapFixture {
   explicit RemapFixture(const Arguments& more = {}) {
     write_tiny_sequence(seq, kRunScans);
     write_other_poses(corrected, kRunScans, 7);
-    std::vector<std::string> arguments = {"run", seq, "--out", out};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    if (start(arguments).code != 0) throw std::runtime_error("run failed");
+    succeed(start(Arguments{"run", seq, "--out", out} + more));
   }
   RemapFixture(const RemapFixture& other) {
     fs::copy(other.folder.path(), folder.path(), fs::copy_options::recursive);

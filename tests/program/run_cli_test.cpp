@@ -452,6 +452,7 @@ TEST_CASE("Ctrl-C: run finishes the current scan, keeps the results so far, exit
   CHECK(scans < 400);
   CHECK(fixture.labels() == scans);
   CHECK(report["last_scan"] == scan_name(scans - 1));
+  CHECK(count_lines(read_text(fixture.out + "/timing.csv")) == scans + 1);
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
   CHECK(count_entries(fixture.out) == 7);

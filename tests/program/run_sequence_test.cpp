@@ -167,19 +167,6 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
   CHECK(timing.rows[0].stages.map == 0.5);
 }
 
-TEST_CASE("A stopped run finishes the scans that it has taken") {
-  Fixture fixture(6);
-  const ScanRange range{0, 5};
-  RunResults results(*fixture.sequence, range, fixture.outputs());
-  const RunTiming timing = run_sequence(fixture.remover, *fixture.sequence, range, results,
-                                        [](std::size_t done) { return done < 4; });
-  results.commit();
-  CHECK(results.finished() == 4);
-  CHECK(timing.rows.size() == 4);
-  CHECK(count_entries(fixture.folder / "out/labels") == 4);
-  CHECK(fs::exists(fixture.folder / "out/map.ply"));
-}
-
 TEST_CASE("A refused pose is named, and final results stay") {
   Fixture fixture(6);
   fixture.remover.fail_at = 4;

@@ -82,13 +82,3 @@ TEST_CASE("An error of the file system is one line that begins with the path") {
   CHECK(outcome.code == 1);
   CHECK_THAT(outcome.err, StartsWith("dynains: error: \"\": "));
 }
-
-TEST_CASE("A NUL byte in a config file is named with its line") {
-  const TemporaryFolder folder;
-  write_text(folder / "config", std::string("tau-s = 0.6\nmargin = 0.2\0 5\n", 28));
-  const Outcome outcome =
-      start({"run", folder / "seq", "--out", folder / "out", "--config", folder / "config"});
-  CHECK(outcome.code == 2);
-  CHECK(outcome.err == "dynains: error: " + (folder / "config").string() +
-                           ":2: expected a line of text, found a NUL byte\n");
-}
