@@ -1,7 +1,6 @@
 // Every reader of files: any bytes give a valid value or an IoError.
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
 #include "dynains/compiled_remover.hpp"
@@ -24,10 +23,7 @@ namespace fs = std::filesystem;
 fs::path file_of(const char* name, Bytes bytes) {
   static const test::TemporaryFolder folder;
   const fs::path path = folder / name;
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()),
-             static_cast<std::streamsize>(bytes.size()));
-  require(static_cast<bool>(file.flush()), "the temporary folder is full");
+  test::write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   return path;
 }
 

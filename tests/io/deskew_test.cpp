@@ -2,6 +2,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/errors.hpp"
@@ -64,6 +65,23 @@ void write_drive(const fs::path& folder, const std::function<double(double, doub
   }
   write_text(folder / "times.txt", times);
   write_text(folder / "poses.tum", poses);
+}
+
+/// Two scans of points at (x, 0, 0), each with x (m) and its time (s).
+void write_two_scans(const TemporaryFolder& folder,
+                     const std::vector<std::pair<double, double>>& points) {
+  PointColumns columns;
+  columns.time = true;
+  for (const char* const name : {"0.ply", "1.ply"}) {
+    PointFileWriter writer(folder / name, columns);
+    for (const auto& [x, time] : points) {
+      FilePoint point;
+      point.position = {x, 0, 0};
+      point.time = time;
+      writer.add(point);
+    }
+    writer.commit();
+  }
 }
 
 RecordingOptions with_deskewing() {
@@ -152,21 +170,8 @@ TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
 
 TEST_CASE("Points at the origin and points without a finite time keep their place") {
   const TemporaryFolder folder;
-  PointColumns columns;
-  columns.time = true;
-  for (int i = 0; i < 2; ++i) {
-    PointFileWriter writer(folder / (std::to_string(i) + ".ply"), columns);
-    const auto add = [&](double x, double time) {
-      FilePoint point;
-      point.position = {x, 0, 0};
-      point.time = time;
-      writer.add(point);
-    };
-    add(0.0, 0.05);
-    add(5.0, std::numeric_limits<double>::quiet_NaN());
-    add(5.0, 0.05);
-    writer.commit();
-  }
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  write_two_scans(folder, {{0.0, 0.05}, {5.0, unknown}, {5.0, 0.05}});
   write_text(folder / "poses.tum", "0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n");
   const Recording recording(folder.path(), with_deskewing());
   const RecordedScan scan = recording.read_scan(0);
@@ -177,18 +182,7 @@ TEST_CASE("Points at the origin and points without a finite time keep their plac
 
 TEST_CASE("De-skewing follows the time offset between scans and poses") {
   const TemporaryFolder folder;
-  PointColumns columns;
-  columns.time = true;
-  for (int i = 0; i < 2; ++i) {
-    PointFileWriter writer(folder / (std::to_string(i) + ".ply"), columns);
-    for (const double time : {0.0, 0.05}) {
-      FilePoint point;
-      point.position = {5, 0, 0};
-      point.time = time;
-      writer.add(point);
-    }
-    writer.commit();
-  }
+  write_two_scans(folder, {{5.0, 0.0}, {5.0, 0.05}});
   // The clock of the poses is 40 s ahead; the sensor moves at 20 m/s in the first 0.1 s.
   write_text(folder / "times.txt", "0\n0.1\n");
   write_text(folder / "poses.tum", "40 0 0 0 0 0 0 1\n40.1 2 0 0 0 0 0 1\n40.2 2 0 0 0 0 0 1\n");

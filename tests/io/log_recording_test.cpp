@@ -27,15 +27,16 @@ const LogChannel kTf = {"/tf", "tf2_msgs/msg/TFMessage"};
 const LogChannel kStaticTf = {"/tf_static", "tf2_msgs/msg/TFMessage"};
 const LogChannel kOdometry = {"/odom", "nav_msgs/msg/Odometry"};
 
-/// Four clouds, one metre apart along x.
-std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding) {
+/// Four clouds in frame `frame`, one metre apart along x.
+std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding,
+                                                const std::string& frame = "lidar") {
   std::vector<WrittenMessage> messages = {
       {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar, encoding)}};
   for (int i = 0; i < 4; ++i) {
     const double time = 1.0 + 0.1 * i;
     messages.push_back(
         {1, nanoseconds(time), transform(time, "odom", "base", pose_at(i, 0), encoding)});
-    messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, "lidar", encoding)});
+    messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, frame, encoding)});
   }
   return messages;
 }
@@ -95,14 +96,8 @@ void check_drive(const fs::path& log) {
 TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
   const TemporaryFolder folder;
   const fs::path log = folder / "base.mcap";
-  std::vector<WrittenMessage> messages = {
-      {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)}};
-  for (int i = 0; i < 4; ++i) {
-    const double time = 1.0 + 0.1 * i;
-    messages.push_back({1, nanoseconds(time), transform(time, "odom", "base", pose_at(i, 0))});
-    messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, "base")});
-  }
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf},
+                            drive_by_transforms(MessageEncoding::kCdr, "base"), {}));
   RecordingOptions options;
   options.sensor_frame = "lidar";
   const Recording recording(log, options);
