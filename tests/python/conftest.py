@@ -1,3 +1,5 @@
+import sys
+
 import dynains
 import numpy as np
 import pytest
@@ -13,6 +15,15 @@ def street():
 @pytest.fixture
 def identity():
     return np.eye(4)
+
+
+@pytest.fixture
+def no_switching():
+    """Other threads run only if a call releases the lock of Python."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000)
+    yield
+    sys.setswitchinterval(interval)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@ import json
 import os
 import shutil
 import signal
-import sys
 import threading
 import time
 import warnings
@@ -149,18 +148,13 @@ def test_an_error_in_the_callback_ends_the_run(drive, finished, tmp_path):
     assert read_labels(tmp_path / "out") == read_labels(finished.folder)
 
 
-def test_others_run_during_a_check_and_a_view(drive, finished):
+def test_others_run_during_a_check_and_a_view(drive, finished, no_switching):
     """A thread that is still at work when start() returns has released the lock."""
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1000)
-    try:
-        for work in lambda: dynains.check(drive), lambda: dynains.view(finished):
-            thread = threading.Thread(target=work)
-            thread.start()
-            assert thread.is_alive()
-            thread.join()
-    finally:
-        sys.setswitchinterval(interval)
+    for work in lambda: dynains.check(drive), lambda: dynains.view(finished):
+        thread = threading.Thread(target=work)
+        thread.start()
+        assert thread.is_alive()
+        thread.join()
 
 
 def test_a_report_with_unknown_flags_is_refused(drive, tmp_path):
@@ -173,22 +167,17 @@ def test_a_report_with_unknown_flags_is_refused(drive, tmp_path):
             dynains.view(tmp_path / "out")
 
 
-def test_runs_in_threads(drive, finished, tmp_path):
+def test_runs_in_threads(drive, finished, tmp_path, no_switching):
     """Others run during a run; two runs at once give what one gives, and leave the signals alone."""
     recording = dynains.Recording(drive)
     threads = [
         threading.Thread(target=dynains.run, args=(recording, tmp_path / str(i))) for i in range(2)
     ]
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1000)  # this thread goes on only if a run releases the lock
-    try:
-        for thread in threads:
-            thread.start()
-        assert any(thread.is_alive() for thread in threads)
-        for thread in threads:
-            thread.join()
-    finally:
-        sys.setswitchinterval(interval)
+    for thread in threads:
+        thread.start()
+    assert any(thread.is_alive() for thread in threads)
+    for thread in threads:
+        thread.join()
     for i in range(2):
         assert read_labels(tmp_path / str(i)) == read_labels(finished.folder)
     assert_python_has_the_signals_back()
