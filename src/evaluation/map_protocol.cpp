@@ -39,7 +39,7 @@ class RadiusLookup {
         cells_(points.size(), [&](std::size_t i, auto&& add) {
           const VoxelKey key = grid_.key(points[i]);
           if (key == kNoKey) return;
-          for_each_around(key, [&](VoxelKey at) {  // more than rounding
+          for_each_touching(key, [&](VoxelKey at) {  // more than rounding
             if (grid_.squared_distance(points[i], at) <= 1.001 * squared_radius_) add(at);
           });
         }) {}
@@ -170,18 +170,18 @@ class MapProtocol::Impl {
     mixed_.assign(groups_.grouped_points(), {});
     near_mixed_ = VoxelHashTable<>();
     for (std::size_t cell = 0; cell < groups_.size(); ++cell) {
-      detail::for_each_around(groups_.key(cell), [&](VoxelKey key) {
+      for_each_touching(groups_.key(cell), [&](VoxelKey key) {
         const std::uint32_t number = measured_.find(key);
         if (number != kNoIndex) truths_[cell] |= measured_truths_[number];
       });
       if (!detail::is_mixed(truths_[cell])) continue;
-      detail::for_each_around(groups_.key(cell), [&](VoxelKey key) { near_mixed_.insert(key); });
+      for_each_touching(groups_.key(cell), [&](VoxelKey key) { near_mixed_.insert(key); });
     }
   }
 
   /// Updates the nearest measured point of the map points in mixed voxels around a point.
   void approach(const VoxelPoint& point, VoxelKey key) {
-    detail::for_each_around(key, [&](VoxelKey at) {
+    for_each_touching(key, [&](VoxelKey at) {
       const std::uint32_t cell = groups_.index().find(at);
       if (cell == kNoIndex || !detail::is_mixed(truths_[cell])) return;
       // Skips voxels whose map points have nearer measured points already: most, in dense maps.

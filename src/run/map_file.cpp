@@ -114,14 +114,11 @@ void MapAttributeTable::add(const RecordedScan& scan, const ScanVerdict& verdict
 
 MapAttributes MapAttributeTable::at(const Eigen::Vector3d& position) const {
   const VoxelKey key = key_of(position);
-  const std::uint32_t own = voxels_.find(key);
-  if (own != kNoIndex) return attributes_[own];
-  for (int neighbour = 0; neighbour < 27; ++neighbour) {
-    const std::uint32_t found = voxels_.find(
-        key + voxel_key_step(neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1));
-    if (found != kNoIndex) return attributes_[found];
-  }
-  return {};
+  std::uint32_t found = voxels_.find(key);
+  for_each_touching(key, [&](VoxelKey near) {
+    if (found == kNoIndex) found = voxels_.find(near);
+  });
+  return found == kNoIndex ? MapAttributes() : attributes_[found];
 }
 
 VoxelKey MapAttributeTable::key_of(const Eigen::Vector3d& position) const {

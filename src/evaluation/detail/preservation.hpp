@@ -72,7 +72,7 @@ bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
     same = candidate->truth == raw.truth;
   };
   compare(key);
-  if (nearest > 0) for_each_around(key, compare);
+  if (nearest > 0) for_each_touching(key, compare);
   return same;
 }
 

@@ -63,14 +63,4 @@ class VoxelGrid {
   Eigen::Array3d anchor_;  // cell numbers
 };
 
-/// Calls `visit(key)` for a voxel and its 26 neighbours.
-template <class Visit>
-void for_each_around(VoxelKey key, Visit&& visit) {
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) visit(key + voxel_key_step(x, y, z));
-    }
-  }
-}
-
 }  // namespace dynains::evaluation::detail
