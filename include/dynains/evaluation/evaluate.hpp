@@ -9,6 +9,7 @@
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
+#include "dynains/evaluation/voxel_protocol.hpp"
 #include "dynains/parameters.hpp"
 
 namespace dynains::evaluation {
@@ -72,7 +73,8 @@ struct Evaluation {
 
   /// Row of estimate 0; null without estimates.
   const EvaluationRow* first_estimate() const {
-    return rows.size() > 2 && rows[2].objects ? &rows[2] : nullptr;
+    constexpr std::size_t first = VoxelProtocol::kFirstEstimate;
+    return rows.size() > first && rows[first].objects ? &rows[first] : nullptr;
   }
 };
 
