@@ -151,7 +151,7 @@ std::set<std::uint32_t> removed_with_box(MovedGround&& moved, const PointBuffer&
   return found;
 }
 
-// The same without references.
+// Indices of the ground points that are removed under a box, if no reference saw the ground.
 std::set<std::uint32_t> ground_that_goes(const FreeSpaceConfig& config, const PointBuffer& ground) {
   return removed_with_box(MovedGround(config), ground, samples_of(config, ground),
                           Cause::kUnderInstance);

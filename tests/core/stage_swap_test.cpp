@@ -15,14 +15,16 @@
 namespace dynains::test {
 namespace {
 
+struct NoParameters {
+  template <class Self, class Visitor>
+  static void visit(Self&, Visitor&&) {}
+  void validate() const {}
+};
+
 // A map that counts inserted points and cannot remove any.
 class CountingMap {
  public:
-  struct Config {
-    template <class Self, class Visitor>
-    static void visit(Self&, Visitor&&) {}
-    void validate() const {}
-  };
+  using Config = NoParameters;
   explicit CountingMap(const Config&) {}
   void insert(PointsView points, Span<const std::uint8_t> keep, const Eigen::Isometry3d&) {
     count += keep.empty() ? points.size()
@@ -71,11 +73,7 @@ class FlatGround {
 // One cluster ahead of the sensor, one behind it. Points near the ground belong to neither.
 class HalvesClusterer {
  public:
-  struct Config {
-    template <class Self, class Visitor>
-    static void visit(Self&, Visitor&&) {}
-    void validate() const {}
-  };
+  using Config = NoParameters;
   explicit HalvesClusterer(const Config&) {}
 
   Span<const std::uint32_t> cluster(PolarView points) {

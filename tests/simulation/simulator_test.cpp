@@ -15,7 +15,7 @@ using test::drive_of;
 
 namespace {
 
-/// Of all data that is written to disk.
+/// Fingerprint of the points, labels and pose that `simulate` writes for a scan.
 std::uint64_t hash_of(const SimulatedScan& scan) {
   Fingerprint hash;
   hash.add(scan.xyzi.data(), scan.xyzi.size() * sizeof(float));
