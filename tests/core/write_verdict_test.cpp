@@ -95,8 +95,10 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     for (std::size_t i = 0; i < ground + points; ++i) {
       scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
     }
-    scan.unjudged.reset(order.size());
-    for (std::size_t i = ground + points; i < order.size(); ++i) scan.unjudged.mark(order[i], 1, 0);
+    scan.unjudged.assign(order.size(), PointLabel::kGround);
+    for (std::size_t i = ground + points; i < order.size(); ++i) {
+      scan.unjudged[order[i]] = PointLabel::kInvalid;
+    }
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
@@ -175,8 +177,10 @@ struct JudgedScan {
     slot.split.resize(ground + above);
     slot.split.ground_count = ground;
     std::copy_n(order.begin(), ground + above, slot.split.input.begin());
-    slot.unjudged.reset(all);
-    for (std::size_t i = ground + above; i < all; ++i) slot.unjudged.mark(order[i], 1, 1);
+    slot.unjudged.assign(all, PointLabel::kGround);
+    for (std::size_t i = ground + above; i < all; ++i) {
+      slot.unjudged[order[i]] = PointLabel::kOutOfRange;
+    }
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
     for (std::size_t i = 0; i < above; ++i) {
       const std::size_t cluster = random.index(kClusters + 1);

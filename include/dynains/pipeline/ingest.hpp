@@ -8,9 +8,9 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
+#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
@@ -30,12 +30,14 @@ class Ingest {
  public:
   /// `cloud`: m. Points at the origin of the cloud or at the sensor are beams without a return and
   /// get kInvalid, as do NaN and infinity. `R`: rotation of the valid points after the range test,
-  /// or null for none. `unjudged`: receives the points that are not valid.
+  /// or null for none. `unjudged`: receives the labels of the points that are not valid, and kGround
+  /// for the others.
   void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R,
-            UnjudgedPoints& unjudged) {
+            std::vector<PointLabel>& unjudged) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
-    unjudged.reset(count);
+    ensure_capacity(unjudged, count);
+    unjudged.assign(count, PointLabel::kGround);
     points_.grow(count + kPackWidth);
     grow(input_, count + kPackWidth);
     count_ = 0;
@@ -79,7 +81,7 @@ class Ingest {
   // Compacts the valid points among the appended ones and marks the others. Returns the number of
   // valid points. The branch for a whole valid pack is the common case.
   std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
-                     UnjudgedPoints& unjudged) {
+                     std::vector<PointLabel>& unjudged) {
     std::size_t result = 0;
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
@@ -117,8 +119,10 @@ class Ingest {
                                   (abs(x) + abs(y) + abs(z) > zero))
                                      .bits();
         const unsigned bad = ~good & ((1U << at.size()) - 1U);
-        static_assert(kWordBits % Packs::kCount == 0);
-        unjudged.mark(first, bad, bad & returns);
+        for_each_bit(bad, [&](std::size_t k) {
+          const bool is_return = (returns >> k & 1U) != 0;
+          unjudged[first + k] = is_return ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+        });
         for (std::size_t k = 0; k < at.size(); ++k) {
           xs[valid_count] = xs[at.begin + k];
           ys[valid_count] = ys[at.begin + k];

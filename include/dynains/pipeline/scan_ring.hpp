@@ -13,7 +13,6 @@
 
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -32,7 +31,8 @@ struct ScanSlot {
   Pose T_world_level = Pose::Identity();  ///< frame of split.points
 
   GroundSplit split;
-  UnjudgedPoints unjudged;
+  /// By input point: kInvalid or kOutOfRange for points that are not judged, else kGround.
+  std::vector<PointLabel> unjudged;
   ShortNumbers input;              ///< by point of the split: its index in the input
   ShortNumbers cluster_of;         ///< by non-ground point: index in `ids`, or kNoCluster
   std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
@@ -40,7 +40,7 @@ struct ScanSlot {
 
   /// Marks the points of the split behind the last one, of `valid` points, as out of range.
   void mark_unjudged(std::size_t valid) {
-    for (std::size_t i = split.count; i < valid; ++i) unjudged.mark(split.input[i], 1, 1);
+    for (std::size_t i = split.count; i < valid; ++i) unjudged[split.input[i]] = PointLabel::kOutOfRange;
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
@@ -49,7 +49,7 @@ struct ScanSlot {
   /// scans cause no page faults.
   void touch(std::size_t points) {
     split.points.grow(points + kPackWidth);
-    unjudged.reset(points);
+    resize_with_margin(unjudged, points);
     input.reserve(points);
     cluster_of.reserve(points);
   }

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/unjudged_points.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
@@ -139,22 +138,19 @@ class VerdictWriter {
   }
 
   // Writes the verdict on ground and on unjudged points; other points get that of the ground.
-  void write_ground(const UnjudgedPoints& unjudged) {
+  void write_ground(Span<const PointLabel> unjudged) {
     std::fill(causes_.begin(), causes_.end(), Cause::kGround);
-    std::fill(labels_.begin(), labels_.end(), PointLabel::kGround);
+    std::copy(unjudged.begin(), unjudged.end(), labels_.begin());
     std::fill(beliefs_.begin(), beliefs_.end(), 0.0F);
-    unjudged.for_each([&](std::size_t i, PointLabel label) {
-      causes_[i] = Cause::kNotJudged;
-      labels_[i] = label;
-    });
+    for (std::size_t i = 0; i < unjudged.size(); ++i) {
+      if (unjudged[i] != PointLabel::kGround) causes_[i] = Cause::kNotJudged;
+    }
   }
 
   void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups) {
-    ensure_capacity(group_of_input_, scan.unjudged.size());
-    group_of_input_.assign(scan.unjudged.size(), fixed_group(PointLabel::kGround));
+    resize_with_margin(group_of_input_, scan.unjudged.size());
     std::uint32_t* const group_of = group_of_input_.data();
-    scan.unjudged.for_each(
-        [&](std::size_t i, PointLabel label) { group_of[i] = fixed_group(label); });
+    std::transform(scan.unjudged.begin(), scan.unjudged.end(), group_of, fixed_group);
     const std::uint32_t* const input = input_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
   }
