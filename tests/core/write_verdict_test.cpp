@@ -15,8 +15,8 @@
 namespace dynains::test {
 namespace {
 
-using detail::ClusterVerdict;
 using detail::DecisionStage;
+using detail::WindowVerdict;
 using PointRun = ClusterSet::PointRun;
 
 constexpr std::uint32_t kClusters = 6;
@@ -47,12 +47,12 @@ std::vector<std::uint32_t> by_point(const std::vector<PointRun>& point_runs) {
   return cluster_of;
 }
 
-std::vector<ClusterVerdict> random_verdicts(Random& random) {
-  std::vector<ClusterVerdict> verdicts(kClusters);
-  for (ClusterVerdict& verdict : verdicts) {
+std::vector<WindowVerdict> random_verdicts(Random& random) {
+  std::vector<WindowVerdict> verdicts(kClusters);
+  for (WindowVerdict& verdict : verdicts) {
     verdict.stage = kStages[1 + random.index(3)];
     if (verdict.stage != DecisionStage::kProposed) continue;
-    verdict.is_dynamic = static_cast<std::uint8_t>(random.index(2));
+    verdict.votes = static_cast<std::uint8_t>(random.index(2));
     verdict.belief = random.uniform_float(0.0, 1.0);
   }
   return verdicts;
@@ -64,14 +64,21 @@ struct Votes {
   int votes = 0;
   float belief = 0.0F;
 
-  void add(std::uint32_t cluster, const std::vector<ClusterVerdict>& verdicts) {
+  void add(std::uint32_t cluster, const std::vector<WindowVerdict>& verdicts) {
     if (cluster == kNoCluster) return;
-    const ClusterVerdict& verdict = verdicts[cluster];
+    const WindowVerdict& verdict = verdicts[cluster];
     stage = std::max(stage, verdict.stage);
-    votes += verdict.is_dynamic;
+    votes += verdict.votes;
     belief = std::max(belief, verdict.belief);
   }
 };
+
+Cause static_cause(DecisionStage stage) {
+  return stage == DecisionStage::kNoCluster     ? Cause::kNotJudged
+         : stage == DecisionStage::kTooFewScans ? Cause::kTooFewScans
+         : stage == DecisionStage::kSimilar     ? Cause::kSimilar
+                                                : Cause::kReverted;
+}
 
 // Keeps what the verdicts need, as after the push of a scan.
 void keep(detail::ScanSlot& scan, const std::vector<std::uint32_t>& cluster_of) {
@@ -106,18 +113,25 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     const std::vector<std::uint32_t> first_cluster = by_point(scan.windows.point_runs);
     std::vector<Votes> expected(points);
     const auto add = [&](const std::vector<PointRun>& point_runs,
-                         const std::vector<ClusterVerdict>& verdicts) {
+                         const std::vector<WindowVerdict>& verdicts) {
       const std::vector<std::uint32_t> cluster_of = by_point(point_runs);
       for (std::size_t i = 0; i < points; ++i) expected[i].add(cluster_of[i], verdicts);
     };
     const auto check = [&](int votes) {
-      const ScanVerdict verdict = writer.verdict(scan);
+      std::vector<EvidenceVerdict::Group> groups(points);
+      std::vector<std::uint32_t> group_of(points);
+      std::iota(group_of.begin(), group_of.end(), 0U);
+      for (std::size_t i = 0; i < points; ++i) {
+        groups[i] = detail::point_verdict(scan.windows.points[i], votes);
+      }
+      const ScanVerdict verdict = writer.write(scan, {groups, group_of, {}});
+      writer.write_flags(scan, {groups, group_of, {}});
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = scan.split.input[ground + i];
         const bool dynamic = expected[i].votes >= votes;
         REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
         REQUIRE(verdict.causes[to] ==
-                (dynamic ? Cause::kProposed : detail::static_cause(expected[i].stage)));
+                (dynamic ? Cause::kProposed : static_cause(expected[i].stage)));
         REQUIRE(verdict.beliefs[to] == expected[i].belief);
         REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
         REQUIRE(verdict.instances[to] ==
@@ -138,25 +152,21 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       }
     };
 
-    const std::vector<ClusterVerdict> first = random_verdicts(random);
+    const std::vector<WindowVerdict> first = random_verdicts(random);
     add(scan.windows.point_runs, first);
-    detail::record_first_window(points, first, scan.windows);
+    scan.windows.points.assign(points, WindowVerdict());
+    scan.windows.record(scan.windows.point_runs, first);
     keep(scan, first_cluster);
-    writer.begin(scan);
-    writer.write_windows(scan, 1);
     check(1);
 
     const std::size_t windows = random.index(4);
     for (std::size_t k = 0; k < windows; ++k) {
       const std::vector<PointRun> point_runs = random_runs(random, points);
-      const std::vector<ClusterVerdict> verdicts = random_verdicts(random);
+      const std::vector<WindowVerdict> verdicts = random_verdicts(random);
       add(point_runs, verdicts);
-      detail::record_later_window(point_runs, verdicts, scan.windows);
+      scan.windows.record(point_runs, verdicts);
     }
-    const int votes = 1 + static_cast<int>(random.index(3));
-    writer.begin(scan);
-    writer.write_windows(scan, votes);
-    check(votes);
+    check(1 + static_cast<int>(random.index(3)));
   }
 }
 
@@ -217,7 +227,8 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       }
     };
     const auto check = [&](bool is_final) {
-      const ScanVerdict verdict = writer.verdict(slot);
+      const ScanVerdict verdict = writer.write(slot, {groups, scan.group_of, moved});
+      if (is_final) writer.write_flags(slot, {groups, scan.group_of, moved});
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = slot.split.input[scan.ground + i];
         const EvidenceVerdict::Group& expected = groups[scan.group_of[i]];
@@ -252,14 +263,9 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
 
     change();
     keep(slot, scan.cluster_of);
-    writer.begin(slot);
-    writer.write_groups(slot, {groups, scan.group_of, moved});
     check(false);
     for (int again = 0; again < 2; ++again) {
       change();
-      writer.begin(slot);
-      writer.write_groups(slot, {groups, scan.group_of, moved});
-      writer.flag_groups(slot, {groups, scan.group_of, moved});
       check(true);
     }
   }

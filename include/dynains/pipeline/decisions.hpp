@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,7 +17,6 @@
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/pipeline/window_votes.hpp"
 #include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
@@ -152,7 +152,7 @@ class ScanWindow {
 
 /// Collects evidence on scans and classifies their points as static or dynamic. The caller calls
 /// observe() and judge() for each scan, and judge() again for the same scan after latency() later
-/// scans, followed by write_final().
+/// scans, each followed by verdict().
 class ScanDecision {
  public:
   virtual ~ScanDecision() = default;
@@ -172,11 +172,9 @@ class ScanDecision {
   /// Judges `scan`. Without `is_final` it is the newest scan, and evidence of later scans is
   /// missing.
   virtual void judge(const ScanSlot& scan, bool is_final) = 0;
-  /// Writes the verdict without latency on the newest scan, after VerdictWriter::begin(). The final
-  /// verdict on an older scan may come before.
-  virtual void write_newest(const ScanSlot& newest, VerdictWriter& writer) = 0;
-  /// Writes the final verdict of the last judge(), with keep flags, after VerdictWriter::begin().
-  virtual void write_final(const ScanSlot& scan, VerdictWriter& writer) = 0;
+  /// Verdict on the scan of the last judge() with the same `is_final`. The final verdict on an
+  /// older scan may come before that on the newest one. The spans are valid until the next call.
+  virtual EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) = 0;
 
   /// Alignment of the newest scan with earlier scans, in the level frame.
   virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
@@ -228,11 +226,15 @@ class WindowDecision final : public ScanDecision {
 
   // The windows have voted already.
   void judge(const ScanSlot&, bool) override {}
-  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
-    writer.write_windows(newest, 1);
-  }
-  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
-    writer.write_windows(scan, std::max(1, votes_));
+  EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) override {
+    const std::vector<WindowVerdict>& points = scan.windows.points;
+    resize_with_margin(groups_, points.size());
+    resize_with_margin(group_of_, points.size());  // each point is a group
+    std::iota(group_of_.begin(), group_of_.end(), 0U);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      groups_[i] = point_verdict(points[i], is_final ? std::max(1, votes_) : 1);
+    }
+    return {groups_, group_of_, {}};
   }
 
  private:
@@ -283,7 +285,7 @@ class WindowDecision final : public ScanDecision {
   }
 
   // Eq. 13-19 for the cluster of the last call of describe().
-  void update_belief(const ClusterView& cluster, ClusterVerdict& verdict) {
+  void update_belief(const ClusterView& cluster, WindowVerdict& verdict) {
     if (belief_descriptor_) belief_descriptor_->describe(cluster);
     auto& descriptor = belief_descriptor_ ? *belief_descriptor_ : descriptor_;
     descriptor.describe_rest();
@@ -297,7 +299,7 @@ class WindowDecision final : public ScanDecision {
       belief_.update(descriptor.heights(k), heights_of_others(descriptor, count, k));
     }
     verdict.belief = static_cast<float>(belief_.posterior());
-    verdict.is_dynamic = belief_.is_dynamic() ? 1 : 0;
+    verdict.votes = belief_.is_dynamic() ? 1 : 0;
   }
 
   // Maximum of the heights of all `scans` observations but k, by cell.
@@ -321,10 +323,10 @@ class WindowDecision final : public ScanDecision {
     ensure_capacity(newest.windows.point_runs, runs.size());
     newest.windows.point_runs.assign(runs.begin(), runs.end());
     assign_ids(scans);
-    record_first_window(newest.non_ground_count(), verdicts_, newest.windows);
-    if (votes_ == 0) return;
-    for (std::uint64_t scan = first_scan; scan < newest.scan; ++scan) {
-      record_later_window(clusters_.point_runs(scan - first_scan), verdicts_, scans[scan].windows);
+    ensure_capacity(newest.windows.points, newest.non_ground_count());
+    newest.windows.points.assign(newest.non_ground_count(), WindowVerdict());
+    for (std::uint64_t scan = votes_ == 0 ? newest.scan : first_scan; scan <= newest.scan; ++scan) {
+      scans[scan].windows.record(clusters_.point_runs(scan - first_scan), verdicts_);
     }
   }
 
@@ -352,7 +354,9 @@ class WindowDecision final : public ScanDecision {
   std::vector<float> others_;
   typename Stages::Belief belief_;
   ClusterSet clusters_;
-  std::vector<ClusterVerdict> verdicts_;  // by cluster of the current window
+  std::vector<WindowVerdict> verdicts_;         // by cluster of the current window
+  std::vector<EvidenceVerdict::Group> groups_;  // by non-ground point
+  std::vector<std::uint32_t> group_of_;
   InstanceIds instance_ids_;
 };
 

@@ -9,7 +9,6 @@
 #include "dynains/evidence/free_space_evidence.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -45,13 +44,8 @@ class FreeSpaceDecision final : public ScanDecision {
     evidence_.judge(scan.scan, is_final);
     if (!is_final) evidence_.make_reference(scan.split);
   }
-  void write_newest(const ScanSlot& newest, VerdictWriter& writer) override {
-    writer.write_groups(newest, evidence_.verdict(false, newest.split));
-  }
-  void write_final(const ScanSlot& scan, VerdictWriter& writer) override {
-    const EvidenceVerdict verdict = evidence_.verdict(true, scan.split);
-    writer.write_groups(scan, verdict);
-    writer.flag_groups(scan, verdict);
+  EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) override {
+    return evidence_.verdict(is_final, scan.split);
   }
 
   std::optional<PoseResidual> pose_residual() const override { return evidence_.pose_residual(); }

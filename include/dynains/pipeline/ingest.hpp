@@ -30,8 +30,8 @@ class Ingest {
  public:
   /// `cloud`: m. Points at the origin of the cloud or at the sensor are beams without a return and
   /// get kInvalid, as do NaN and infinity. `R`: rotation of the valid points after the range test,
-  /// or null for none. `unjudged`: receives the labels of the points that are not valid, and kGround
-  /// for the others.
+  /// or null for none. `unjudged`: receives the labels of the points that are not valid, and
+  /// kGround for the others.
   void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R,
             std::vector<PointLabel>& unjudged) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());

@@ -295,9 +295,7 @@ class Pipeline final : private NewestVerdictMaker {
 
   const ScanVerdict& newest_verdict() override {
     if (unwritten_ == nullptr) return newest_;
-    newest_writer_.begin(*unwritten_);
-    decision_->write_newest(*unwritten_, newest_writer_);  // Eq. 2
-    newest_ = newest_writer_.verdict(*unwritten_);
+    newest_ = newest_writer_.write(*unwritten_, decision_->verdict(*unwritten_, false));  // Eq. 2
     unwritten_ = nullptr;
     return newest_;
   }
@@ -306,15 +304,17 @@ class Pipeline final : private NewestVerdictMaker {
   ScanVerdict finish_oldest(StageTimes& times) {
     const ScanSlot& scan = scans_.finish_oldest();
     timed(times.judge, [&] { decision_->judge(scan, true); });
+    ScanVerdict verdict;
     timed(times.verdict, [&] {
-      final_writer_.begin(scan);
-      decision_->write_final(scan, final_writer_);
+      const EvidenceVerdict evidence = decision_->verdict(scan, true);
+      verdict = final_writer_.write(scan, evidence);
+      if (build_map_) final_writer_.write_flags(scan, evidence);
     });
     if (build_map_) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
       timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });
     }
-    return final_writer_.verdict(scan);
+    return verdict;
   }
 
   // Finishes the oldest scan if its verdict is due and no other one waits for take_finished().

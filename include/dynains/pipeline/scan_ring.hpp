@@ -40,7 +40,8 @@ struct ScanSlot {
 
   /// Marks the points of the split behind the last one, of `valid` points, as out of range.
   void mark_unjudged(std::size_t valid) {
-    for (std::size_t i = split.count; i < valid; ++i) unjudged[split.input[i]] = PointLabel::kOutOfRange;
+    for (std::size_t i = split.count; i < valid; ++i)
+      unjudged[split.input[i]] = PointLabel::kOutOfRange;
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }

@@ -1,5 +1,5 @@
-// Conversion of verdicts on clusters, groups and points to the arrays of a ScanVerdict (Eq. 2). The
-// cause determines the label and the keep flag.
+// Conversion of verdicts on groups and points to the arrays of a ScanVerdict (Eq. 2). The cause
+// determines the label and the keep flag.
 #pragma once
 
 #include <algorithm>
@@ -8,17 +8,10 @@
 #include <vector>
 
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/window_votes.hpp"
 #include "dynains/points.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
-
-/// Label of a valid point for the cause of its verdict.
-constexpr PointLabel label_of(Cause cause) {
-  if (is_dynamic(cause)) return PointLabel::kDynamic;
-  return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
-}
 
 /// Number of the group of points that have a label without evidence: of kGround and those before.
 constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::uint32_t>(label); }
@@ -28,11 +21,7 @@ constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::
 /// open scans need no arrays of their own.
 class VerdictWriter {
  public:
-  /// The written verdict on `scan`, valid until the next begin().
-  ScanVerdict verdict(const ScanSlot& scan) const {
-    return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
-  }
-  /// Keep flags of the verdict, by point of the split (ground first): 1 if static.
+  /// Keep flags of the last write_flags(), by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
   /// Ensures capacity for a scan of `points` points and writes to the memory, so that later scans
@@ -44,13 +33,13 @@ class VerdictWriter {
 
   /// Ensures capacity for the number of groups of `other`.
   void ensure_capacity_like(const VerdictWriter& other) {
-    ensure_capacity(verdicts_, other.verdicts_.size());
+    ensure_capacity(groups_, other.groups_.size());
   }
 
-  /// Begins the verdict on a scan: writes the instance ids, and sets all keep flags.
-  void begin(const ScanSlot& scan) {
+  /// Writes the verdict on a scan, which is valid until the next call.
+  ScanVerdict write(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     const std::size_t count = scan.unjudged.size();
-    is_kept_.assign(scan.split.count, 1);
+    resize_all(count, labels_, beliefs_, causes_, group_of_input_);
     ensure_capacity(instances_, count);
     instances_.assign(count, kNoInstance);
     scan.input.copy_to(input_);
@@ -60,113 +49,77 @@ class VerdictWriter {
     for (std::size_t i = 0; i < cluster_of_.size(); ++i) {
       if (cluster_of_[i] != kNoCluster) instances[input[i]] = scan.ids[cluster_of_[i]];
     }
-    resize_all(count, labels_, beliefs_, causes_);
-  }
-
-  /// Writes the verdict of the windows so far on all points: dynamic with at least `votes_needed`
-  /// votes. Also writes the keep flags.
-  void write_windows(const ScanSlot& scan, int votes_needed) {
-    write_ground(scan.unjudged);
-    const std::size_t count = scan.non_ground_count();
-    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
-    const DecisionStage* const stage = scan.windows.stage.data();
-    PointLabel* const labels = labels_.data();
-    Cause* const causes = causes_.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      if (stage[i] == DecisionStage::kProposed) {
-        write(scan.split.ground_count + i, point_verdict(scan.windows, i, votes_needed));
-      } else {
-        labels[input[i]] = PointLabel::kStatic;
-        causes[input[i]] = static_cause(stage[i]);
-      }
-    }
-  }
-
-  /// Writes the verdict by evidence on all points. The group of each input point is computed first,
-  /// so that the arrays are written sequentially.
-  void write_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
-    verdicts_.resize(kFirstGroup);
+    groups_.resize(kFirstGroup);
     for (const PointLabel label : {PointLabel::kInvalid, PointLabel::kOutOfRange}) {
-      verdicts_[fixed_group(label)].label = label;
+      groups_[fixed_group(label)].label = label;
     }
-    verdicts_[fixed_group(PointLabel::kGround)] = GroupVerdict({Cause::kGround, 0.0F});
-    verdicts_.insert(verdicts_.end(), evidence.groups.begin(), evidence.groups.end());
-    order_groups(scan, evidence.group_of);
-    expand_groups(scan.unjudged.size());
+    groups_[fixed_group(PointLabel::kGround)] = Group({Cause::kGround, 0.0F});
+    groups_.insert(groups_.end(), evidence.groups.begin(), evidence.groups.end());
+    // The group of each input point comes first, so that the arrays are written sequentially.
+    std::uint32_t* const group_of = group_of_input_.data();
+    std::transform(scan.unjudged.begin(), scan.unjudged.end(), group_of, fixed_group);
+    for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
+      group_of[input[i]] = kFirstGroup + evidence.group_of[i];
+    }
+    expand_groups(count);
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
-      write(ground.point, ground.verdict);
+      write(input_[ground.point], Group(ground.verdict));
     }
+    return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
   }
 
-  /// Writes the keep flags of the non-ground points after write_groups().
-  void flag_groups(const ScanSlot& scan, const EvidenceVerdict& evidence) {
-    const std::size_t count = scan.non_ground_count();
+  /// Writes the keep flags of the verdict of the last write().
+  void write_flags(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    is_kept_.assign(scan.split.count, 1);
     const std::uint32_t* const group_of = evidence.group_of.data();
-    const GroupVerdict* const verdicts = verdicts_.data() + kFirstGroup;
+    const Group* const groups = groups_.data() + kFirstGroup;
     std::uint8_t* const is_kept = is_kept_.data() + scan.split.ground_count;
-    for (std::size_t i = 0; i < count; ++i) is_kept[i] = verdicts[group_of[i]].is_kept;
+    for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
+      is_kept[i] = groups[group_of[i]].label == PointLabel::kDynamic ? 0 : 1;
+    }
+    for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) is_kept_[ground.point] = 0;
   }
 
  private:
   // Verdict on the points of a group, packed in eight bytes.
-  struct GroupVerdict {
-    GroupVerdict() = default;
-    GroupVerdict(const PointVerdict& verdict)
+  struct Group {
+    Group() = default;
+    Group(const EvidenceVerdict::Group& verdict)
         : belief(verdict.belief),
-          label(label_of(verdict.cause)),
-          cause(verdict.cause),
-          is_kept(is_dynamic(verdict.cause) ? 0 : 1) {}
+          label(is_dynamic(verdict.cause)         ? PointLabel::kDynamic
+                : verdict.cause == Cause::kGround ? PointLabel::kGround
+                                                  : PointLabel::kStatic),
+          cause(verdict.cause) {}
     float belief = 0.0F;
     PointLabel label = PointLabel::kStatic;
     Cause cause = Cause::kNotJudged;
-    std::uint8_t is_kept = 1;
   };
-  static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
 
-  // Writes the verdict on a single point, by index in the split.
-  void write(std::size_t point, const PointVerdict& verdict) {
-    const std::uint32_t to = input_[point];
-    labels_[to] = label_of(verdict.cause);
-    causes_[to] = verdict.cause;
-    beliefs_[to] = verdict.belief;
-    is_kept_[point] = is_dynamic(verdict.cause) ? 0 : 1;
-  }
+  static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
 
   template <class... Vectors>
   static void resize_all(std::size_t count, Vectors&... values) {
     (resize_with_margin(values, count), ...);
   }
 
-  // Writes the verdict on ground and on unjudged points; other points get that of the ground.
-  void write_ground(Span<const PointLabel> unjudged) {
-    std::fill(causes_.begin(), causes_.end(), Cause::kGround);
-    std::copy(unjudged.begin(), unjudged.end(), labels_.begin());
-    std::fill(beliefs_.begin(), beliefs_.end(), 0.0F);
-    for (std::size_t i = 0; i < unjudged.size(); ++i) {
-      if (unjudged[i] != PointLabel::kGround) causes_[i] = Cause::kNotJudged;
-    }
-  }
-
-  void order_groups(const ScanSlot& scan, Span<const std::uint32_t> groups) {
-    resize_with_margin(group_of_input_, scan.unjudged.size());
-    std::uint32_t* const group_of = group_of_input_.data();
-    std::transform(scan.unjudged.begin(), scan.unjudged.end(), group_of, fixed_group);
-    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
-    for (std::size_t i = 0; i < groups.size(); ++i) group_of[input[i]] = kFirstGroup + groups[i];
+  void write(std::size_t input, const Group& group) {
+    beliefs_[input] = group.belief;
+    causes_[input] = group.cause;
+    labels_[input] = group.label;
   }
 
   void expand_groups(std::size_t count) {
     // Local copies of members avoid reloads after byte stores, which could alias them.
     const std::uint32_t* const group_of = group_of_input_.data();
-    const GroupVerdict* const verdicts = verdicts_.data();
+    const Group* const groups = groups_.data();
     PointLabel* const labels = labels_.data();
     Cause* const causes = causes_.data();
     float* const beliefs = beliefs_.data();
     for (std::size_t i = 0; i < count; ++i) {
-      const GroupVerdict verdict = verdicts[group_of[i]];
-      beliefs[i] = verdict.belief;
-      causes[i] = verdict.cause;
-      labels[i] = verdict.label;
+      const Group group = groups[group_of[i]];
+      beliefs[i] = group.belief;
+      causes[i] = group.cause;
+      labels[i] = group.label;
     }
   }
 
@@ -180,7 +133,7 @@ class VerdictWriter {
   std::vector<std::uint8_t> is_kept_;      // by point of the split
   std::vector<std::uint32_t> input_;       // by point of the split
   std::vector<std::uint32_t> cluster_of_;  // by non-ground point
-  std::vector<GroupVerdict> verdicts_;
+  std::vector<Group> groups_;              // fixed groups, then those of the evidence
 };
 
 }  // namespace dynains::detail
