@@ -52,7 +52,7 @@ void add_session(const dynains::City& city, const char* name, double begin, bool
   dynains::SessionInfo session;
   session.name = name;
   session.begin = begin;
-  dynains::MemoryStore store;
+  dynains::ByteStore store;
   dynains::SessionWriter writer(city, session, store);
   for (std::uint32_t number = 0; number < 8; ++number) {
     const double y = static_cast<double>(number) - 4.0;

@@ -82,7 +82,7 @@ double moving_share(const std::vector<Scan>& scans,
 int main() {
   const std::vector<Scan> scans = drive();
   std::vector<dynains::VerdictArrays> verdicts;  // by scan
-  dynains::MemoryStore store;                    // or your own ByteStore, for example a file
+  dynains::ByteStore store;
   dynains::SecondPass pass(store);
   dynains::ComparedPoses compared;
 

@@ -12,7 +12,6 @@
 #include "poses/given_motion.hpp"
 #include "poses/landmarks.hpp"
 #include "recorded_scans.hpp"
-#include "scratch_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -42,7 +41,7 @@ void add(std::vector<ReturnError>& errors, std::size_t earlier, std::size_t late
 
 std::vector<ReturnToPlace> find_returns(const Recording& recording,
                                         const std::filesystem::path& folder) {
-  ScratchFile store(folder);
+  ByteStore store(folder);
   Returns returns(store, FreeSpaceConfig());
   PointBuffer points;
   std::vector<PointLabel> all_static;

@@ -18,7 +18,6 @@
 #include "run_plan.hpp"
 #include "run_report.hpp"
 #include "run_sequence.hpp"
-#include "scratch_file.hpp"
 #include "start_check.hpp"
 #include "write_view.hpp"
 
@@ -189,7 +188,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   const RunOutputs outputs = partial_outputs(plan, out, outside);
   RunResults results(plan.sequence, plan.range, outputs);
   if (session) results.contribute_to(*session);
-  ScratchFile store(outputs.folder);
+  ByteStore store(outputs.folder);
   Returns returns(store, plan.settings.config.evidence);
   std::optional<SecondPass> second_pass;
   if (plan.settings.passes > 1) {

@@ -15,7 +15,6 @@
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "scan_range.hpp"
-#include "scratch_file.hpp"
 
 namespace dynains::program {
 
@@ -57,7 +56,7 @@ class SessionContribution {
   void commit() { writer_.commit(); }
 
  private:
-  ScratchFile store_;
+  ByteStore store_;
   SessionWriter writer_;
   std::optional<Pose> T_city_session_;
   PointBuffer points_;

@@ -77,7 +77,7 @@ class MeasuredObjects {
 
 /// One simulated day.
 struct Day {
-  std::unique_ptr<MemoryStore> store;
+  std::unique_ptr<ByteStore> store;
   SessionPoints near;  ///< static and moving points, up to the range of contributions
   SessionPoints all;
   std::set<std::uint32_t> changes = {};  ///< changes of the place that stand there
@@ -91,7 +91,7 @@ void add_day(const City& city, const simulation::Config& config, Day& day) {
   SessionInfo info;
   info.name = "day" + std::to_string(config.day);
   info.begin = config.day;
-  MemoryStore store;
+  ByteStore store;
   SessionWriter writer(city, info, store);
   std::deque<simulation::SimulatedScan> open;
   const auto take_final = [&](const ScanVerdict& verdict) {
@@ -204,7 +204,7 @@ Result try_days(const fs::path& folder, int days, simulation::Config config) {
   std::vector<Day> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
     constexpr double kAnyDistance = 300.0;  // m
-    auto store = std::make_unique<MemoryStore>();
+    auto store = std::make_unique<ByteStore>();
     SessionPoints near(city.grid(), SessionConfig().contribution_range, *store);
     SessionPoints all(city.grid(), kAnyDistance, *store);
     measured.push_back({std::move(store), std::move(near), std::move(all)});

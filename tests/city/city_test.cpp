@@ -43,7 +43,7 @@ void add(const City& city, const Session& session, const std::vector<test::BoxSc
   info.name = session.name;
   info.begin = session.begin;
   info.fingerprint = session.name;
-  MemoryStore store;
+  ByteStore store;
   SessionWriter writer(city, info, store, config);
   std::uint32_t number = 0;
   for (const test::BoxScan& scan : scans) {
@@ -328,7 +328,7 @@ TEST_CASE("a city: the file of a session has the points of the session, tile by 
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
   SessionInfo info;
   info.name = "monday";
-  MemoryStore store;
+  ByteStore store;
   SessionWriter writer(city, info, store, config);
   SessionPoints all(grid, config.contribution_range, store);
   // Away, back, and over the same places again, at other heights within their voxels.
@@ -403,7 +403,7 @@ TEST_CASE("a city: another grid or version and a name that leads out are refused
   CHECK_THROWS_AS(City(folder.path() / "nothing"), IoError);
   SessionInfo outside;
   outside.name = "../monday";
-  MemoryStore store;
+  ByteStore store;
   CHECK_THROWS_AS(SessionWriter(city, outside, store), ConfigError);
 }
 
@@ -456,7 +456,7 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
   const auto before = test::read_tree(city.folder());
   SessionInfo info;
   info.name = "tuesday";
-  MemoryStore store;
+  ByteStore store;
   const test::BoxScan scan = test::scan_boxes({}, 0.0, 0.0);
   {
     SessionWriter writer(city, info, store);

@@ -40,7 +40,7 @@ void add(const City& city, const std::string& name, const Scans& scans,
          const Eigen::Isometry3d& T_city_session = Eigen::Isometry3d::Identity()) {
   SessionInfo info;
   info.name = name;
-  MemoryStore store;
+  ByteStore store;
   SessionWriter writer(city, info, store);
   std::uint32_t number = 0;
   for (const test::BoxScan& scan : scans) {
@@ -180,7 +180,7 @@ TEST_CASE("alignment: the file of the session keeps it") {
   alignment.uncertainty = 0.0071;
   alignment.sessions = {"friday", "monday"};
   info.alignment = alignment;
-  MemoryStore store;
+  ByteStore store;
   SessionWriter(city, info, store).commit();
   const auto read = city.sessions().front().alignment;
   REQUIRE(read);

@@ -104,7 +104,7 @@ TEST_CASE("points of a session: the first of each voxel, whatever floats round t
   SessionGrid grid;
   grid.map_voxel = voxel;
   grid.tile = tile;
-  MemoryStore store;
+  ByteStore store;
   SessionPoints session(grid, range, store);
   Oracle oracle(grid, range);
   Random random(7);

@@ -10,7 +10,7 @@ TEST_CASE("ground is level if none within two cells is lower, across tiles and t
   for (const int cells : {1, 2, 3}) {
     for (const bool is_tested_first : {false, true}) {
       CAPTURE(cells, is_tested_first);
-      MemoryStore store;
+      ByteStore store;
       RecordingGround ground(store, 0);
       const float border = static_cast<float>(kTileEdge);
       const float tested = border + (is_tested_first ? -0.2F : 0.2F);

@@ -59,7 +59,7 @@ class Recorder {
     }
   }
 
-  MemoryStore store;
+  ByteStore store;
   RecordingPlaces places{store, kBudget};
   double step = 1.0;  // s
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();

@@ -35,7 +35,7 @@ struct Drives {
     found = returns.found();
   }
 
-  MemoryStore store;
+  ByteStore store;
   std::vector<Pose> T_given, T_true;
   std::vector<std::uint32_t> visits;
   std::vector<ReturnToPlace> found;

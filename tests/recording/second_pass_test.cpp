@@ -84,7 +84,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
                           const SecondPassConfig& config = short_first_pass(),
                           const Pose& T_turned_world = Pose::Identity(),
                           std::size_t second_epoch = 0, double jump = 0.0) {
-  MemoryStore store;
+  ByteStore store;
   SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
     const VerdictArrays arrays = first_verdict(recording.scans[i], i, removes);
@@ -319,7 +319,7 @@ TEST_CASE("the second pass refuses scans out of order and verdicts of another si
   verdict.labels = arrays.labels;
   verdict.causes = arrays.causes;
   verdict.instances = arrays.instances;
-  MemoryStore store;
+  ByteStore store;
   SecondPass pass(store);
   verdict.scan = 1;
   CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);

@@ -1,4 +1,4 @@
-#include "run/scratch_file.hpp"
+#include "dynains/recording/byte_store.hpp"
 
 #include <cstdint>
 #include <vector>
@@ -10,9 +10,9 @@
 using namespace dynains;
 using namespace dynains::test;
 
-TEST_CASE("a scratch file gives its bytes back, and no folder lists it") {
+TEST_CASE("a byte store gives its bytes back, and no folder lists it") {
   const TemporaryFolder folder;
-  program::ScratchFile file(folder.path());
+  ByteStore file(folder.path());
   const std::vector<std::uint8_t> first = {1, 2, 3}, second(100000, 7);
   CHECK(file.append(first) == 0);
   CHECK(file.append(second) == 3);
