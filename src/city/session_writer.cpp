@@ -27,14 +27,13 @@ void remove_temporaries(const City& city) {
 
 }  // namespace
 
-SessionWriter::SessionWriter(const City& city, SessionInfo session, ByteStore& store,
-                             const SessionConfig& config, Mode mode)
+SessionWriter::SessionWriter(const City& city, SessionInfo session, ByteStore& store, Mode mode)
     : city_(city),
       session_(std::move(session)),
       mode_(mode),
       store_(store),
-      points_(city.grid(), (config.validate(), config.contribution_range), store),
-      references_(config.references, session_.evidence.lateral_margin) {
+      points_(city.grid(), kLookRange, store),
+      references_(/*most_scans=*/10, session_.evidence.lateral_margin) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +
                       "\" must consist of letters, digits, '.', '_' and '-', and begin with a "

@@ -24,7 +24,7 @@ Visit::Visit(ByteStore& store, const SecondPassConfig& config)
       store_(store),
       places_(store, bytes_of(kPlaceShare * config.memory)),
       ground_(store, bytes_of((1.0 - kPlaceShare) * config.memory)),
-      references_(RecordingReferencesConfig{1.0, 5}, config.evidence.lateral_margin) {}
+      references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
 
 // Axes of the places: which way is up is told by the ground of the first scan, not by the world.
 void Visit::find_up(PointsView points, const Pose& T_world_sensor) {

@@ -67,8 +67,7 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
 
 SessionContribution::SessionContribution(const SessionRequest& request, SessionWriter::Mode mode)
     : store_(City::open_or_make(request.city, request.grid).folder()),
-      writer_(City::open_or_make(request.city, request.grid), request.info, store_, SessionConfig(),
-              mode) {
+      writer_(City::open_or_make(request.city, request.grid), request.info, store_, mode) {
   if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
 }
 

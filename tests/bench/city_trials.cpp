@@ -46,7 +46,7 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
 class MeasuredObjects {
  public:
   void add(const simulation::SimulatedScan& scan) {
-    constexpr float kRange = static_cast<float>(SessionConfig().contribution_range);
+    constexpr float kRange = static_cast<float>(kLookRange);
     std::set<std::uint32_t> measured;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
       const Eigen::Map<const Eigen::Vector3f> point(&scan.xyzi[4 * i]);
@@ -205,7 +205,7 @@ Result try_days(const fs::path& folder, int days, simulation::Config config) {
   for (config.day = 1; config.day <= days; ++config.day) {
     constexpr double kAnyDistance = 300.0;  // m
     auto store = std::make_unique<ByteStore>();
-    SessionPoints near(city.grid(), SessionConfig().contribution_range, *store);
+    SessionPoints near(city.grid(), kLookRange, *store);
     SessionPoints all(city.grid(), kAnyDistance, *store);
     measured.push_back({std::move(store), std::move(near), std::move(all)});
     add_day(city, config, measured.back());

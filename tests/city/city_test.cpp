@@ -37,14 +37,13 @@ const std::vector<Session> kDays = {{"monday", 0.0, {kParkedCar}},
                                     {"tuesday", 86400.0, {kNewContainer}},
                                     {"wednesday", 172800.0, {kNewContainer}}};
 
-void add(const City& city, const Session& session, const std::vector<test::BoxScan>& scans,
-         const SessionConfig& config = {}) {
+void add(const City& city, const Session& session, const std::vector<test::BoxScan>& scans) {
   SessionInfo info;
   info.name = session.name;
   info.begin = session.begin;
   info.fingerprint = session.name;
   ByteStore store;
-  SessionWriter writer(city, info, store, config);
+  SessionWriter writer(city, info, store);
   std::uint32_t number = 0;
   for (const test::BoxScan& scan : scans) {
     writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, number++);
@@ -305,32 +304,27 @@ TEST_CASE("a city: clusters that are small, parts of others or seen too briefly 
 
 TEST_CASE("a city: points beyond the contribution range do not come in") {
   const test::TemporaryFolder folder;
-  SessionConfig near;
-  near.contribution_range = 20.0;
-  const std::vector<test::BoxScan> scans = {test::scan_boxes({}, 0.0, 0.0)};
+  test::BoxScan scan = test::scan_boxes({}, 0.0, 0.0);
+  for (float& x : scan.points.x) x *= 2.0F;
   const City city = city_of(folder.path() / "city", {});
-  add(city, kDays[0], scans, near);
+  add(city, kDays[0], {scan});
   const SessionInfo session = city.sessions().at(0);
   CHECK(session.points > 1000);
-  CHECK(session.highest.head<2>().cwiseAbs().maxCoeff() <= 20.0);
-  CHECK(session.lowest.head<2>().cwiseAbs().maxCoeff() > 15.0);
-  near.contribution_range = 0.0;
-  CHECK_THROWS_WITH(add(city, kDays[1], scans, near), ContainsSubstring("contribution_range"));
+  CHECK(session.highest.head<2>().cwiseAbs().maxCoeff() <= 60.0);
+  CHECK(session.lowest.head<2>().cwiseAbs().maxCoeff() > 45.0);
 }
 
 TEST_CASE("a city: the file of a session has the points of the session, tile by tile") {
   const test::TemporaryFolder folder;
   SessionGrid grid;
   grid.tile = 10.0;
-  SessionConfig config;
-  config.contribution_range = 15.0;
   const City city = City::open_or_make(folder.path() / "city", grid);
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
   SessionInfo info;
   info.name = "monday";
   ByteStore store;
-  SessionWriter writer(city, info, store, config);
-  SessionPoints all(grid, config.contribution_range, store);
+  SessionWriter writer(city, info, store);
+  SessionPoints all(grid, kLookRange, store);
   // Away, back, and over the same places again, at other heights within their voxels.
   for (std::uint32_t number = 0; number < 60; ++number) {
     const double way = 8.0 * (number < 40 ? number : 80 - number);
@@ -484,7 +478,7 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
 }
 
 TEST_CASE("references of a session: coded images are the images") {
-  RecordingReferences recorder(RecordingReferencesConfig(), FreeSpaceConfig().lateral_margin);
+  RecordingReferences recorder(10, FreeSpaceConfig().lateral_margin);
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
   const RecordingReference* const reference =
       recorder.add(scan.points, scan.verdicts, scan.T_world_sensor, 0);

@@ -8,7 +8,6 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_points.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
@@ -17,20 +16,6 @@
 namespace dynains {
 
 class Folder;
-
-struct SessionConfig {
-  double contribution_range = 60.0;  ///< m
-  RecordingReferencesConfig references;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"contribution_range", self.contribution_range, closed(5, 300), "m",
-                      "points at a larger distance from the sensor are not contributed"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("Session", *this); }
-};
 
 /// Takes the final verdicts of a session scan by scan, and adds the session to a city at once by
 /// commit(). Until prepare(), all data waits in a store, so that the memory does not grow with the
@@ -43,10 +28,9 @@ class SessionWriter {
   };
 
   /// `session`: all but what is found here. `store` outlives this. Throws ConfigError for an
-  /// invalid name or configuration, UsageError if the city has a session of this name or of this
+  /// invalid name, UsageError if the city has a session of this name or of this
   /// fingerprint, IoError.
-  SessionWriter(const City& city, SessionInfo session, ByteStore& store,
-                const SessionConfig& config = {}, Mode mode = Mode::kNew);
+  SessionWriter(const City& city, SessionInfo session, ByteStore& store, Mode mode = Mode::kNew);
 
   /// Adds one scan. `points`: m, sensor frame. `verdicts`: final verdict by point. `labels`: label
   /// of the recording by point, or empty. `scan`: its number; ascending.

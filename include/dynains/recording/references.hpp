@@ -10,7 +10,6 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/evidence/visibility.hpp"
-#include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
@@ -100,30 +99,13 @@ struct RecordingReference {
   RangeImage image;  ///< in the frame of the sensor
 };
 
-struct RecordingReferencesConfig {
-  double reference_way = 1.0;  ///< m
-  int reference_scans = 10;    ///< scans
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"reference_way", self.reference_way, closed(0, 20), "m",
-                      "way of the sensor between two reference scans that a session keeps"});
-    visitor(Parameter{"reference_scans", self.reference_scans, closed(1, 1000000), "scans",
-                      "most scans between two reference scans that a session keeps"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const { validate_parameters("RecordingReferences", *this); }
-};
-
-/// Makes the reference scans of one session: the first scan, and each scan that is `reference_way`
-/// or `reference_scans` away from the latest reference. The grid of all images is that of the first
-/// scan.
+/// Makes the reference scans of one session: the first scan, and each scan that is 1 m of way or
+/// some scans away from the latest reference. The grid of all images is that of the first scan.
 class RecordingReferences {
  public:
-  /// `lateral_margin`: m, of FreeSpaceConfig. Throws ConfigError.
-  RecordingReferences(const RecordingReferencesConfig& config, double lateral_margin)
-      : config_((config.validate(), config)), lateral_margin_(lateral_margin) {}
+  /// `most_scans`: from one reference to the next. `lateral_margin`: m, of FreeSpaceConfig.
+  RecordingReferences(std::uint32_t most_scans, double lateral_margin)
+      : most_scans_(most_scans), lateral_margin_(lateral_margin) {}
 
   /// The grid of the images; without rows until the first scan with a known sensor.
   const RangeImageGrid& grid() const { return grid_; }
@@ -147,8 +129,8 @@ class RecordingReferences {
 
  private:
   bool is_near_latest(const Eigen::Vector3d& position, std::uint32_t scan) const {
-    return latest_ && (position - *latest_).norm() < config_.reference_way &&
-           scan - reference_.scan < static_cast<std::uint32_t>(config_.reference_scans);
+    constexpr double kWay = 1.0;  // m
+    return latest_ && (position - *latest_).norm() < kWay && scan - reference_.scan < most_scans_;
   }
 
   static void forget_moving(RangeImage& image) {
@@ -187,7 +169,7 @@ class RecordingReferences {
     return sensor.known();
   }
 
-  RecordingReferencesConfig config_;
+  std::uint32_t most_scans_;
   double lateral_margin_;  // m
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame
