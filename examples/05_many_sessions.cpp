@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "dynains/city/city.hpp"
-#include "dynains/city/city_map.hpp"
 #include "dynains/city/session_writer.hpp"
 
 namespace {
@@ -48,7 +47,7 @@ Scan measure(double y, bool has_box) {
   return scan;
 }
 
-void add_session(const dynains::City& city, const char* name, double begin, bool has_box) {
+void add_session(dynains::City& city, const char* name, double begin, bool has_box) {
   dynains::SessionInfo session;
   session.name = name;
   session.begin = begin;
@@ -65,12 +64,12 @@ void add_session(const dynains::City& city, const char* name, double begin, bool
 }
 
 /// Points of the map after session number `last` in the middle of the box.
-std::size_t count_box_points(const dynains::CityMap& map, std::uint32_t last) {
+std::size_t count_box_points(const dynains::City& city, std::uint32_t last) {
   std::size_t count = 0;
-  for (const dynains::TileIndex& tile : map.tiles()) {
-    const dynains::TileHistory history = map.history(tile, last);
+  for (const dynains::TileIndex& tile : city.tiles()) {
+    const dynains::TileHistory history = city.history(tile, last);
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      const Eigen::Vector3d p = map.position(tile, history.points(session)[i]);
+      const Eigen::Vector3d p = city.position(tile, history.points(session)[i]);
       const bool is_inside = p.x() > 7.5 && p.x() < 10.5 && std::abs(p.y()) < 1.2;
       if (is_inside && p.z() > 0.5) ++count;
     });
@@ -88,13 +87,11 @@ int main(int argc, char** argv) {
   add_session(city, "second_day", 86400.0, false);
   add_session(city, "first_day", 0.0, true);
 
-  const dynains::CityMap map(city);
-  const std::size_t before = count_box_points(map, map.number_of("first_day"));
-  const std::size_t after = count_box_points(map, map.number_of("second_day"));
+  const std::size_t before = count_box_points(city, city.number_of("first_day"));
+  const std::size_t after = count_box_points(city, city.number_of("second_day"));
   std::cout << "points of the box after the first day: " << before
             << ", after the second day: " << after << std::endl;
   for (const char* const name : {"first_day", "second_day"}) city.drop(name);
-  std::filesystem::remove(folder / "city.json");
   std::filesystem::remove(folder);
   return before > 20 && after == 0 ? 0 : 1;
 }

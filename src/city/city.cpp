@@ -20,13 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void refuse_earlier_version(const fs::path& folder) {
-  if (!fs::exists(folder / "city.json")) return;
-  fail(folder / "city.json",
-       "is of a map of an earlier version; expected a new folder, to which the runs are added "
-       "again");
-}
-
 void refuse_other_grid(const fs::path& city, const SessionGrid& its, const SessionGrid& asked) {
   const auto refuse = [&](const char* field, double is, double is_asked) {
     if (is == is_asked) return;
@@ -68,10 +61,9 @@ bool is_session_name(const std::string& name) {
          std::all_of(name.begin(), name.end(), is_allowed);
 }
 
-City::City(const fs::path& folder) : folder_(folder) {
-  const std::vector<SessionInfo> all = sessions();
-  if (all.empty()) fail(folder, "holds no session; expected a map of many sessions");
-  grid_ = all.front().grid;
+City::City(const fs::path& folder) : City(folder, SessionGrid()) {
+  if (sessions_.empty()) fail(folder, "holds no session; expected a map of many sessions");
+  grid_ = sessions_.front().grid;
 }
 
 City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
@@ -80,9 +72,8 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   fs::create_directories(folder, error);
   if (error) fail_by_system(folder, "cannot be created", error.value());
   City city(folder, grid);
-  const std::vector<SessionInfo> sessions = city.sessions();
-  if (!sessions.empty()) {
-    refuse_other_grid(folder, sessions.front().grid, grid);
+  if (!city.sessions_.empty()) {
+    refuse_other_grid(folder, city.sessions_.front().grid, grid);
     return city;
   }
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -110,17 +101,15 @@ std::vector<std::string> City::names() const {
   return names;
 }
 
-std::vector<SessionInfo> City::sessions() const {
-  refuse_earlier_version(folder_);
-  std::vector<SessionInfo> sessions;
+void City::reload() {
+  sessions_.clear();
   for (const std::string& name : names()) {
-    sessions.push_back(read_session(session_file(name)));
-    refuse_other_grid(session_file(name), sessions.back().grid, sessions.front().grid);
+    sessions_.push_back(read_session(session_file(name)));
+    refuse_other_grid(session_file(name), sessions_.back().grid, sessions_.front().grid);
   }
   // The names are sorted already.
-  std::stable_sort(sessions.begin(), sessions.end(),
+  std::stable_sort(sessions_.begin(), sessions_.end(),
                    [](const SessionInfo& a, const SessionInfo& b) { return a.begin < b.begin; });
-  return sessions;
 }
 
 std::vector<SessionPoint> City::read_tile(const SessionInfo& session, const TileIndex& tile) const {
@@ -163,6 +152,7 @@ void City::drop(const std::string& name) {
   fs::remove(session_file(name), error);
   if (error) fail_by_system(session_file(name), "cannot be removed", error.value());
   sync_files(folder_);
+  reload();
 }
 
 std::vector<std::string> City::check() const {

@@ -1,11 +1,11 @@
-#include "dynains/city/city_map.hpp"
-
+// The map of a city: which points of which session stand, tile by tile.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
 
+#include "dynains/city/city.hpp"
 #include "dynains/errors.hpp"
 
 namespace dynains {
@@ -109,16 +109,16 @@ CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, st
   return {removed.objects(), added.objects()};
 }
 
-std::uint32_t CityMap::number_of(const std::string& session) const {
+std::uint32_t City::number_of(const std::string& session) const {
   const auto found = std::find_if(sessions_.begin(), sessions_.end(),
                                   [&](const SessionInfo& info) { return info.name == session; });
   if (found == sessions_.end()) {
-    throw ConfigError(city_.folder().string() + ": has no session \"" + session + '"');
+    throw ConfigError(folder_.string() + ": has no session \"" + session + '"');
   }
   return static_cast<std::uint32_t>(found - sessions_.begin());
 }
 
-std::vector<TileIndex> CityMap::tiles() const {
+std::vector<TileIndex> City::tiles() const {
   std::set<TileIndex> tiles;
   for (const SessionInfo& session : sessions_) {
     for (const auto& tile : session.tiles) tiles.insert(tile.first);
@@ -126,11 +126,11 @@ std::vector<TileIndex> CityMap::tiles() const {
   return {tiles.begin(), tiles.end()};
 }
 
-TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
-  TileHistory history(city_.grid());
+TileHistory City::history(const TileIndex& tile, std::uint32_t last) const {
+  TileHistory history(grid_);
   const std::size_t count = std::min<std::size_t>(sessions_.size(), std::size_t{last} + 1);
   for (std::size_t i = 0; i < count; ++i) {
-    history.add_session(city_.read_tile(sessions_[i], tile));
+    history.add_session(read_tile(sessions_[i], tile));
   }
   for (std::size_t i = 0; i < count; ++i) {
     revise(history, tile, sessions_[i]);
@@ -139,23 +139,22 @@ TileHistory CityMap::history(const TileIndex& tile, std::uint32_t last) const {
   return history;
 }
 
-CityChanges CityMap::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
+CityChanges City::changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const {
   if (a >= b) throw ConfigError("changes of a map: expected an earlier and a later session");
-  return find_changes(city_.grid(), history(tile, b), a, b);
+  return find_changes(grid_, history(tile, b), a, b);
 }
 
-void CityMap::revise(TileHistory& history, const TileIndex& tile,
-                     const SessionInfo& session) const {
+void City::revise(TileHistory& history, const TileIndex& tile, const SessionInfo& session) const {
   detail::Visibility visibility;
   RecordingReference reference;
-  const double edge = city_.grid().tile;
-  const Eigen::Vector3d corner = tile_corner(city_.grid(), tile);
+  const double edge = grid_.tile;
+  const Eigen::Vector3d corner = tile_corner(grid_, tile);
   const Eigen::Vector3d middle = corner + Eigen::Vector3d(0.5 * edge, 0.5 * edge, 0.0);
   // Beyond this distance, no point of the tile is in range.
   const double reach = kLookRange + std::sqrt(0.5) * edge;
   for (const SessionReference& which : session.references) {
     if ((which.sensor - middle).head<2>().norm() > reach) continue;
-    city_.read_reference(session, which, reference);
+    read_reference(session, which, reference);
     const Pose T_world_points(Eigen::Translation3d(which.sensor));
     history.revise(
         which.sensor - corner, [&](const PointBuffer& points, std::size_t count) -> const auto& {

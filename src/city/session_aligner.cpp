@@ -53,7 +53,7 @@ PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& pl
   const SessionGrid& grid = city.grid();
   std::map<TileIndex, std::size_t> counts;
   PointBuffer points;
-  const std::vector<SessionInfo> sessions = city.sessions();
+  const std::vector<SessionInfo>& sessions = city.sessions();
   for (auto session = sessions.rbegin(); session != sessions.rend(); ++session) {
     for (const auto& [tile, block] : session->tiles) {
       const Eigen::Vector3d corner = tile_corner(grid, tile);
@@ -167,7 +167,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
 }
 
 SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
-  const std::vector<SessionInfo> sessions = city_.sessions();
+  const std::vector<SessionInfo>& sessions = city_.sessions();
   const auto seed = std::find_if(sensors_.begin(), sensors_.end(), [&](const auto& sensor) {
     const TileIndex tile = tile_index(city_.grid(), T_city_start * sensor);
     return std::any_of(sessions.begin(), sessions.end(),

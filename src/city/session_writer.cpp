@@ -27,7 +27,7 @@ void remove_temporaries(const City& city) {
 
 }  // namespace
 
-SessionWriter::SessionWriter(const City& city, SessionInfo session, ByteStore& store, Mode mode)
+SessionWriter::SessionWriter(City& city, SessionInfo session, ByteStore& store, Mode mode)
     : city_(city),
       session_(std::move(session)),
       mode_(mode),
@@ -47,7 +47,8 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session, ByteStore& s
 }
 
 // Throws unless the city can take the session.
-void SessionWriter::check() const {
+void SessionWriter::check() {
+  city_.reload();
   const fs::path file = city_.session_file(session_.name);
   const bool exists = fs::exists(fs::symlink_status(file));
   if (mode_ == Mode::kReplace && !fs::is_regular_file(fs::symlink_status(file))) {
@@ -109,6 +110,7 @@ void SessionWriter::prepare() {
 void SessionWriter::commit() {
   if (!file_) prepare();
   file_->commit();
+  city_.reload();
 }
 
 }  // namespace dynains

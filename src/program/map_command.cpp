@@ -8,7 +8,6 @@
 
 #include "command.hpp"
 #include "dynains/city/city.hpp"
-#include "dynains/city/city_map.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "run/map_file.hpp"
@@ -23,7 +22,6 @@ struct MapOptions {
   std::string city;
   std::string session, later_session;
   std::string file, added, removed;
-  std::vector<double> region;  // m: lowest x, lowest y, highest x, highest y
   bool force = false;
 };
 
@@ -40,10 +38,10 @@ fs::path target_of(const fs::path& city, const std::string& name) {
   return path;
 }
 
-MapFileOptions file_options(const CityMap& map) {
+MapFileOptions file_options(const City& city) {
   double most = 0.0;
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
-  for (const SessionInfo& session : map.sessions()) {
+  for (const SessionInfo& session : city.sessions()) {
     most = std::max(
         {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
     lowest = session.lowest;
@@ -60,18 +58,18 @@ MapFileOptions file_options(const CityMap& map) {
 class CityPointFile {
  public:
   /// Throws ConfigError, IoError.
-  CityPointFile(const CityMap& map, const fs::path& city, const std::string& name, bool force)
-      : map_(map),
-        output_(target_of(city, name), force, InputFiles()),
-        file_(MapFile::open(output_.path(), file_options(map))) {}
+  CityPointFile(const City& city, const std::string& name, bool force)
+      : city_(city),
+        output_(target_of(city.folder(), name), force, InputFiles()),
+        file_(MapFile::open(output_.path(), file_options(city))) {}
 
-  void add(const Eigen::Vector3d& position, std::uint32_t session, const SessionPoint& point) {
+  void add(const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
     MapAttributes attributes;
-    attributes.time = attributes.scan_time = map_.sessions()[session].begin;
+    attributes.time = attributes.scan_time = city_.sessions()[session].begin;
     attributes.label = attributes.instance = point.label;
     attributes.session = static_cast<std::uint16_t>(std::min(session, 65535U));
     attributes.is_ground = point.is_ground != 0;
-    file_->add(position, attributes);
+    file_->add(city_.position(tile, point), attributes);
   }
 
   std::size_t size() const { return file_->size(); }
@@ -81,7 +79,7 @@ class CityPointFile {
   }
 
  private:
-  const CityMap& map_;
+  const City& city_;
   OutputFile output_;
   std::unique_ptr<MapFile> file_;
 };
@@ -102,68 +100,32 @@ void list(const MapOptions& options) {
   std::cout << std::flush;
 }
 
-/// Whether a tile reaches into the region; true without a region.
-bool is_in_region(const std::vector<double>& region, const SessionGrid& grid,
-                  const TileIndex& tile) {
-  if (region.empty()) return true;
-  const Eigen::Vector3d corner = tile_corner(grid, tile);
-  return corner.x() <= region[2] && corner.y() <= region[3] &&
-         corner.x() + grid.tile >= region[0] && corner.y() + grid.tile >= region[1];
-}
-
-bool is_in_region(const std::vector<double>& region, const Eigen::Vector3d& p) {
-  return region.empty() ||
-         (p.x() >= region[0] && p.y() >= region[1] && p.x() <= region[2] && p.y() <= region[3]);
-}
-
-/// visit(position, session, point) for each point of the region that stands after session `last`.
-template <class Visitor>
-void for_each_standing(const City& city, const CityMap& map, std::uint32_t last,
-                       const std::vector<double>& region, Visitor&& visit) {
-  for (const TileIndex& tile : map.tiles()) {
-    if (!is_in_region(region, city.grid(), tile)) continue;
-    const TileHistory history = map.history(tile, last);
+/// Writes the map after session number `last`.
+void write_map(const City& city, std::uint32_t last, const MapOptions& options) {
+  CityPointFile file(city, options.file, options.force);
+  for (const TileIndex& tile : city.tiles()) {
+    const TileHistory history = city.history(tile, last);
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      const SessionPoint& point = history.points(session)[i];
-      const Eigen::Vector3d position = map.position(tile, point);
-      if (is_in_region(region, position)) {
-        visit(position, static_cast<std::uint32_t>(session), point);
-      }
+      file.add(tile, static_cast<std::uint32_t>(session), history.points(session)[i]);
     });
   }
-}
-
-/// Writes the map after session number `last`.
-void write_map(const City& city, const CityMap& map, std::uint32_t last,
-               const MapOptions& options) {
-  if (!options.region.empty() &&
-      !(options.region[0] < options.region[2] && options.region[1] < options.region[3])) {
-    throw ConfigError("--region: expected the lowest x and y before the highest x and y");
-  }
-  CityPointFile file(map, city.folder(), options.file, options.force);
-  for_each_standing(city, map, last, options.region,
-                    [&](const Eigen::Vector3d& position, std::uint32_t session,
-                        const SessionPoint& point) { file.add(position, session, point); });
   file.commit();
   std::cout << options.file << ": " << file.size() << " points" << std::endl;
 }
 
 void export_map(const MapOptions& options) {
-  const City city{fs::path(options.city)};
-  write_map(city, CityMap(city), TileHistory::kNever, options);
+  write_map(City{fs::path(options.city)}, TileHistory::kNever, options);
 }
 
 void write_map_at(const MapOptions& options) {
   const City city{fs::path(options.city)};
-  const CityMap map(city);
-  write_map(city, map, map.number_of(options.session), options);
+  write_map(city, city.number_of(options.session), options);
 }
 
 void diff(const MapOptions& options) {
   const City city{fs::path(options.city)};
-  const CityMap map(city);
-  const std::uint32_t a = map.number_of(options.session);
-  const std::uint32_t b = map.number_of(options.later_session);
+  const std::uint32_t a = city.number_of(options.session);
+  const std::uint32_t b = city.number_of(options.later_session);
   if (a >= b) {
     throw ConfigError("diff " + options.session + ' ' + options.later_session +
                       ": expected an earlier and a later session, by their begin");
@@ -171,16 +133,12 @@ void diff(const MapOptions& options) {
   if (whole_path(options.added) == whole_path(options.removed)) {
     throw ConfigError("--removed " + options.removed + ": is the file of --added, too");
   }
-  CityPointFile added(map, city.folder(), options.added, options.force);
-  CityPointFile removed(map, city.folder(), options.removed, options.force);
-  for (const TileIndex& tile : map.tiles()) {
-    const CityChanges changes = map.changes(tile, a, b);
-    for (const CityPoint& p : changes.added) {
-      added.add(map.position(tile, p.point), p.session, p.point);
-    }
-    for (const CityPoint& p : changes.removed) {
-      removed.add(map.position(tile, p.point), p.session, p.point);
-    }
+  CityPointFile added(city, options.added, options.force);
+  CityPointFile removed(city, options.removed, options.force);
+  for (const TileIndex& tile : city.tiles()) {
+    const CityChanges changes = city.changes(tile, a, b);
+    for (const CityPoint& p : changes.added) added.add(tile, p.session, p.point);
+    for (const CityPoint& p : changes.removed) removed.add(tile, p.session, p.point);
   }
   added.commit();
   removed.commit();
@@ -228,11 +186,6 @@ void add_map_command(CLI::App& app) {
     command->add_option("FILE", options->file, "points, .ply, .pcd or .las")
         ->required()
         ->type_name("");
-    command
-        ->add_option("--region", options->region,
-                     "lowest x, lowest y, highest x and highest y of the points [all]")
-        ->expected(4)
-        ->type_name("M M M M");
   };
   const auto add_force = [&](CLI::App* command) {
     command->add_flag("--force", options->force, "replace files");

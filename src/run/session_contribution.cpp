@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "dynains/city/city.hpp"
 #include "dynains/city/session_aligner.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
@@ -22,7 +21,8 @@ bool has_alignment(const SessionRequest& request, const SessionInfo& session) {
 
 bool SessionRequest::is_fulfilled() const {
   if (!std::filesystem::exists(city)) return false;
-  const std::vector<SessionInfo> sessions = City::open_or_make(city, grid).sessions();
+  const City opened = City::open_or_make(city, grid);
+  const std::vector<SessionInfo>& sessions = opened.sessions();
   return std::any_of(sessions.begin(), sessions.end(), [&](const SessionInfo& session) {
     return session.name == info.name && session.fingerprint == info.fingerprint &&
            session.begin == info.begin && has_alignment(*this, session) &&
@@ -66,8 +66,9 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
 }
 
 SessionContribution::SessionContribution(const SessionRequest& request, SessionWriter::Mode mode)
-    : store_(City::open_or_make(request.city, request.grid).folder()),
-      writer_(City::open_or_make(request.city, request.grid), request.info, store_, mode) {
+    : city_(City::open_or_make(request.city, request.grid)),
+      store_(city_.folder()),
+      writer_(city_, request.info, store_, mode) {
   if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
 }
 

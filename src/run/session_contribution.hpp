@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "dynains/city/city.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
@@ -56,6 +57,7 @@ class SessionContribution {
   void commit() { writer_.commit(); }
 
  private:
+  City city_;
   ByteStore store_;
   SessionWriter writer_;
   std::optional<Pose> T_city_session_;

@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "dynains/city/city.hpp"
-#include "dynains/city/city_map.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/simulation/simulator.hpp"
@@ -85,7 +84,7 @@ struct Day {
 };
 
 /// Runs over one day and adds it to the city.
-void add_day(const City& city, const simulation::Config& config, Day& day) {
+void add_day(City& city, const simulation::Config& config, Day& day) {
   simulation::Simulator simulator(config);
   DynaInsRemover remover(DynaInsRemover::Config::offline());
   SessionInfo info;
@@ -150,11 +149,10 @@ bool is_gone(std::uint32_t label, std::size_t session, const std::vector<Day>& d
 }
 
 void judge_map(const City& city, std::vector<Day>& days, Result& result) {
-  const CityMap map(city);
-  const auto last = static_cast<std::uint32_t>(map.sessions().size() - 1);
+  const auto last = static_cast<std::uint32_t>(city.sessions().size() - 1);
   std::map<TileIndex, VoxelHashTable<>> standing_of;
-  for (const TileIndex& tile : map.tiles()) {
-    const TileHistory history = map.history(tile);
+  for (const TileIndex& tile : city.tiles()) {
+    const TileHistory history = city.history(tile);
     VoxelHashTable<>& standing = standing_of[tile];
     std::set<std::pair<std::size_t, std::size_t>> in_map;
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
@@ -200,7 +198,7 @@ void judge_map(const City& city, std::vector<Day>& days, Result& result) {
 }
 
 Result try_days(const fs::path& folder, int days, simulation::Config config) {
-  const City city = City::open_or_make(folder, {});
+  City city = City::open_or_make(folder, {});
   std::vector<Day> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
     constexpr double kAnyDistance = 300.0;  // m

@@ -36,7 +36,7 @@ Scans second_day() {
   return scans;
 }
 
-void add(const City& city, const std::string& name, const Scans& scans,
+void add(City& city, const std::string& name, const Scans& scans,
          const Eigen::Isometry3d& T_city_session = Eigen::Isometry3d::Identity()) {
   SessionInfo info;
   info.name = name;
@@ -115,7 +115,7 @@ TEST_CASE("alignment: displacements up to 2 m and 5 degrees are found to 5 cm") 
 
 TEST_CASE("alignment: a start leads to a map far away, and the same input to the same bits") {
   const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
+  City city = City::open_or_make(folder / "city", {});
   Eigen::Isometry3d T_city_world(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitZ()));
   T_city_world.translation() = Eigen::Vector3d(433210.5, 5401234.25, 210.0);
   add(city, "first", first_day(), T_city_world);
@@ -150,7 +150,7 @@ TEST_CASE("alignment: a session of another place is refused") {
 
 TEST_CASE("alignment: a street that looks alike along its way is refused") {
   const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
+  City city = City::open_or_make(folder / "city", {});
   const Scans scans = test::drive_along({}, -8.0, 8.0);
   add(city, "first", scans);
   CHECK_THROWS_WITH(align(city, scans, Eigen::Isometry3d::Identity()),
@@ -159,7 +159,7 @@ TEST_CASE("alignment: a street that looks alike along its way is refused") {
 
 TEST_CASE("alignment: an empty map and a session without scans are refused") {
   const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
+  City city = City::open_or_make(folder / "city", {});
   const Eigen::Isometry3d kIdentity = Eigen::Isometry3d::Identity();
   CHECK_THROWS_WITH(align(city, second_day(), kIdentity), ContainsSubstring("no points"));
   add(city, "first", first_day());
@@ -168,7 +168,7 @@ TEST_CASE("alignment: an empty map and a session without scans are refused") {
 
 TEST_CASE("alignment: the file of the session keeps it") {
   const test::TemporaryFolder folder;
-  const City city = City::open_or_make(folder / "city", {});
+  City city = City::open_or_make(folder / "city", {});
   SessionInfo info;
   info.name = "aligned";
   SessionAlignment alignment;

@@ -1,19 +1,41 @@
 // A map of many sessions in a folder: the contributions of all sessions.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "dynains/city/session.hpp"
+#include "dynains/city/tile_history.hpp"
 #include "dynains/recording/references.hpp"
 
 namespace dynains {
 
+/// One point of the map of a city.
+struct CityPoint {
+  std::uint32_t session;  ///< number of the session that measured it
+  SessionPoint point;
+};
+
+/// Changes of a tile from the map after one session to the map after a later one.
+struct CityChanges {
+  std::vector<CityPoint> removed;  ///< points that beams of a later session passed through
+  std::vector<CityPoint> added;    ///< new points whose place beams of earlier sessions passed
+};
+
+/// Changes of a tile from the map after session `a` to the map after session `b`, whose history has
+/// sessions 0 to `b`, or more: clusters of points in touching blocks that are objects, see
+/// docs/scale.md. Places that only one of both maps has seen are no changes.
+CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, std::uint32_t a,
+                         std::uint32_t b);
+
 /// A folder CITY with one file NAME.session for each session, which is written once and never
-/// changed (SessionWriter). The map is a function of the sessions (CityMap); nothing else is
-/// stored. All members throw IoError with path and position.
+/// changed (SessionWriter). The map is a function of the set of sessions; nothing else is stored.
+/// Memory: one tile of all sessions and one range image. All members throw IoError with path and
+/// position.
 class City {
  public:
   /// Opens a city that has sessions.
@@ -25,18 +47,33 @@ class City {
 
   const std::filesystem::path& folder() const { return folder_; }
   const SessionGrid& grid() const { return grid_; }
-
-  /// All sessions, in the order of their time. Links are none.
-  std::vector<SessionInfo> sessions() const;
   std::filesystem::path session_file(const std::string& name) const {
     return folder_ / (name + ".session");
   }
+
+  /// Reads which sessions there are. Links are none.
+  void reload();
+  /// All sessions as of the latest reload(), in the order of their time.
+  const std::vector<SessionInfo>& sessions() const { return sessions_; }
+  /// Number of a session in the order of time. Throws ConfigError if there is none.
+  std::uint32_t number_of(const std::string& session) const;
 
   /// Points of one tile of a session; empty if the session has none there.
   std::vector<SessionPoint> read_tile(const SessionInfo& session, const TileIndex& tile) const;
   /// Reads one of the references of a session into `reference`, whose memory is used again.
   void read_reference(const SessionInfo& session, const SessionReference& which,
                       RecordingReference& reference) const;
+
+  /// All tiles that any session has points in, sorted.
+  std::vector<TileIndex> tiles() const;
+  /// The history of one tile over sessions 0 to `last`.
+  TileHistory history(const TileIndex& tile, std::uint32_t last = TileHistory::kNever) const;
+  /// find_changes(). Throws ConfigError unless `a` is before `b`.
+  CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
+  /// World position of a point of a tile, m.
+  Eigen::Vector3d position(const TileIndex& tile, const SessionPoint& point) const {
+    return position_of(grid_, tile, point);
+  }
 
   /// Removes one session: the map is as if it had never come.
   void drop(const std::string& name);
@@ -46,12 +83,16 @@ class City {
 
  private:
   City(std::filesystem::path folder, const SessionGrid& grid)
-      : folder_(std::move(folder)), grid_(grid) {}
+      : folder_(std::move(folder)), grid_(grid) {
+    reload();
+  }
 
   std::vector<std::string> names() const;
+  void revise(TileHistory& history, const TileIndex& tile, const SessionInfo& session) const;
 
   std::filesystem::path folder_;
   SessionGrid grid_;
+  std::vector<SessionInfo> sessions_;
 };
 
 }  // namespace dynains

@@ -27,10 +27,10 @@ class SessionWriter {
     kReplace  ///< the city has one; commit() puts this one in its place in one step
   };
 
-  /// `session`: all but what is found here. `store` outlives this. Throws ConfigError for an
-  /// invalid name, UsageError if the city has a session of this name or of this
-  /// fingerprint, IoError.
-  SessionWriter(const City& city, SessionInfo session, ByteStore& store, Mode mode = Mode::kNew);
+  /// `session`: all but what is found here. `city` and `store` outlive this. Throws ConfigError for
+  /// an invalid name, UsageError if the city has a session of this name or of this fingerprint,
+  /// IoError.
+  SessionWriter(City& city, SessionInfo session, ByteStore& store, Mode mode = Mode::kNew);
 
   /// Adds one scan. `points`: m, sensor frame. `verdicts`: final verdict by point. `labels`: label
   /// of the recording by point, or empty. `scan`: its number; ascending.
@@ -47,9 +47,9 @@ class SessionWriter {
   void commit();
 
  private:
-  void check() const;
+  void check();
 
-  City city_;
+  City& city_;
   SessionInfo session_;
   Mode mode_;
   ByteStore& store_;
