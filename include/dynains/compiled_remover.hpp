@@ -107,12 +107,10 @@ class BasicDynaInsRemover {
   /// scan, or if no parameter needs the estimate.
   const SensorModel& sensor() const;
 
-  /// Warm-up: allocates and touches the memory for scans like `example` (m, sensor frame), so that
-  /// the first pushes cause few allocations and page faults. The memory is 27 to 38 bytes per point
-  /// and open scan, and the buffers of the stages, which process `example` a few times. `scans`:
-  /// expected number of scans, an upper bound for the reserved slots. Scans of other sizes may
-  /// follow. Results do not change. Throws UsageError after the first push, and CloudError for an
-  /// invalid cloud.
+  /// Warm-up: pushes `example` (m, sensor frame) until verdicts are final, at most `scans` times,
+  /// and forgets all scans. The memory stays, so that the first pushes of scans like it cause few
+  /// allocations and page faults. Scans of other sizes may follow. Results do not change. Throws
+  /// UsageError after the first push, and CloudError for an invalid cloud.
   template <class Cloud>
   void reserve_like(const Cloud& example,
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {

@@ -77,27 +77,6 @@ class FreeSpaceEvidence {
     moved_ground_.adapt(sensor);
   }
 
-  /// Allocates memory for `scans` scans: images for the sensor of adapt(), and records for scans of
-  /// the size of the scans already observed. Discards the observed scans, so call it before scan 0.
-  void reserve(std::size_t scans) {
-    references_.reserve(scans);
-    pose_correction_.reserve();
-    const auto largest =
-        std::max_element(records_.begin(), records_.end(), [](const Record& a, const Record& b) {
-          return a.evidence.samples.size() < b.evidence.samples.size();
-        });
-    const Record roomy = *largest;
-    // Some spare capacity, since a copy has none and scans of one sensor differ in size.
-    const std::size_t points = roomy.number_of_point.size() + roomy.number_of_point.size() / 8;
-    for (std::size_t i = 0; i < std::min(scans, records_.size()); ++i) {
-      records_[i] = roomy;
-      records_[i].number_of_point.reserve(points);
-    }
-    for (Judged* judged : {&provisional_, &final_}) {
-      detail::ensure_capacity(judged->supervoxels, roomy.evidence.samples.supervoxel_count());
-    }
-  }
-
   /// Lets `other`, which outlives this, work for observe() and make_reference(). Results stay the
   /// same. Null: none.
   void share_work(Background* other) { other_ = other; }

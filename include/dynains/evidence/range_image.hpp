@@ -53,14 +53,25 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
-  /// A cell to write, for images that are read from files. Call reserve() before.
+  /// A cell to write, for images that are read from files. Call clear() before.
   Cell& cell(std::size_t index) { return cells_[index]; }
-  /// The grid of the image; empty before the first build() or reserve().
+  /// The grid of the image; empty before the first allocate().
   const RangeImageGrid& grid() const { return grid_; }
 
-  /// Allocates the cells and writes to them, so that the operating system maps the memory now.
-  void reserve(const RangeImageGrid& grid) {
-    make_cells(grid);
+  /// Allocates the cells without initialising them, since build() writes each. The exception is
+  /// cell 0, the cell of all directions outside the image.
+  void allocate(const RangeImageGrid& grid) {
+    const bool fits = grid.cell_count() == grid_.cell_count();
+    if (!fits) {
+      cells_ = std::unique_ptr<Cell[]>(new Cell[grid.cell_count()]);
+      cells_[0] = {kNothing, kUnknown};
+    }
+    grid_ = grid;
+  }
+
+  /// Makes an empty image.
+  void clear(const RangeImageGrid& grid) {
+    allocate(grid);
     std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
   }
 
@@ -227,7 +238,7 @@ class RangeImage {
   void store_with_least_around(const RangeImageGrid& grid, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
-    make_cells(grid);
+    allocate(grid);
     scratch.least.resize(stride);
     scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
@@ -411,17 +422,6 @@ class RangeImage {
       first[-1 - static_cast<std::ptrdiff_t>(i)] = first[columns - 1 - i];
       first[columns + i] = first[i];
     }
-  }
-
-  // Allocates the cells. They are not initialised, since each is written before it is read. The
-  // exception is cell 0, the cell of all directions outside the image.
-  void make_cells(const RangeImageGrid& grid) {
-    const bool fits = grid.cell_count() == grid_.cell_count();
-    if (!fits) {
-      cells_ = std::unique_ptr<Cell[]>(new Cell[grid.cell_count()]);
-      cells_[0] = {kNothing, kUnknown};
-    }
-    grid_ = grid;
   }
 
   std::unique_ptr<Cell[]> cells_;

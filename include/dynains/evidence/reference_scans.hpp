@@ -102,22 +102,16 @@ class ReferenceScans {
         span_(config),
         references_(span_.count()) {}
 
-  /// Sets the resolution of later images, and the tilt of their frame, for a sensor.
+  /// Sets the resolution of later images, and the tilt of their frame, for a sensor. Allocates all
+  /// images.
   void adapt(const SensorModel& sensor) {
     grid_ = RangeImageGrid::for_sensor(sensor);
+    for (ReferenceScan& reference : references_) reference.image.allocate(grid_);
     R_beams_level_.reset();
     if (!sensor.is_level()) R_beams_level_ = transposed(sensor.R_level_headed);
   }
 
   const ReferenceSpan& span() const { return span_; }
-
-  /// Allocates the images for `scans` scans, at most all.
-  void reserve(std::size_t scans) {
-    const std::size_t images = scans / static_cast<std::size_t>(span_.step) + 1;
-    for (std::size_t i = 0; grid_.rows > 0 && i < std::min(images, references_.size()); ++i) {
-      references_[i].image.reserve(grid_);
-    }
-  }
 
   /// Invalidates all references.
   void forget() {

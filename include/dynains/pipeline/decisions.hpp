@@ -164,8 +164,6 @@ class ScanDecision {
 
   virtual bool needs_sensor() const = 0;
   virtual void adapt(const SensorModel& sensor) = 0;
-  /// Reserves memory for `scans` scans. Scans observed before this call belong to the warm-up.
-  virtual void reserve(std::size_t scans) = 0;
 
   /// Adds the newest scan and assigns an instance id to each of its clusters.
   virtual void observe(ScanRing& scans, const ScanWindow& window) = 0;
@@ -214,7 +212,6 @@ class WindowDecision final : public ScanDecision {
   std::size_t latency() const override { return votes_ == 0 ? 0 : length_ - 1; }
   bool needs_sensor() const override { return false; }
   void adapt(const SensorModel&) override {}
-  void reserve(std::size_t) override {}
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {

@@ -29,7 +29,6 @@ class FreeSpaceDecision final : public ScanDecision {
   std::size_t latency() const override { return evidence_.lookahead_scans(); }
   bool needs_sensor() const override { return true; }
   void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
-  void reserve(std::size_t scans) override { evidence_.reserve(scans); }
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {

@@ -206,12 +206,6 @@ class Pipeline final : private NewestVerdictMaker {
 
   void reserve_like(const CloudView& example, std::size_t scans) {
     if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
-    if (scans == 0) return;
-    // Margin: scans of one sensor differ slightly in size.
-    const std::size_t points = example.size() + example.size() / 16;
-    for (std::size_t i = 0; i < std::min(scans, scans_.capacity()); ++i) scans_[i].touch(points);
-    newest_writer_.touch(points);
-    final_writer_.touch(points);
     // Scans of the warm-up are not inserted into the map, which may be on disk.
     struct WarmUp {
       Pipeline& pipeline;
@@ -222,15 +216,10 @@ class Pipeline final : private NewestVerdictMaker {
     };
     const WarmUp warm_up{*this};
     build_map_ = false;
-    // After four scans, each kind of decision has compared a scan with a reference.
-    const std::size_t enough = std::max<std::size_t>(decision_->window_length(), 4);
-    for (std::size_t i = 0; i < std::min(scans, enough); ++i) {
+    for (std::size_t i = 0; i < std::min(scans, scans_.capacity() + 1); ++i) {
       push(example, Pose::Identity(), next_time());
       newest_verdict();
     }
-    for (ScanSlot& slot : scans_.slots()) slot.ensure_capacity_like(scans_.newest());
-    final_writer_.ensure_capacity_like(newest_writer_);
-    decision_->reserve(scans);
   }
 
   void reset() {

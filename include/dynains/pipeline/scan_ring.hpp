@@ -45,21 +45,6 @@ struct ScanSlot {
   }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
-
-  /// Ensures capacity for `points` points and writes to the memory of the points, so that later
-  /// scans cause no page faults.
-  void touch(std::size_t points) {
-    split.points.grow(points + kPackWidth);
-    resize_with_margin(unjudged, points);
-    input.reserve(points);
-    cluster_of.reserve(points);
-  }
-
-  /// Ensures capacity for the clusters and the windows of `other`.
-  void ensure_capacity_like(const ScanSlot& other) {
-    detail::ensure_capacity(ids, other.ids.size());
-    windows.reserve_like(other.windows);
-  }
 };
 
 /// Ring of scans, numbered from 0. Scans become final in the order of their pushes.
@@ -79,7 +64,6 @@ class ScanRing {
 
   ScanSlot& operator[](std::uint64_t scan) { return slots_[scan % slots_.size()]; }
   ScanSlot& newest() { return (*this)[pushed_ - 1]; }
-  std::vector<ScanSlot>& slots() { return slots_; }
 
   /// Initializes the slot of the next scan. A PushTransaction adds the scan to the ring. Throws
   /// PoseError for an invalid pose or a time (s) not greater than the previous one.

@@ -24,22 +24,13 @@ class VerdictWriter {
   /// Keep flags of the last write_flags(), by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
-  /// Ensures capacity for a scan of `points` points and writes to the memory, so that later scans
-  /// cause no page faults.
-  void touch(std::size_t points) {
-    resize_all(points, labels_, instances_, beliefs_, causes_, is_kept_, group_of_input_, input_,
-               cluster_of_);
-  }
-
-  /// Ensures capacity for the number of groups of `other`.
-  void ensure_capacity_like(const VerdictWriter& other) {
-    ensure_capacity(groups_, other.groups_.size());
-  }
-
   /// Writes the verdict on a scan, which is valid until the next call.
   ScanVerdict write(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     const std::size_t count = scan.unjudged.size();
-    resize_all(count, labels_, beliefs_, causes_, group_of_input_);
+    resize_with_margin(labels_, count);
+    resize_with_margin(beliefs_, count);
+    resize_with_margin(causes_, count);
+    resize_with_margin(group_of_input_, count);
     ensure_capacity(instances_, count);
     instances_.assign(count, kNoInstance);
     scan.input.copy_to(input_);
@@ -96,11 +87,6 @@ class VerdictWriter {
   };
 
   static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
-
-  template <class... Vectors>
-  static void resize_all(std::size_t count, Vectors&... values) {
-    (resize_with_margin(values, count), ...);
-  }
 
   void write(std::size_t input, const Group& group) {
     beliefs_[input] = group.belief;

@@ -39,12 +39,6 @@ struct WindowVotes {
   std::vector<WindowVerdict> points;  ///< by non-ground point of one scan in the order of its split
   std::vector<ClusterSet::PointRun> point_runs;  ///< in the window that ends with the scan
 
-  /// Ensures capacity for the votes on the scan of `other`.
-  void reserve_like(const WindowVotes& other) {
-    ensure_capacity(points, other.points.size());
-    ensure_capacity(point_runs, other.point_runs.size());
-  }
-
   /// Adds the verdicts of one window, by cluster. `runs`: point runs of the scan in that window.
   void record(Span<const ClusterSet::PointRun> runs, Span<const WindowVerdict> verdicts) {
     for (const ClusterSet::PointRun& run : runs) {

@@ -68,7 +68,7 @@ inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> by
     is_valid = false;
     return 0;
   };
-  image.reserve(grid);
+  image.clear(grid);
   std::uint64_t zeros = 0;
   for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
     for (std::int32_t row = 0; row < grid.rows; ++row) {

@@ -51,12 +51,6 @@ class AlignmentPoints {
   AlignmentPoints(double longest_object, double highest_object)
       : longest_object_(longest_object), highest_object_(highest_object) {}
 
-  /// Allocates memory for all points.
-  void reserve() {
-    points_.grow(kMost);
-    instance_of_.reserve(kMost);
-  }
-
   void select(const GroundSplit& split, const ScanInstances& instances) {
     points_.clear();
     instance_of_.clear();
@@ -244,9 +238,6 @@ struct Alignment {
 /// of elevation, as beams have biases.
 class PlaneAligner {
  public:
-  /// Allocates memory for `count` points.
-  void reserve(std::size_t count) { matches_.reserve(count); }
-
   /// Forgets the errors of the sensor.
   void clear() {
     elevation_ = 0.0;

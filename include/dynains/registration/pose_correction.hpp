@@ -93,14 +93,6 @@ class PoseCorrection {
   PoseCorrection(double tolerance, double longest_object, double highest_object)
       : tolerance_(tolerance), selected_(longest_object, highest_object) {}
 
-  /// Allocates all memory.
-  void reserve() {
-    if (!is_active()) return;
-    planes_.reserve();
-    selected_.reserve();
-    aligner_.reserve(AlignmentPoints::kMost);
-  }
-
   /// Forgets all scans and the motion. `T_world_sensor`: pose of the first scan of the next epoch.
   void begin_epoch(const Pose& T_world_sensor) {
     motion_.clear();

@@ -78,8 +78,12 @@ class VoxelPlanes {
   /// Maximum number of voxels.
   static constexpr std::size_t kMostVoxels = 24576;
 
-  /// `edge`: of the voxels, m.
-  explicit VoxelPlanes(double edge = 1.0) : edge_(edge), per_metre_(1.0 / edge) {}
+  /// `edge`: of the voxels, m. Allocates the memory of a full map.
+  explicit VoxelPlanes(double edge = 1.0) : edge_(edge), per_metre_(1.0 / edge) {
+    keys_.reserve(kMostVoxels);
+    moments_.reserve(kMostVoxels);
+    planes_.reserve(kMostVoxels);
+  }
 
   double edge() const { return edge_; }
 
@@ -89,14 +93,6 @@ class VoxelPlanes {
     moments_.clear();
     planes_.clear();
     scans_ = 0;
-  }
-
-  /// Allocates the memory of a full map.
-  void reserve() {
-    table_.reserve(kMostVoxels);
-    keys_.reserve(kMostVoxels);
-    moments_.reserve(kMostVoxels);
-    planes_.reserve(kMostVoxels);
   }
 
   /// Begins the insertion of the points of the next scan. `T_map_sensor`: its pose.
@@ -281,10 +277,10 @@ class VoxelPlanes {
   static constexpr std::uint32_t kLongest = 64;  // scans
 
   double edge_, per_metre_;
-  VoxelHashTable<> table_{4096};  // numbers of the voxels
-  std::vector<VoxelKey> keys_;    // by voxel
-  std::vector<Moments> moments_;  // by voxel
-  std::vector<Plane> planes_;     // by voxel
+  VoxelHashTable<> table_{kMostVoxels};  // numbers of the voxels
+  std::vector<VoxelKey> keys_;           // by voxel
+  std::vector<Moments> moments_;         // by voxel
+  std::vector<Plane> planes_;            // by voxel
   std::uint32_t scans_ = 0;
   std::array<double, 3> sensor_ = {};  // position at the newest scan, m
 };
