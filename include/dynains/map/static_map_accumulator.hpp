@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <deque>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -21,38 +21,6 @@
 
 namespace dynains::detail {
 
-/// Vector that grows by chunks. Elements never move, so references stay valid. A push_back()
-/// allocates at most one chunk. `T`: trivially constructible. `kChunk`: elements per chunk.
-template <class T, std::uint32_t kChunk>
-class ChunkedVector {
- public:
-  std::uint32_t size() const { return size_; }
-  T& operator[](std::uint32_t i) { return chunks_[i / kChunk][i % kChunk]; }
-  const T& operator[](std::uint32_t i) const { return chunks_[i / kChunk][i % kChunk]; }
-
-  /// Appends an element and returns its index, at most 2^32 - 2. Throws std::length_error if the
-  /// vector is full, and std::bad_alloc; in both cases the vector is unchanged.
-  std::uint32_t push_back(const T& value) {
-    if (size_ == chunks_.size() * kChunk) add_chunk();
-    (*this)[size_] = value;
-    return size_++;
-  }
-
-  std::size_t memory_bytes() const {
-    return chunks_.size() * kChunk * sizeof(T) + chunks_.capacity() * sizeof(chunks_[0]);
-  }
-
- private:
-  void add_chunk() {
-    if (chunks_.size() == kNoIndex / kChunk)
-      throw std::length_error("2^32 - 1 elements are too many");
-    chunks_.emplace_back(new T[kChunk]);
-  }
-
-  std::vector<std::unique_ptr<T[]>> chunks_;
-  std::uint32_t size_ = 0;
-};
-
 /// Indices of a block in the world frame, in blocks. Each has 32 bits: the 21 bits of a VoxelKey
 /// are too few for the smallest voxels at national grid coordinates.
 struct BlockIndex {
@@ -65,75 +33,51 @@ struct BlockIndex {
 /// Voxels of the map that are stored together, and the list of their points.
 struct MapBlock {
   BlockIndex index;
-  std::uint64_t occupied;  ///< one bit per voxel
-  std::uint32_t first;     ///< first point of the block, or kNoIndex
-  std::uint32_t next;      ///< next block of the bucket, or kNoIndex
+  std::uint64_t occupied = 0;      ///< one bit per voxel
+  std::uint32_t first = kNoIndex;  ///< first point of the block, or kNoIndex
 };
 
-/// Hash table that numbers blocks in the order of their insertion. Blocks never move in memory.
-///
-/// Linear hashing (Litwin, 1980): each new block splits one bucket, so the time of an insertion
-/// does not grow with the table. VoxelHashTable instead rebuilds the whole table, which takes tens
-/// of milliseconds for half a million keys.
+/// Hash table of blocks, with open addressing. Blocks never move in memory. VoxelHashTable also
+/// holds the keys, which would double the memory.
 class BlockTable {
  public:
-  std::uint32_t size() const { return blocks_.size(); }
-  const MapBlock& operator[](std::uint32_t block) const { return blocks_[block]; }
+  const std::deque<MapBlock>& blocks() const { return blocks_; }
 
-  /// The block of an index; adds a block without points. Throws std::length_error beyond 2^32 - 2
-  /// blocks, and std::bad_alloc.
+  /// The block of an index; adds a block without points. May throw std::bad_alloc.
   MapBlock& find_or_add(const BlockIndex& index) {
-    const std::uint32_t hash = hash_of(index);
-    std::uint32_t block = buckets_.size() == 0 ? kNoIndex : buckets_[bucket_of(hash)];
-    while (block != kNoIndex && !(blocks_[block].index == index)) block = blocks_[block].next;
-    return blocks_[block == kNoIndex ? add(index, hash) : block];
+    if (2 * blocks_.size() >= numbers_.size()) grow();
+    std::uint32_t& number = numbers_[slot_of(index)];
+    if (number == kNoIndex) {
+      blocks_.push_back({index});
+      number = static_cast<std::uint32_t>(blocks_.size() - 1);
+    }
+    return blocks_[number];
   }
 
-  std::size_t memory_bytes() const { return blocks_.memory_bytes() + buckets_.memory_bytes(); }
+  std::size_t memory_bytes() const {
+    return blocks_.size() * sizeof(MapBlock) + numbers_.size() * sizeof(std::uint32_t);
+  }
 
  private:
-  // The lower bits are well mixed.
-  static std::uint32_t hash_of(const BlockIndex& index) {
+  // The slot of a block, or the empty slot where it would be added. At most half are in use.
+  std::size_t slot_of(const BlockIndex& index) const {
     const auto hash = static_cast<std::uint32_t>(mixed_hash(index.x, index.y, index.z));
-    return hash ^ (hash >> 13);
-  }
-
-  // A round of splits doubles the number of buckets, from round_begin_ to 2 * round_begin_.
-  std::uint32_t bucket_of(std::uint32_t hash) const {
-    const std::uint32_t bucket = hash & (2 * round_begin_ - 1);
-    return bucket < buckets_.size() ? bucket : bucket - round_begin_;
-  }
-
-  // The table has one bucket per block: a search visits one or two blocks on average.
-  std::uint32_t add(const BlockIndex& index, std::uint32_t hash) {
-    split_bucket();
-    std::uint32_t& first = buckets_[bucket_of(hash)];
-    first = blocks_.push_back({index, 0, kNoIndex, first});
-    return first;
-  }
-
-  void split_bucket() {
-    if (buckets_.size() == 2 * round_begin_) round_begin_ *= 2;
-    const std::uint32_t added = buckets_.push_back(kNoIndex);
-    if (added == 0) return;
-    std::uint32_t* link = &buckets_[added - round_begin_];
-    std::uint32_t* moved = &buckets_[added];
-    while (*link != kNoIndex) {
-      MapBlock& block = blocks_[*link];
-      if (bucket_of(hash_of(block.index)) == added) {
-        *moved = *link;
-        *link = block.next;
-        block.next = kNoIndex;
-        moved = &block.next;
-      } else {
-        link = &block.next;
-      }
+    std::size_t at = hash ^ (hash >> 13);  // the lower bits are well mixed
+    for (;; ++at) {
+      at &= numbers_.size() - 1;
+      if (numbers_[at] == kNoIndex || blocks_[numbers_[at]].index == index) return at;
     }
   }
 
-  std::uint32_t round_begin_ = 1;
-  ChunkedVector<std::uint32_t, 1024> buckets_;  // by bucket: its first block, or kNoIndex
-  ChunkedVector<MapBlock, 512> blocks_;
+  void grow() {
+    constexpr std::size_t kFewest = 1024;
+    numbers_.assign(std::max(kFewest, 2 * numbers_.size()), kNoIndex);
+    std::uint32_t number = 0;
+    for (const MapBlock& block : blocks_) numbers_[slot_of(block.index)] = number++;
+  }
+
+  std::deque<MapBlock> blocks_;         // in the order of their insertion
+  std::vector<std::uint32_t> numbers_;  // by slot: index of a block, or kNoIndex
 };
 
 }  // namespace dynains::detail
@@ -144,9 +88,8 @@ namespace dynains {
 ///
 /// Voxels are grouped in flat blocks of 8 x 4 x 2, because the ground is flat; the occupancy of a
 /// block is one word. Points are stored in single precision relative to the corner of their block,
-/// so their precision does not depend on the distance from the world origin. Stored points never
-/// move in memory, and the table of blocks grows bucket by bucket, so the time of an insertion does
-/// not grow with the map.
+/// so their precision does not depend on the distance from the world origin. Points and blocks
+/// never move in memory.
 class StaticMapAccumulator {
  public:
   struct Config {
@@ -181,7 +124,7 @@ class StaticMapAccumulator {
   /// Adds points of one scan. `points`: m, sensor frame. `keep`: by point, 0 for points to ignore;
   /// an empty `keep` adds all points. A voxel with a point ignores further points.
   /// `T_world_sensor`: rigid, translation within kMaxTranslation. Throws std::length_error beyond
-  /// 2^32 - 2 points, and std::bad_alloc.
+  /// 2^32 - 1 points, and std::bad_alloc.
   void insert(PointsView points, Span<const std::uint8_t> keep, const Pose& T_world_sensor) {
     // Transforms to a corner next to the sensor, an exact multiple of all block edges, so that
     // single precision is sufficient.
@@ -219,17 +162,17 @@ class StaticMapAccumulator {
 
   /// Memory of the map, including its index, bytes.
   std::size_t memory_bytes() const {
-    return points_.memory_bytes() + blocks_.memory_bytes() + recent_.size() * sizeof(recent_[0]);
+    return points_.size() * sizeof(Point) + blocks_.memory_bytes() +
+           recent_.size() * sizeof(recent_[0]);
   }
 
   /// Calls `visit(Eigen::Vector3d)` for every point (m, world frame).
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::uint32_t block = 0; block < blocks_.size(); ++block) {
-      const BlockIndex& index = blocks_[block].index;
-      const Eigen::Vector3d corner(index.x * block_size(0), index.y * block_size(1),
-                                   index.z * block_size(2));
-      for (std::uint32_t i = blocks_[block].first; i != kNoIndex; i = points_[i].next) {
+    for (const detail::MapBlock& block : blocks_.blocks()) {
+      const Eigen::Vector3d corner(block.index.x * block_size(0), block.index.y * block_size(1),
+                                   block.index.z * block_size(2));
+      for (std::uint32_t i = block.first; i != kNoIndex; i = points_[i].next) {
         const Point& point = points_[i];
         visit(Eigen::Vector3d(corner.x() + static_cast<double>(point.x),
                               corner.y() + static_cast<double>(point.y),
@@ -325,8 +268,9 @@ class StaticMapAccumulator {
       detail::MapBlock& block = *known;
       const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i];
       if ((block.occupied & bit) != 0 && !keep_all_) continue;
-      block.first =
-          points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
+      if (points_.size() == kNoIndex) throw std::length_error("2^32 - 1 points are too many");
+      points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
+      block.first = static_cast<std::uint32_t>(points_.size() - 1);
       block.occupied |= bit;
     }
   }
@@ -335,7 +279,7 @@ class StaticMapAccumulator {
   double voxel_;
   bool keep_all_;
   detail::BlockTable blocks_;
-  detail::ChunkedVector<Point, 512> points_;
+  std::deque<Point> points_;
   std::vector<detail::MapBlock*> recent_;  // by cache slot: the last block, or null
 };
 
