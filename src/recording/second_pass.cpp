@@ -31,12 +31,12 @@ void SecondPass::add(PointsView points, const ScanVerdict& verdict, const Compar
   if (visit != latest_) visits_[latest_]->rest();
   latest_ = visit;
   scans_.push_back({visit, visits_[visit]->scans()});
-  visits_[visit]->add(points, verdict, compared.T_world_sensor);
+  visits_[visit]->add(points, verdict, compared);
 }
 
 void SecondPass::test(const std::function<bool()>& keep_going) {
   for (std::unique_ptr<Visit>& visit : visits_) {
-    if (visit->length() <= returns_.compared()) {
+    if (visit->length() <= returns_.compared() || visit->is_suspicious()) {
       visit.reset();
     } else if (!visit->test(keep_going)) {
       return;

@@ -32,13 +32,14 @@ void Visit::find_up(PointsView points, const Pose& T_world_sensor) {
   T_level_world_ = orthonormalized(T_level_world_ * T_world_sensor.inverse());
 }
 
-void Visit::add(PointsView points, const ScanVerdict& verdict, const Pose& T_world_sensor) {
+void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
   const std::uint32_t number = scans();
   if (number == 0) {
     first_ = static_cast<std::uint32_t>(verdict.scan);
-    find_up(points, T_world_sensor);
+    find_up(points, compared.T_world_sensor);
   }
-  const Pose T = orthonormalized(T_level_world_ * T_world_sensor);
+  const Pose T = orthonormalized(T_level_world_ * compared.T_world_sensor);
+  is_suspicious_ = is_suspicious_ || compared.is_suspicious;
   T_level_sensor_.push_back(T);
   last_ = static_cast<std::uint32_t>(verdict.scan);
   places_.add(points, verdict.labels, verdict.causes, T, verdict.time, number);

@@ -60,6 +60,11 @@ VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Remov
   return verdict;
 }
 
+/// Changes the pose that the first pass has compared.
+using Changes = std::function<void(std::size_t scan, ComparedPose& pose)>;
+
+void changes_nothing(std::size_t, ComparedPose&) {}
+
 /// The first pass compares fewer scans than one drive has.
 SecondPassConfig short_first_pass() {
   SecondPassConfig config;
@@ -82,8 +87,7 @@ struct Counts {
 std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool tests = true,
                           const Removes& removes = removes_nothing,
                           const SecondPassConfig& config = short_first_pass(),
-                          const Pose& T_turned_world = Pose::Identity(),
-                          std::size_t second_epoch = 0, double jump = 0.0) {
+                          const Changes& changes = changes_nothing) {
   ByteStore store;
   SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
@@ -91,13 +95,13 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     ScanVerdict verdict;
     verdict.scan = i;
     verdict.time = 0.5 * static_cast<double>(i);
-    verdict.T_world_sensor = T_turned_world * recording.scans[i].T_world_sensor;
-    if (second_epoch > 0 && i >= second_epoch) verdict.T_world_sensor.translation().x() += jump;
+    ComparedPose compared{recording.scans[i].T_world_sensor, i == 0, false};
+    changes(i, compared);
+    verdict.T_world_sensor = compared.T_world_sensor;
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
     verdict.instances = arrays.instances;
-    pass.add(recording.scans[i].points, verdict,
-             {verdict.T_world_sensor, i == 0 || i == second_epoch});
+    pass.add(recording.scans[i].points, verdict, compared);
   }
   pass.test([tests] { return tests; });
   CHECK(pass.is_decided() == tests);
@@ -214,13 +218,22 @@ TEST_CASE("an epoch judges another one if it fits there, and no scan that was co
   const Recorded recording = with_parked_car();
   const std::size_t turn = recording.scans.size() / 2;
   const auto removed_after = [&](double jump) {
-    return sum(count(recording, kCar, true, removes_nothing, short_first_pass(), Pose::Identity(),
-                     turn, jump))
-        .removed;
+    const auto jumps = [&](std::size_t scan, ComparedPose& pose) {
+      pose.begins_epoch = scan == 0 || scan == turn;
+      if (scan >= turn) pose.T_world_sensor.translation().x() += jump;
+    };
+    return sum(count(recording, kCar, true, removes_nothing, short_first_pass(), jumps)).removed;
   };
   CHECK(removed_after(0.0) > 0);
   for (const double jump : {0.3, 1.0, 3.0}) CHECK(removed_after(jump) == 0);
   CHECK(sum(count(recording, kCar, true, removes_nothing, {})).removed == 0);
+}
+
+TEST_CASE("poses that the first pass doubts judge nothing") {
+  const auto doubts = [](std::size_t scan, ComparedPose& pose) { pose.is_suspicious = scan == 20; };
+  const Recorded recording = with_parked_car();
+  CHECK(sum(count(recording, kCar, true, removes_nothing, short_first_pass(), doubts)).removed ==
+        0);
 }
 
 TEST_CASE("the ground tells which way is up") {
@@ -228,8 +241,11 @@ TEST_CASE("the ground tells which way is up") {
   const Counts upright = sum(count(recording, kCar));
   Pose T_turned_world(Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.6, 0.0, 0.8)));
   T_turned_world.translation() = Eigen::Vector3d(100.0, -50.0, 20.0);
+  const auto turns = [&](std::size_t, ComparedPose& pose) {
+    pose.T_world_sensor = T_turned_world * pose.T_world_sensor;
+  };
   const Counts turned =
-      sum(count(recording, kCar, true, removes_nothing, short_first_pass(), T_turned_world));
+      sum(count(recording, kCar, true, removes_nothing, short_first_pass(), turns));
   CHECK(turned.removed == Approx(upright.removed).epsilon(0.01));
 }
 

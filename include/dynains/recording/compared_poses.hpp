@@ -12,6 +12,7 @@ namespace dynains {
 struct ComparedPose {
   Pose T_world_sensor = Pose::Identity();  ///< as pushed, or with the corrections of its epoch
   bool begins_epoch = false;               ///< the scan is not compared with earlier ones
+  bool is_suspicious = false;              ///< scans do not fit to each other, see Plausibility
 };
 
 /// Chains the corrected motions of pushes. An epoch begins at the pushed pose.
@@ -20,7 +21,8 @@ class ComparedPoses {
   /// Takes the result of the next push.
   void add(const FrameResult& frame) {
     const Pose& T_pushed = frame.newest.T_world_sensor;
-    ComparedPose next = {T_pushed, poses_.empty() || frame.began_epoch.has_value()};
+    ComparedPose next = {T_pushed, poses_.empty() || frame.began_epoch.has_value(),
+                         frame.plausibility.suspicion != Suspicion::kNone};
     if (!next.begins_epoch && frame.pose_residual) {
       constexpr double kRounding = 1e-6;  // m, and rad
       const Pose T = orthonormalized(

@@ -19,8 +19,8 @@ namespace dynains {
 
 /// The first pass judges a scan by the scans around it: DynaInsRemover. The second one judges it by
 /// all scans of its visit (see Returns). Poses are those by which the first pass compared the
-/// scans. The first pass has compared all scans of a visit that is short, so that its verdicts
-/// stay.
+/// scans. Its verdicts stay in a visit that is so short that it has compared all scans, and in one
+/// with poses that it doubts.
 ///
 /// Give all scans with their first verdicts to add(), call test(), and give all scans again to
 /// revise(), in the same order. Not for several callers at once. All functions throw what the store
@@ -59,7 +59,7 @@ class SecondPass {
   SecondPassConfig config_;
   ByteStore& store_;
   Returns returns_;
-  std::vector<std::unique_ptr<Visit>> visits_;  // after test(): null if short
+  std::vector<std::unique_ptr<Visit>> visits_;  // after test(): null if verdicts stay
   std::vector<ScanOfVisit> scans_;
   std::uint32_t latest_ = 0;  // visit of the last call
   std::size_t places_ = 0;

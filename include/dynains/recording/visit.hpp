@@ -12,6 +12,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
+#include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/ground.hpp"
 #include "dynains/recording/places.hpp"
 #include "dynains/recording/references.hpp"
@@ -60,7 +61,7 @@ class Visit {
   Visit(ByteStore& store, const SecondPassConfig& config);
 
   /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.
-  void add(PointsView points, const ScanVerdict& verdict, const Pose& T_world_sensor);
+  void add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared);
   /// Puts all that waits into the store.
   void rest();
   /// Tests all places. Returns false, without a result, if `keep_going()` does.
@@ -71,6 +72,8 @@ class Visit {
   std::uint32_t scans() const { return static_cast<std::uint32_t>(T_level_sensor_.size()); }
   /// Scans of the recording from the first one of the visit to the last one.
   std::uint32_t length() const { return last_ - first_ + 1; }
+  /// Whether the first pass has doubted the poses of a scan, so that scans may not fit.
+  bool is_suspicious() const { return is_suspicious_; }
   std::size_t place_count() const { return places_.size(); }
 
  private:
@@ -95,6 +98,7 @@ class Visit {
   Pose T_level_world_ = Pose::Identity();  // z up, origin and heading of the first sensor
   std::vector<Pose> T_level_sensor_;       // by scan, as it was compared
   std::uint32_t first_ = 0, last_ = 0;     // scans of the recording
+  bool is_suspicious_ = false;
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
   std::vector<std::int32_t> majority_;  // by instance: points that left, less those that stay
