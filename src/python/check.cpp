@@ -6,7 +6,6 @@
 #include <string>
 
 #include "bindings.hpp"
-#include "parameters.hpp"
 #include "recording.hpp"
 #include "run/recording_check.hpp"
 #include "run/recording_settings.hpp"

@@ -1,6 +1,6 @@
 #include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "parameters.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {
@@ -15,10 +15,12 @@ py::list list_parameters() {
       py::dict entry;
       entry["name"] = parameter.name;
       entry["section"] = section;
-      entry["default"] = value_of(parameter);
+      entry["default"] = plain_value(parameter.value);
       entry["min"] = parameter.bounds.min;
       entry["max"] = parameter.bounds.max;
-      entry["values"] = values_of(parameter);
+      using Value = std::remove_const_t<std::remove_reference_t<decltype(parameter.value)>>;
+      entry["values"] = py::none();
+      if constexpr (std::is_enum_v<Value>) entry["values"] = value_names(Value());
       entry["unit"] = parameter.unit;
       entry["help"] = parameter.help;
       result.append(entry);

@@ -8,7 +8,6 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "parameters.hpp"
 #include "settings.hpp"
 
 namespace dynains::python {

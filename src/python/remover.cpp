@@ -15,7 +15,7 @@
 #include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/points.hpp"
-#include "parameters.hpp"
+#include "settings.hpp"
 
 namespace dynains::python {
 namespace {

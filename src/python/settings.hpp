@@ -1,16 +1,21 @@
-// Settings of recordings and runs as keyword arguments: the names of the flags of the program, with
-// underscores. A value may be the text of the flag.
+// Parameters and settings by name, from the one list of fields of each: keyword arguments have the
+// names of the flags of the program, with underscores. A value may be the text of the flag.
 #pragma once
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include <string>
+#include <type_traits>
 
-#include "parameters.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/parameters.hpp"
 #include "run/parameter_values.hpp"
 #include "run/recording_settings.hpp"
 
 namespace dynains::python {
+
+namespace py = pybind11;
 
 /// The text of a flag with this value; that of a (4, 4) array is `x y z qx qy qz qw`. Throws
 /// PoseError for another array that is no list of numbers.
@@ -27,6 +32,15 @@ bool assign_setting(Settings& settings, const std::string& name, const py::handl
     if (!value.is_none()) program::assign_parameter(setting, to_text(value), name);
   });
   return is_known;
+}
+
+/// Sets the parameters that `values` names. Throws ConfigError, also for unknown names.
+template <class Config>
+void assign_all(Config& config, const py::dict& values) {
+  for (const auto& [key, value] : values) {
+    const std::string name = py::str(key);
+    if (!assign_setting(config, name, value)) throw ConfigError("unknown parameter " + name);
+  }
 }
 
 template <class Settings>
@@ -47,6 +61,29 @@ std::string describe_settings() {
             program::describe_range(setting) + '\n';
   });
   return text;
+}
+
+template <class Config>
+py::dict to_dict(const Config& config) {
+  py::dict result;
+  Config::visit(config, [&](const auto& parameter) {
+    result[parameter.name] = plain_value(parameter.value);
+  });
+  return result;
+}
+
+/// A property with a docstring for each parameter.
+template <class Config, class Class>
+void add_properties(Class& bound) {
+  const Config defaults;
+  Config::visit(defaults, [&](const auto& parameter) {
+    const std::string name = parameter.name;
+    bound.def_property(
+        parameter.name,
+        [name](const Config& self) -> py::object { return to_dict(self)[name.c_str()]; },
+        [name](Config& self, const py::object& value) { assign_setting(self, name, value); },
+        (std::string(parameter.help) + "; " + program::describe_range(parameter)).c_str());
+  });
 }
 
 /// Settings with the keyword arguments `values`. Throws ConfigError, also for an unknown name,

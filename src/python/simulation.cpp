@@ -10,7 +10,6 @@
 #include "bindings.hpp"
 #include "dynains/simulation/simulator.hpp"
 #include "dynains/simulation/write_sequence.hpp"
-#include "parameters.hpp"
 #include "settings.hpp"
 
 namespace dynains::python {
@@ -87,7 +86,7 @@ void bind_simulation(py::module_& module) {
   py::class_<Simulator>(module, "Simulator", doc.c_str())
       .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
            py::arg("labelling") = "ever",
-           "Raises ConfigError for unknown names, TypeError for other values.")
+           "Raises ConfigError for unknown names and other values.")
       .def("__len__", &Simulator::size)
       .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.")
       .def("write", &write, py::arg("folder"),

@@ -41,24 +41,23 @@ def test_the_configuration_of_a_remover_is_a_copy():
 
 
 @pytest.mark.parametrize(
-    "values, error, text",
+    "values, text",
     [
-        ({"tau_s": 1.5}, dynains.ConfigError, r"tau_s = 1.5 must be in \[0, 1\]"),
-        ({"tau_s": float("nan")}, dynains.ConfigError, "tau_s = nan"),
-        ({"window": 1000}, dynains.ConfigError, "window = 1000"),
-        ({"window": 4.5}, TypeError, "window = 4.5: expected int"),
-        ({"tau_s": "high"}, TypeError, "expected float"),
-        ({"level": None}, TypeError, "level = None: expected bool"),
-        ({"level": 0.5}, TypeError, "level = 0.5: expected bool"),
-        ({"tau": 0.5}, dynains.ConfigError, "unknown parameter tau$"),
-        ({"decision": "paper"}, TypeError, "expected str, one of window|free_space"),
-        ({"decision": 1}, TypeError, "decision = 1: expected str"),
+        ({"tau_s": 1.5}, r"tau_s = 1.5: expected FLOAT in \[0, 1\]"),
+        ({"tau_s": float("nan")}, "tau_s = nan"),
+        ({"window": 1000}, "window = 1000"),
+        ({"window": 4.5}, "window = 4.5: expected INT"),
+        ({"tau_s": "high"}, "expected FLOAT"),
+        ({"level": 0.5}, "level = 0.5: expected true"),
+        ({"tau": 0.5}, "unknown parameter tau$"),
+        ({"decision": "paper"}, r"expected window\|free_space"),
+        ({"decision": 1}, "decision = 1: expected window"),
     ],
 )
-def test_bad_values_are_refused(values, error, text):
-    with pytest.raises(error, match=text):
+def test_bad_values_are_refused(values, text):
+    with pytest.raises(dynains.ConfigError, match=text):
         dynains.Config(**values)
-    with pytest.raises(error, match=text):
+    with pytest.raises(dynains.ConfigError, match=text):
         dynains.DynaInsRemover(**values)
 
 

@@ -71,7 +71,7 @@ def test_the_simulator_is_a_sequence():
     assert simulator[0].points.shape == (len(simulator[0].labels), 4)
     with pytest.raises(IndexError):
         simulator[3]
-    with pytest.raises(TypeError, match="urban"):
+    with pytest.raises(dynains.ConfigError, match="urban"):
         dynains.Simulator("moon")
     with pytest.raises(dynains.ConfigError, match="unknown parameter"):
         dynains.Simulator(scan=3)
