@@ -60,20 +60,6 @@ std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 ce
   return result;
 }
 
-/// The corridors, with the segments that can be nearest to a point within `radius` of `centre`.
-std::vector<Corridor> nearest_within(const std::vector<Corridor>& corridors, Vec2 centre,
-                                     double radius) {
-  std::vector<Corridor> result;
-  for (const Corridor& corridor : corridors) {
-    const double reach = corridor.distance(centre) + 2 * radius;
-    Corridor& kept = result.emplace_back(Corridor{corridor.street, {}});
-    for (const Segment& segment : corridor.segments) {
-      if (std::sqrt(segment.squared_distance(centre)) <= reach) kept.segments.push_back(segment);
-    }
-  }
-  return result;
-}
-
 struct Ground {
   double edge = kFar;     ///< distance to the edge of the nearest carriageway
   double half_width = 4;  ///< of that street
@@ -147,17 +133,15 @@ double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
 
 void Terrain::build(int ix, int iy, Tile& tile) const {
   const Vec2 corner{ix * kTile, iy * kTile};
-  const Vec2 centre = corner + Vec2{kTile / 2, kTile / 2};
-  const auto corridors = corridors_near(streets_, centre, kTile * 0.71);
-  // Block by block: few segments can be nearest within a block.
+  // Block by block: few segments are near one.
   constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
+  constexpr double kHalf = 0.5 * kBlock * kCell;
   std::vector<std::vector<Corridor>> blocks;
   blocks.reserve(grid_index(kBlocks, 0, kBlocks));
   for (int row = 0; row < kBlocks; ++row) {
     for (int column = 0; column < kBlocks; ++column) {
-      const double half = 0.5 * kBlock * kCell;
-      const Vec2 middle = corner + Vec2{2 * half * column + half, 2 * half * row + half};
-      blocks.push_back(nearest_within(corridors, middle, 1.42 * half));
+      const Vec2 middle = corner + Vec2{kHalf * (2 * column + 1), kHalf * (2 * row + 1)};
+      blocks.push_back(corridors_near(streets_, middle, 1.42 * kHalf));
     }
   }
   std::vector<double> hills(grid_index(kCells + 1, 0, kCells + 1), 0.0);
