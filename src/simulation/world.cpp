@@ -1,26 +1,8 @@
 #include "simulation/world.hpp"
 
-#include <cmath>
-
 #include "simulation/scenes/scenes.hpp"
 
 namespace dynains::simulation {
-
-void StaticGeometry::add(const Rigid& T_world_model, const Model& model) {
-  for (const Primitive& primitive : model) {
-    const auto index = static_cast<std::uint32_t>(primitives_.size());
-    primitives_.push_back(transformed(T_world_model, primitive));
-    model_of_.push_back(models_);
-    const Vec3 c = primitives_.back().centre;
-    const double ix = std::floor(static_cast<double>(c.x) / kCell);
-    const double iy = std::floor(static_cast<double>(c.y) / kCell);
-    const auto found =
-        cell_of_.emplace(cell_key(static_cast<int>(ix), static_cast<int>(iy)), cells_.size());
-    if (found.second) cells_.push_back({{(ix + 0.5) * kCell, (iy + 0.5) * kCell}, {}});
-    cells_[found.first->second].members.push_back(index);
-  }
-  ++models_;
-}
 
 namespace {
 

@@ -1,8 +1,9 @@
 // Everything that a scene consists of.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "dynains/simulation/config.hpp"
@@ -11,33 +12,31 @@
 
 namespace dynains::simulation {
 
-/// Primitives that never move, found by place. World frame.
+/// Primitives that never move. World frame.
 class StaticGeometry {
  public:
-  void add(const Rigid& T_world_model, const Model& model);
-  /// Calls `visitor(primitive, salt, model)` for the cells within `radius` of `centre`; `model`
-  /// counts the calls of add().
+  void add(const Rigid& T_world_model, const Model& model) {
+    for (const Primitive& part : model) {
+      primitives_.push_back({transformed(T_world_model, part), models_});
+    }
+    ++models_;
+  }
+  /// Calls `visitor(primitive, salt, model)` for the primitives within `radius` of `centre`, and
+  /// some beyond; `model` counts the calls of add().
   template <class Visitor>
   void visit_near(Vec2 centre, double radius, Visitor&& visitor) const {
-    for (const Cell& cell : cells_) {
-      const Vec2 d = cell.centre - centre;
-      if (norm(d) > radius + kCell) continue;
-      for (const std::uint32_t i : cell.members)
-        visitor(primitives_[i], std::uint64_t{i}, model_of_[i]);
+    constexpr double kReach = 40.0;  // m, from the middle of a primitive to its ends, at most
+    for (std::size_t i = 0; i < primitives_.size(); ++i) {
+      const auto& [primitive, model] = primitives_[i];
+      const Vec2 middle{static_cast<double>(primitive.centre.x),
+                        static_cast<double>(primitive.centre.y)};
+      if (norm(middle - centre) <= radius + kReach) visitor(primitive, std::uint64_t{i}, model);
     }
   }
 
  private:
-  static constexpr double kCell = 40.0;
-  struct Cell {
-    Vec2 centre;
-    std::vector<std::uint32_t> members;
-  };
-  std::vector<Primitive> primitives_;
-  std::vector<std::uint32_t> model_of_;
+  std::vector<std::pair<Primitive, std::uint32_t>> primitives_;  // and the numbers of their models
   std::uint32_t models_ = 0;
-  std::vector<Cell> cells_;
-  std::unordered_map<std::uint64_t, std::size_t> cell_of_;
 };
 
 struct World {
