@@ -2,10 +2,10 @@
 
 #include <stdexcept>
 
-#include "dynains/evaluation/map_protocol.hpp"
-#include "dynains/evaluation/point_protocol.hpp"
-#include "dynains/evaluation/voxel_protocol.hpp"
 #include "dynains/threads/background.hpp"
+#include "map_protocol.hpp"
+#include "point_protocol.hpp"
+#include "voxel_protocol.hpp"
 
 namespace dynains::evaluation {
 namespace {
@@ -31,20 +31,18 @@ void check_lengths(const LabelledScan& scan, std::size_t index) {
 Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& estimates,
                     const std::vector<MapEstimate>& maps, const EvaluationConfig& config) {
   config.validate();
+  if (estimates.size() > kMaxEstimates) {
+    throw ConfigError("at most " + std::to_string(kMaxEstimates) +
+                      " estimates are evaluated at once");
+  }
   Evaluation result;
   result.config = config;
 
-  VoxelProtocol voxels({config.voxel, config.min_range, config.max_range, config.truth},
-                       estimates.size());
-  PointProtocol points({config.min_range, config.point_max_range, config.truth}, estimates.size());
+  VoxelProtocol voxels(config, estimates.size());
+  PointProtocol points(config, estimates.size());
   std::vector<MapProtocol> map_protocols;
   map_protocols.reserve(maps.size());
-  for (const MapEstimate& map : maps) {
-    map_protocols.emplace_back(
-        MapProtocol::Settings{config.voxel, config.min_range, config.max_range,
-                              config.point_max_range, config.point_radius, config.truth},
-        map.points_world);
-  }
+  for (const MapEstimate& map : maps) map_protocols.emplace_back(config, map.points_world);
 
   LabelledScan scan;
   Background others;
@@ -70,7 +68,7 @@ Evaluation evaluate(const ScanSource& source, const std::vector<std::string>& es
   std::vector<std::string> names = {"identity", "oracle"};
   names.insert(names.end(), estimates.begin(), estimates.end());
   for (std::size_t row = 0; row < names.size(); ++row) {
-    const bool is_estimate = row >= VoxelProtocol::kFirstEstimate;
+    const bool is_estimate = row >= kFirstEstimate;
     result.rows.push_back({names[row], voxels.score(row), points.points(row), points.objects(row),
                            is_estimate ? points.by_class(row) : std::vector<ClassScore>(),
                            std::nullopt, std::nullopt});

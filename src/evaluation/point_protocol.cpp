@@ -1,13 +1,10 @@
-#include "dynains/evaluation/point_protocol.hpp"
+#include "point_protocol.hpp"
 
 #include <map>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "detail/range_gate.hpp"
-#include "dynains/errors.hpp"
-#include "dynains/evaluation/voxel_protocol.hpp"
 
 namespace dynains::evaluation {
 namespace {
@@ -24,17 +21,8 @@ bool is_right(Truth truth, std::uint64_t points, std::uint64_t kept) {
 
 }  // namespace
 
-PointProtocol::PointProtocol(const Settings& settings, std::size_t estimates)
-    : settings_(settings), estimates_(estimates) {
-  detail::RangeGate(settings.min_range, settings.max_range);
-  if (estimates > kMaxEstimates) {
-    throw ConfigError("PointProtocol evaluates at most " + std::to_string(kMaxEstimates) +
-                      " estimates at once");
-  }
-}
-
 void PointProtocol::add(const LabelledScan& scan) {
-  const detail::RangeGate gate(settings_.min_range, settings_.max_range);
+  const detail::RangeGate gate(config_.min_range, config_.point_max_range);
   if (!scan.causes.empty()) causes_.resize(kCauseCount);
   // Consecutive points mostly have one label.
   std::optional<std::uint32_t> last_label;
@@ -44,7 +32,7 @@ void PointProtocol::add(const LabelledScan& scan) {
     const std::uint32_t label = scan.truth[i];
     if (last_label != label) {
       last_label = label;
-      truth = settings_.truth(label);
+      truth = config_.truth(label);
       counts = truth == Truth::kIgnored ? nullptr : &by_label_[label];
     }
     if (counts == nullptr || !gate.passes(scan.xyz + i * scan.stride)) continue;
@@ -61,16 +49,16 @@ void PointProtocol::add(const LabelledScan& scan) {
 }
 
 std::uint64_t PointProtocol::kept(const Counts& counts, Truth truth, std::size_t row) const {
-  if (row == VoxelProtocol::kIdentity) return counts.points;
-  if (row == VoxelProtocol::kOracle) return truth == Truth::kStatic ? counts.points : 0;
-  return counts.kept.at(row - VoxelProtocol::kFirstEstimate);
+  if (row == kIdentity) return counts.points;
+  if (row == kOracle) return truth == Truth::kStatic ? counts.points : 0;
+  return counts.kept.at(row - kFirstEstimate);
 }
 
 std::vector<ClassScore> PointProtocol::by_class(std::size_t row) const {
   std::map<std::pair<Truth, std::uint16_t>, ClassScore> classes;
   for (const auto& [label, counts] : by_label_) {
     if (counts.points == 0) continue;
-    const Truth truth = settings_.truth(label);
+    const Truth truth = config_.truth(label);
     const std::uint64_t points_kept = kept(counts, truth, row);
     ClassScore& of_class = classes[{truth, semantic_class(label)}];
     of_class.id = semantic_class(label);

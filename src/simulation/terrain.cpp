@@ -135,13 +135,13 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
   const Vec2 corner{ix * kTile, iy * kTile};
   // Block by block: few segments are near one.
   constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
-  constexpr double kHalf = 0.5 * kBlock * kCell;
+  const double half = 0.5 * kBlock * kCell;
   std::vector<std::vector<Corridor>> blocks;
   blocks.reserve(grid_index(kBlocks, 0, kBlocks));
   for (int row = 0; row < kBlocks; ++row) {
     for (int column = 0; column < kBlocks; ++column) {
-      const Vec2 middle = corner + Vec2{kHalf * (2 * column + 1), kHalf * (2 * row + 1)};
-      blocks.push_back(corridors_near(streets_, middle, 1.42 * kHalf));
+      const Vec2 middle = corner + Vec2{half * (2 * column + 1), half * (2 * row + 1)};
+      blocks.push_back(corridors_near(streets_, middle, 1.42 * half));
     }
   }
   std::vector<double> hills(grid_index(kCells + 1, 0, kCells + 1), 0.0);

@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/point_protocol.hpp"
 #include "dynains/evaluation/report.hpp"
-#include "dynains/evaluation/voxel_protocol.hpp"
+#include "evaluation/point_protocol.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
 
@@ -38,9 +37,9 @@ std::vector<OwnedScan> street() {
 }  // namespace
 
 TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic points") {
-  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
+  PointProtocol protocol(EvaluationConfig(), 1);
   for (const OwnedScan& scan : street()) protocol.add(scan.view());
-  const PointScore score = protocol.points(VoxelProtocol::kFirstEstimate);
+  const PointScore score = protocol.points(kFirstEstimate);
   CHECK(score.static_total == 30);
   CHECK(score.static_kept == 25);
   CHECK(score.dynamic_total == 12);
@@ -49,9 +48,9 @@ TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic poi
   CHECK(score.dynamic_accuracy() == Approx(66.6666667));
   CHECK(score.associated_accuracy() == Approx(74.5355992));  // sqrt(83.33 * 66.67)
   CHECK(score.harmonic_accuracy() == Approx(74.0740741));    // 2 * 83.33 * 66.67 / 150
-  CHECK(protocol.points(VoxelProtocol::kIdentity).static_accuracy() == 100.0);
-  CHECK(protocol.points(VoxelProtocol::kIdentity).dynamic_accuracy() == 0.0);
-  CHECK(protocol.points(VoxelProtocol::kOracle).harmonic_accuracy() == 100.0);
+  CHECK(protocol.points(kIdentity).static_accuracy() == 100.0);
+  CHECK(protocol.points(kIdentity).dynamic_accuracy() == 0.0);
+  CHECK(protocol.points(kOracle).harmonic_accuracy() == 100.0);
 }
 
 TEST_CASE("Every evaluation carries identity and oracle") {
@@ -158,6 +157,11 @@ TEST_CASE("Malformed scans and settings are refused with their name") {
   EvaluationConfig config;
   config.voxel = 0;
   CHECK_THROWS_AS(evaluate(source_of(scans), {}, {}, config), ConfigError);
+  config = {};
+  config.max_range = 2.0;
+  CHECK_THROWS_AS(evaluate(source_of(scans), {}, {}, config), ConfigError);
+  const std::vector<std::string> many(kMaxEstimates + 1);
+  CHECK_THROWS_AS(evaluate(source_of(street()), many, {}), ConfigError);
 }
 
 TEST_CASE("Class lists are ids and ranges, with a short text form that can be read back") {

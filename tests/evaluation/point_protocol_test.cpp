@@ -1,4 +1,4 @@
-#include "dynains/evaluation/point_protocol.hpp"
+#include "evaluation/point_protocol.hpp"
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -6,14 +6,13 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/evaluation/report.hpp"
-#include "dynains/evaluation/voxel_protocol.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::evaluation::testing {
 namespace {
 
-constexpr std::size_t kFirst = VoxelProtocol::kFirstEstimate;
+constexpr std::size_t kFirst = kFirstEstimate;
 constexpr std::uint32_t kCar = 10, kBuilding = 50, kPerson = 30;
 
 std::uint32_t label(std::uint32_t kind, std::uint32_t instance) { return kind | instance << 16U; }
@@ -26,7 +25,7 @@ void add_object(OwnedScan& scan, std::uint32_t of, int points, int kept, float r
 }
 
 PointProtocol protocol_of(const OwnedScan& scan) {
-  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
+  PointProtocol protocol(EvaluationConfig(), 1);
   protocol.add(scan.view());
   return protocol;
 }
@@ -53,7 +52,7 @@ TEST_CASE("Objects have 50 points and more within the range, in all scans togeth
   add_object(scan, label(kCar, 1), 49, 0);
   add_object(scan, label(kCar, 2), 50, 0);
   add_object(scan, label(kCar, 3), 500, 0, 51.0F);  // out of range
-  PointProtocol protocol({2.7, 50, TruthClasses()}, 1);
+  PointProtocol protocol(EvaluationConfig(), 1);
   protocol.add(scan.view());
   CHECK(protocol.objects(kFirst).static_total == 1);
   protocol.add(scan.view());
@@ -95,18 +94,16 @@ TEST_CASE("Estimates are judged apart, beside identity and oracle") {
   add_object(scan, label(kCar, 1), 100, 100);
   add_object(scan, label(kMovingCar, 3), 100, 100);
   for (std::size_t i = 0; i < 100; ++i) scan.in_map[i] = i < 50 ? 3 : 1;  // estimate 1 keeps half
-  PointProtocol protocol({2.7, 50, TruthClasses()}, 2);
+  PointProtocol protocol(EvaluationConfig(), 2);
   protocol.add(scan.view());
   CHECK(protocol.objects(kFirst).kept() == 100.0);
   CHECK(protocol.objects(kFirst + 1).kept() == 0.0);
   CHECK(protocol.objects(kFirst).removed() == 0.0);
   CHECK(protocol.objects(kFirst + 1).removed() == 100.0);
-  CHECK(protocol.objects(VoxelProtocol::kIdentity).kept() == 100.0);
-  CHECK(protocol.objects(VoxelProtocol::kIdentity).removed() == 0.0);
-  CHECK(protocol.objects(VoxelProtocol::kOracle).kept() == 100.0);
-  CHECK(protocol.objects(VoxelProtocol::kOracle).removed() == 100.0);
-  CHECK_THROWS_AS(PointProtocol({2.7, 50, TruthClasses()}, kMaxEstimates + 1), ConfigError);
-  CHECK_THROWS_AS(PointProtocol({2.7, 1, TruthClasses()}, 1), ConfigError);
+  CHECK(protocol.objects(kIdentity).kept() == 100.0);
+  CHECK(protocol.objects(kIdentity).removed() == 0.0);
+  CHECK(protocol.objects(kOracle).kept() == 100.0);
+  CHECK(protocol.objects(kOracle).removed() == 100.0);
 }
 
 TEST_CASE("Table, JSON and CSV of an evaluation have the objects") {

@@ -11,7 +11,7 @@
 
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
-#include "dynains/evaluation/voxel_protocol.hpp"
+#include "evaluation/voxel_protocol.hpp"
 #include "scenes.hpp"
 
 namespace dynains::evaluation::testing {
@@ -52,7 +52,7 @@ using Chosen = std::function<bool(const OwnedScan&, std::size_t, Truth)>;
 
 /// Map of the chosen points of all scans: voxels of each scan, then voxels of the whole.
 inline std::vector<VoxelPoint> reference_map(const std::vector<OwnedScan>& scans,
-                                             const VoxelProtocol::Settings& settings,
+                                             const EvaluationConfig& settings,
                                              const Chosen& chosen) {
   std::vector<VoxelPoint> all;
   for (const OwnedScan& scan : scans) {

@@ -15,6 +15,13 @@ namespace dynains::evaluation {
 /// Largest number of estimates in one evaluation.
 inline constexpr std::size_t kMaxEstimates = 6;
 
+/// Numbers of rows.
+enum Row : std::size_t {
+  kIdentity,  ///< no point removed
+  kOracle,    ///< exactly the dynamic points removed
+  kFirstEstimate
+};
+
 /// Views of one scan. Each span has one value per point; spans may be empty where stated.
 struct LabelledScan {
   const float* xyz = nullptr;  ///< x y z of each point, m, sensor frame

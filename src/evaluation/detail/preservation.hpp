@@ -7,10 +7,21 @@
 #include <limits>
 #include <optional>
 
-#include "dynains/evaluation/voxel_protocol.hpp"
+#include "dynains/evaluation/scores.hpp"
+#include "dynains/evaluation/truth.hpp"
 #include "evaluation/detail/voxel_grid.hpp"
 
-namespace dynains::evaluation::detail {
+namespace dynains::evaluation {
+
+/// Labelled point of a voxel map: the centroid of the points in the voxel, with the class of the
+/// source point nearest to the centroid. If squared distances differ by at most 1e-8 m^2, the first
+/// source point is used.
+struct VoxelPoint {
+  Eigen::Vector3d p_world;  ///< m
+  Truth truth;              ///< static or dynamic
+};
+
+namespace detail {
 
 /// Set of Truth values, one bit each.
 using TruthMask = std::uint8_t;
@@ -86,4 +97,5 @@ inline void count(VoxelScore& score, Truth truth, bool preserved) {
   }
 }
 
-}  // namespace dynains::evaluation::detail
+}  // namespace detail
+}  // namespace dynains::evaluation

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/evaluation/causes.hpp"
+#include "dynains/evaluation/config.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
@@ -18,19 +19,12 @@ namespace dynains::evaluation {
 /// DynamicMap_Benchmark (Zhang et al., ITSC 2023) does by class.
 class PointProtocol {
  public:
-  struct Settings {
-    double min_range = 2.7;  ///< m, planar
-    double max_range = 50;   ///< m, planar; 0 = no limit
-    TruthClasses truth;
-  };
-
-  /// `estimates`: number of estimates. Throws ConfigError for negative ranges, min_range above
-  /// max_range, or more than kMaxEstimates estimates.
-  PointProtocol(const Settings& settings, std::size_t estimates);
+  PointProtocol(const EvaluationConfig& config, std::size_t estimates)
+      : config_(config), estimates_(estimates) {}
 
   void add(const LabelledScan& scan);
 
-  /// Scores of a row, as of VoxelProtocol.
+  /// Scores of a Row.
   PointScore points(std::size_t row) const;
   ObjectScore objects(std::size_t row) const;
   /// Static classes first, each ordered by id.
@@ -46,7 +40,7 @@ class PointProtocol {
   };
   std::uint64_t kept(const Counts& counts, Truth truth, std::size_t row) const;
 
-  Settings settings_;
+  EvaluationConfig config_;
   std::size_t estimates_;
   std::unordered_map<std::uint32_t, Counts> by_label_;
   std::vector<CauseErrors> causes_;

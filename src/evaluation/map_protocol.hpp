@@ -1,0 +1,93 @@
+// Both protocols for a map of unlabelled points, such as a map file of another program.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "dynains/evaluation/config.hpp"
+#include "dynains/evaluation/scan.hpp"
+#include "dynains/evaluation/scores.hpp"
+#include "dynains/evaluation/truth.hpp"
+#include "dynains/points.hpp"
+#include "evaluation/detail/cell_groups.hpp"
+#include "evaluation/detail/preservation.hpp"
+#include "evaluation/detail/radius_lookup.hpp"
+#include "evaluation/detail/range_gate.hpp"
+#include "evaluation/detail/voxel_grid.hpp"
+#include "evaluation/voxel_protocol.hpp"
+
+namespace dynains::evaluation {
+
+/// Evaluates a map by the scans from which it was built.
+///
+/// Voxel-wise (PR, RR): a map point gets the class of the nearest measured point within the 27
+/// voxels around it, which contain all measured points nearer than one voxel edge. Map points
+/// without such a measured point (out of range, or in another frame), or with an ignored one, are
+/// excluded. The other map points are voxelised and compared as in VoxelProtocol. Point-wise (SA,
+/// DA): a measured point is removed if no map point lies within `point_radius`.
+///
+/// Call add() for each scan, then resolve() for each scan. Memory is proportional to the numbers of
+/// map points and occupied voxels.
+class MapProtocol {
+ public:
+  /// `map_world`: points, m, world frame of the poses; must outlive this object. Points that are
+  /// not finite are excluded.
+  MapProtocol(const EvaluationConfig& config, Span<const Eigen::Vector3d> map_world)
+      : config_(config),
+        gate_(config.min_range, config.max_range),
+        point_gate_(config.min_range, config.point_max_range),
+        map_(map_world),
+        grid_(config.voxel, detail::anchor_of(map_world)),
+        groups_(grid_, map_world),
+        lookup_(config.point_radius, map_world) {}
+
+  void add(const LabelledScan& scan);      ///< first pass
+  void resolve(const LabelledScan& scan);  ///< second pass
+
+  /// Score relative to the raw map of `raw`, which must have equal scans and settings.
+  VoxelScore voxel_score(const VoxelProtocol& raw);
+  const PointScore& point_score() const { return point_score_; }
+
+  /// Number of map points that are excluded because no measured point is near. If most map points
+  /// are excluded, the map is probably not in the world frame of the poses.
+  std::uint64_t foreign_points();
+
+ private:
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+
+  /// A map point in a mixed map voxel: measured points around it have more than one class.
+  struct Mixed {
+    double nearest = kFar;  // squared distance to the nearest measured point, m^2
+    Truth truth = Truth::kIgnored;
+  };
+
+  void count_point(Truth truth, bool is_kept);
+  void finish_first_pass();
+  void approach(const VoxelPoint& point, VoxelKey key);
+  Truth truth_of(std::size_t cell, std::size_t rank) const;
+  std::optional<VoxelPoint> voxel_point(std::size_t cell) const;
+
+  EvaluationConfig config_;
+  detail::RangeGate gate_;
+  detail::RangeGate point_gate_;
+  Span<const Eigen::Vector3d> map_;
+  detail::VoxelGrid grid_;
+  detail::CellGroups groups_;
+  detail::RadiusLookup lookup_;
+  PointScore point_score_;
+
+  VoxelHashTable<> measured_;  // voxels that contain measured points
+  std::vector<detail::TruthMask> measured_truths_;
+
+  bool finished_first_pass_ = false;
+  std::vector<detail::TruthMask> truths_;  // by map voxel: classes of the measured points around it
+  VoxelHashTable<> near_mixed_;            // mixed map voxels and their neighbours
+  std::vector<Mixed> mixed_;               // by map point, in the order of groups_
+  std::vector<double> farthest_;           // by map voxel: largest Mixed::nearest
+};
+
+}  // namespace dynains::evaluation
