@@ -16,6 +16,7 @@
 #include "dynains/descriptors/occupancy_descriptor.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
+#include "dynains/pipeline/remover_pipeline.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -60,11 +61,6 @@ class ReentrancyGuard {
 
 namespace dynains {
 
-namespace detail {
-template <class Stages>
-class Pipeline;
-}  // namespace detail
-
 /// Types of the pipeline's stages. To replace a stage, derive from this struct and redefine its
 /// alias.
 struct DefaultStages {
@@ -90,22 +86,19 @@ class BasicDynaInsRemover {
   /// All parameters: RemoverConfig and the Config of each stage.
   using Config = PipelineConfig<Stages>;
 
-  BasicDynaInsRemover();
+  BasicDynaInsRemover() : BasicDynaInsRemover(Config()) {}
   /// Throws ConfigError.
   explicit BasicDynaInsRemover(const Config& config);
-  BasicDynaInsRemover(BasicDynaInsRemover&&) noexcept;
-  BasicDynaInsRemover& operator=(BasicDynaInsRemover&&) noexcept;
-  ~BasicDynaInsRemover();
 
-  const Config& config() const;
-  const Map& map() const;
+  const Config& config() const { return pipeline().config(); }
+  const Map& map() const { return pipeline().map(); }
 
   /// Number of scans between a push and the final verdict on its scan.
-  std::size_t latency() const;
+  std::size_t latency() const { return pipeline().latency(); }
 
   /// Model of the sensor, estimated from the first scan with enough points. Not known() before that
   /// scan, or if no parameter needs the estimate.
-  const SensorModel& sensor() const;
+  const SensorModel& sensor() const { return pipeline().sensor(); }
 
   /// Warm-up: pushes `example` (m, sensor frame) until verdicts are final, at most `scans` times,
   /// and forgets all scans. The memory stays, so that the first pushes of scans like it cause few
@@ -114,7 +107,8 @@ class BasicDynaInsRemover {
   template <class Cloud>
   void reserve_like(const Cloud& example,
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {
-    reserve_view(detail::CloudView(example), scans);
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    pipeline().reserve_like(detail::CloudView(example), scans);
   }
 
   /// Processes one scan.
@@ -124,23 +118,19 @@ class BasicDynaInsRemover {
   /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan, in a type that
   /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both are those of a body, such
   /// as base_link, if RemoverConfig::sensor_origin() is the position of the sensor in it; clouds of
-  /// several sensors are pushed one by one. `time`: s, greater than the time of the
-  /// previous scan.
+  /// several sensors are pushed one by one. `time`: s, greater than the time of the previous scan;
+  /// by default 0 for the first scan, else 0.1 s after the previous scan, or the next double if
+  /// 0.1 s is below the resolution.
   ///
   /// Throws PoseError, or the exceptions of PointCloudTraits such as CloudError; the state is then
   /// unchanged. If a stage throws (std::bad_alloc), the scan is discarded and the next scan starts
   /// a new epoch; evidence of the discarded scan on older scans may remain. If the finalization of
   /// an older scan throws, for example in the map, only the final verdict on that scan is lost.
   template <class Cloud, class PoseLike>
-  FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor, double time) {
-    return push_view(detail::CloudView(cloud), to_pose(T_world_sensor), time);
-  }
-
-  /// Pushes a scan with a default time: 0 s for the first scan, else 0.1 s after the previous scan,
-  /// or the next double if 0.1 s is below the resolution.
-  template <class Cloud, class PoseLike>
-  FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor) {
-    return push_view(detail::CloudView(cloud), to_pose(T_world_sensor), std::nullopt);
+  FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor,
+                   std::optional<double> time = std::nullopt) {
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    return pipeline().push(detail::CloudView(cloud), to_pose(T_world_sensor), time);
   }
 
   /// Makes the verdicts on all open scans final, oldest first, and calls `sink(const ScanVerdict&)`
@@ -148,30 +138,29 @@ class BasicDynaInsRemover {
   template <class Sink>
   void flush(Sink&& sink) {
     const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
-    while (const std::optional<ScanVerdict> verdict = finish_oldest()) sink(*verdict);
-    begin_epoch();
+    while (const std::optional<ScanVerdict> verdict = pipeline().finish_oldest()) sink(*verdict);
+    pipeline().start_epoch();
   }
 
   /// The next scan is not compared with the scans before it, as after a correction of the poses.
   void start_epoch() {
     const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
-    begin_epoch();
+    pipeline().start_epoch();
   }
 
   /// Restores the state after construction and clears the map; buffers keep their capacity.
-  void reset();
+  void reset() {
+    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    pipeline().reset();
+  }
 
  private:
-  using Pipeline = detail::Pipeline<Stages>;
+  detail::RemoverPipeline<Stages>& pipeline() const {
+    if (pipeline_ == nullptr) throw UsageError("this remover was moved from");
+    return *pipeline_;
+  }
 
-  Pipeline& pipeline() const;
-  FrameResult push_view(const detail::CloudView& cloud, const Pose& T_world_sensor,
-                        std::optional<double> time);
-  void reserve_view(const detail::CloudView& example, std::size_t scans);
-  std::optional<ScanVerdict> finish_oldest();
-  void begin_epoch();
-
-  std::unique_ptr<Pipeline> pipeline_;
+  std::unique_ptr<detail::RemoverPipeline<Stages>> pipeline_;
   detail::ReentrancyGuard reentrancy_guard_;
 };
 

@@ -20,6 +20,7 @@
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
 #include "dynains/pipeline/plausibility_check.hpp"
+#include "dynains/pipeline/remover_pipeline.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -98,10 +99,9 @@ void timed(double& milliseconds, Work&& work) {
   milliseconds += time.count();
 }
 
-/// Implementation of BasicDynaInsRemover, with the same calls and errors. Owns the stages and every
-/// buffer.
+/// Owns the stages and every buffer.
 template <class Stages>
-class Pipeline final : private NewestVerdictMaker {
+class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMaker {
  public:
   using Config = PipelineConfig<Stages>;
   using Ground = typename Stages::Ground;
@@ -138,15 +138,15 @@ class Pipeline final : private NewestVerdictMaker {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  const Config& config() const { return config_; }
-  const Map& map() const { return map_; }
-  std::size_t latency() const { return decision_->latency() + (finishes_later_ ? 1 : 0); }
-  const SensorModel& sensor() const { return frame_.sensor(); }
-  double next_time() const { return scans_.next_time(); }
+  const Config& config() const override { return config_; }
+  const Map& map() const override { return map_; }
+  std::size_t latency() const override { return decision_->latency() + (finishes_later_ ? 1 : 0); }
+  const SensorModel& sensor() const override { return frame_.sensor(); }
 
-  FrameResult push(const CloudView& cloud, const Pose& T_world_sensor, double time) {
+  FrameResult push(const CloudView& cloud, const Pose& T_world_sensor,
+                   std::optional<double> time) override {
     StageTimes times;
-    ScanSlot& newest = scans_.prepare(T_world_sensor, time, config_);
+    ScanSlot& newest = scans_.prepare(T_world_sensor, time.value_or(scans_.next_time()), config_);
     timed(times.ingest, [&] { ingest(cloud, newest); });
     PushTransaction transaction(scans_, newest);
     unwritten_ = nullptr;
@@ -194,17 +194,16 @@ class Pipeline final : private NewestVerdictMaker {
     return result;
   }
 
-  /// Makes the verdict on the oldest open scan final. Empty if no scan is open.
-  std::optional<ScanVerdict> finish_oldest() {
+  std::optional<ScanVerdict> finish_oldest() override {
     if (is_finished_known()) return take_finished();
     if (scans_.open() == 0) return std::nullopt;
     StageTimes times;
     return finish_oldest(times);
   }
 
-  void start_epoch() { scans_.start_epoch(); }
+  void start_epoch() override { scans_.start_epoch(); }
 
-  void reserve_like(const CloudView& example, std::size_t scans) {
+  void reserve_like(const CloudView& example, std::size_t scans) override {
     if (scans_.pushed() > 0) throw UsageError("memory is reserved before the first push");
     // Scans of the warm-up are not inserted into the map, which may be on disk.
     struct WarmUp {
@@ -217,12 +216,12 @@ class Pipeline final : private NewestVerdictMaker {
     const WarmUp warm_up{*this};
     build_map_ = false;
     for (std::size_t i = 0; i < std::min(scans, scans_.capacity() + 1); ++i) {
-      push(example, Pose::Identity(), next_time());
+      push(example, Pose::Identity(), std::nullopt);
       newest_verdict();
     }
   }
 
-  void reset() {
+  void reset() override {
     map_.clear();
     forget_scans();
   }
