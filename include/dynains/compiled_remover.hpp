@@ -62,7 +62,11 @@ class ReentrancyGuard {
 namespace dynains {
 
 /// Types of the pipeline's stages. To replace a stage, derive from this struct and redefine its
-/// alias.
+/// alias. A stage has a Config, with visit() and validate(), and a constructor that takes it; the
+/// members of the classes below that it needs are segment(); cluster() and cluster_count();
+/// describe(), describe_rest(), heights(), cluster_heights() and proposes_dynamic(); reset(),
+/// update(), posterior() and is_dynamic(); insert() and clear(). It may have needs_sensor() and
+/// adapt().
 struct DefaultStages {
   using Ground = GroundSegmenter;
   using Clusterer = CurvedVoxelClusterer;

@@ -1,4 +1,4 @@
-// Must not compile, with a one-line reason: cluster_count() is missing.
+// Must not compile, with a reason: cluster_count() is missing.
 #include <cstdint>
 
 #include "dynains/dyna_ins_remover.hpp"

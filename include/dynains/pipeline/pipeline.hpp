@@ -33,43 +33,6 @@
 
 namespace dynains::detail {
 
-// Required members of stages, for Offers.
-template <class Stage>
-using ConfigInterface =
-    std::void_t<typename Stage::Config, decltype(Stage(std::declval<typename Stage::Config>())),
-                decltype(std::declval<typename Stage::Config>().validate())>;
-template <class Stage>
-using GroundInterface = decltype(std::declval<Stage&>().segment(
-    PointsView(), Span<const std::uint32_t>(), std::declval<GroundSplit&>()));
-template <class Stage>
-using ClustererInterface = std::enable_if_t<
-    std::is_convertible_v<decltype(std::declval<Stage&>().cluster(PolarView())),
-                          Span<const std::uint32_t>> &&
-    std::is_convertible_v<decltype(std::declval<Stage&>().cluster_count()), std::size_t>>;
-template <class Stage>
-using DescriptorInterface =
-    std::void_t<decltype(std::declval<Stage&>().describe(std::declval<const ClusterView&>())),
-                decltype(std::declval<Stage&>().describe_rest()),
-                decltype(std::declval<Stage&>().heights(std::size_t{})),
-                decltype(std::declval<Stage&>().cluster_heights(std::size_t{})),
-                std::enable_if_t<std::is_convertible_v<
-                    decltype(std::declval<Stage&>().proposes_dynamic()), bool>>>;
-template <class Stage>
-using BeliefInterface = std::void_t<
-    decltype(std::declval<Stage&>().reset()),
-    decltype(std::declval<Stage&>().update(Span<const float>(), Span<const float>())),
-    std::enable_if_t<std::is_convertible_v<decltype(std::declval<Stage&>().posterior()), double> &&
-                     std::is_convertible_v<decltype(std::declval<Stage&>().is_dynamic()), bool>>>;
-template <class Stage>
-using MapInterface =
-    std::void_t<decltype(std::declval<Stage&>().insert(PointsView(), Span<const std::uint8_t>(),
-                                                       std::declval<const Pose&>())),
-                decltype(std::declval<Stage&>().clear())>;
-/// Whether a class is a stage with the members of `Interface`.
-template <class Stage, template <class> class Interface>
-inline constexpr bool kIsStage =
-    std::conjunction_v<Offers<ConfigInterface, Stage>, Offers<Interface, Stage>>;
-
 // Optional members of stages, for Offers.
 template <class Stage>
 using NeedsSensor = decltype(std::declval<const Stage&>().needs_sensor());
@@ -109,19 +72,6 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   using Descriptor = typename Stages::Descriptor;
   using Belief = typename Stages::Belief;
   using Map = typename Stages::Map;
-
-  static_assert(kIsStage<Ground, GroundInterface>,
-                "Stages::Ground needs Config and segment(PointsView, numbers, GroundSplit&)");
-  static_assert(kIsStage<Clusterer, ClustererInterface>,
-                "Stages::Clusterer needs Config, cluster(PolarView) and cluster_count()");
-  static_assert(kIsStage<Descriptor, DescriptorInterface>,
-                "Stages::Descriptor needs Config, describe(ClusterView), describe_rest(), "
-                "heights(k), cluster_heights(k) and proposes_dynamic()");
-  static_assert(kIsStage<Belief, BeliefInterface>,
-                "Stages::Belief needs Config, reset(), update(heights, heights), posterior() and "
-                "is_dynamic()");
-  static_assert(kIsStage<Map, MapInterface>,
-                "Stages::Map needs Config, insert(PointsView, flags, T_world_sensor) and clear()");
 
   explicit Pipeline(const Config& config)
       : config_(validated(config)),
