@@ -10,27 +10,6 @@ const CAUSE_COLOURS = [
   [0.85, 0.30, 0.85], [0.60, 0.35, 0.95], [0.35, 0.55, 0.90], [0.30, 0.80, 0.45],
   [0.98, 0.85, 0.35], [0.70, 0.95, 0.20], [0.20, 0.65, 0.60]];
 
-const CAUSE_SENTENCES = [
-  'kept or removed for an unknown cause',
-  'kept: it is ground',
-  'kept: the occupancy of its instance is alike in older and newer scans',
-  'kept: its instance was proposed as moving, but the belief or the votes of other windows revert this',
-  'kept: its cluster has too few points',
-  'kept: its cluster has no points in the oldest or newest scan',
-  'kept: it is out of range or belongs to no cluster, and is not judged',
-  'removed: the occupancy of its instance differs between older and newer scans',
-  'removed: beams of other scans passed through its position',
-  'removed: beams of other scans passed through a part of its instance',
-  'removed: it is ground below a removed instance',
-  'kept: other scans give no evidence about its position',
-  'removed: its instance moved in other scans',
-  'removed for now: earlier scans give no evidence about its position',
-  'kept: its position is occupied according to other scans',
-  'kept: too few beams of other scans passed through its position',
-  'removed: most points in its dynamic grid cell are dynamic',
-  'removed: scans of the whole recording saw its instance come or go',
-  'kept: scans of the whole recording show that it stands'];
-
 const LABELS = ['not judged', 'static', 'moving'];
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(' ')})`;
 
@@ -72,7 +51,7 @@ function factsOf(description, points, index) {
     ['label', LABELS[point.label]],
     ['belief', description.has_beliefs ? point.belief.toFixed(2)
       : 'not in the files (dynains run --write-beliefs)'],
-    ['cause', CAUSE_SENTENCES[point.cause] ?? CAUSE_SENTENCES[0]],
+    ['cause', description.causes[point.cause].name],
   ];
   if (description.has_truth) facts.push(['ground truth', errorOf(point)]);
   facts.push(['position', world.join(', ') + ' m']);
