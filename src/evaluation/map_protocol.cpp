@@ -16,8 +16,8 @@ void MapProtocol::add(const LabelledScan& scan) {
   detail::for_each_point(scan, lookup_.grid(), point_gate_,
                          [&](std::size_t i, const Eigen::Vector3d& p, VoxelKey key) {
                            const Truth truth = config_.truth(scan.truth[i]);
-                           if (truth != Truth::kIgnored)
-                             count_point(truth, lookup_.contains(p, key));
+                           if (truth == Truth::kIgnored) return;
+                           point_score_.add(truth, 1, lookup_.contains(p, key) ? 1 : 0);
                          });
   finished_first_pass_ = false;
 }
@@ -31,17 +31,17 @@ void MapProtocol::resolve(const LabelledScan& scan) {
                          });
 }
 
-VoxelScore MapProtocol::voxel_score(const VoxelProtocol& raw) {
+Score MapProtocol::voxel_score(const VoxelProtocol& raw) {
   finish_first_pass();
   std::vector<std::optional<VoxelPoint>> estimate(groups_.size());
   for (std::size_t cell = 0; cell < groups_.size(); ++cell) estimate[cell] = voxel_point(cell);
   const auto point_at = [&](std::uint32_t cell) { return estimate[cell]; };
-  VoxelScore score;
+  Score score;
   raw.for_each(kIdentity, [&](const VoxelPoint& point) {
     const VoxelKey key = grid_.key(point.p_world);
-    detail::count(score, point.truth,
-                  key != detail::kNoKey &&
-                      detail::is_preserved(point, key, grid_, groups_.index(), point_at));
+    const bool is_kept =
+        key != detail::kNoKey && detail::is_preserved(point, key, grid_, groups_.index(), point_at);
+    score.add(point.truth, 1, is_kept ? 1 : 0);
   });
   return score;
 }
@@ -53,16 +53,6 @@ std::uint64_t MapProtocol::foreign_points() {
     if (truths_[cell] == 0) foreign += groups_.points(cell).size();
   }
   return foreign;
-}
-
-void MapProtocol::count_point(Truth truth, bool is_kept) {
-  if (truth == Truth::kStatic) {
-    ++point_score_.static_total;
-    point_score_.static_kept += is_kept;
-  } else {
-    ++point_score_.dynamic_total;
-    point_score_.dynamic_removed += !is_kept;
-  }
 }
 
 // Collects the classes of measured points around each map voxel. One class decides the points of

@@ -49,8 +49,8 @@ class MapProtocol {
   void resolve(const LabelledScan& scan);  ///< second pass
 
   /// Score relative to the raw map of `raw`, which must have equal scans and settings.
-  VoxelScore voxel_score(const VoxelProtocol& raw);
-  const PointScore& point_score() const { return point_score_; }
+  Score voxel_score(const VoxelProtocol& raw);
+  const Score& point_score() const { return point_score_; }
 
   /// Number of map points that are excluded because no measured point is near. If most map points
   /// are excluded, the map is probably not in the world frame of the poses.
@@ -65,7 +65,6 @@ class MapProtocol {
     Truth truth = Truth::kIgnored;
   };
 
-  void count_point(Truth truth, bool is_kept);
   void finish_first_pass();
   void approach(const VoxelPoint& point, VoxelKey key);
   Truth truth_of(std::size_t cell, std::size_t rank) const;
@@ -78,7 +77,7 @@ class MapProtocol {
   detail::VoxelGrid grid_;
   detail::CellGroups groups_;
   detail::RadiusLookup lookup_;
-  PointScore point_score_;
+  Score point_score_;
 
   VoxelHashTable<> measured_;  // voxels that contain measured points
   std::vector<detail::TruthMask> measured_truths_;

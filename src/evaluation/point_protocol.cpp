@@ -15,8 +15,8 @@ bool is_person(std::uint16_t id) { return id >= 30 && id <= 32; }
 bool is_right(Truth truth, std::uint64_t points, std::uint64_t kept) {
   const auto all = static_cast<double>(points);
   return truth == Truth::kStatic
-             ? static_cast<double>(kept) >= ObjectScore::kKept * all
-             : static_cast<double>(points - kept) >= ObjectScore::kRemoved * all;
+             ? static_cast<double>(kept) >= ObjectLimits::kKept * all
+             : static_cast<double>(points - kept) >= ObjectLimits::kRemoved * all;
 }
 
 }  // namespace
@@ -65,7 +65,7 @@ std::vector<ClassScore> PointProtocol::by_class(std::size_t row) const {
     of_class.truth = truth;
     of_class.points += counts.points;
     of_class.points_kept += points_kept;
-    if (semantic_instance(label) == 0 || counts.points < ObjectScore::kMinPoints) continue;
+    if (semantic_instance(label) == 0 || counts.points < ObjectLimits::kMinPoints) continue;
     ++of_class.objects;
     of_class.right += is_right(truth, counts.points, points_kept);
   }
@@ -75,31 +75,18 @@ std::vector<ClassScore> PointProtocol::by_class(std::size_t row) const {
   return result;
 }
 
-PointScore PointProtocol::points(std::size_t row) const {
-  PointScore score;
-  for (const ClassScore& one : by_class(row)) {
-    if (one.truth == Truth::kDynamic) {
-      score.dynamic_total += one.points;
-      score.dynamic_removed += one.removed();
-    } else {
-      score.static_total += one.points;
-      score.static_kept += one.points_kept;
-    }
-  }
+Score PointProtocol::points(std::size_t row) const {
+  Score score;
+  for (const ClassScore& one : by_class(row)) score.add(one.truth, one.points, one.points_kept);
   return score;
 }
 
-ObjectScore PointProtocol::objects(std::size_t row) const {
-  ObjectScore score;
+Score PointProtocol::objects(std::size_t row) const {
+  Score score;
   for (const ClassScore& one : by_class(row)) {
-    if (is_ground_class(one.id)) continue;
-    if (one.truth == Truth::kDynamic) {
-      score.dynamic_total += one.objects;
-      score.dynamic_removed += one.right;
-    } else if (!is_person(one.id)) {
-      score.static_total += one.objects;
-      score.static_kept += one.right;
-    }
+    const bool is_static = one.truth == Truth::kStatic;
+    if (is_ground_class(one.id) || (is_static && is_person(one.id))) continue;
+    score.add(one.truth, one.objects, is_static ? one.right : one.objects - one.right);
   }
   return score;
 }

@@ -25,8 +25,8 @@ class PointProtocol {
   void add(const LabelledScan& scan);
 
   /// Scores of a Row.
-  PointScore points(std::size_t row) const;
-  ObjectScore objects(std::size_t row) const;
+  Score points(std::size_t row) const;
+  Score objects(std::size_t row) const;
   /// Static classes first, each ordered by id.
   std::vector<ClassScore> by_class(std::size_t row) const;
 

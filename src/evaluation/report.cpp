@@ -24,34 +24,50 @@ std::string range_text(double min, double max) {
 
 Json json_number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-Json to_json(const VoxelScore& score) {
-  return {{"pr", json_number(score.preservation_rate())},
-          {"rr", json_number(score.rejection_rate())},
-          {"f1", json_number(score.f1())},
-          {"static_total", score.static_total},
-          {"static_preserved", score.static_preserved},
-          {"dynamic_total", score.dynamic_total},
-          {"dynamic_preserved", score.dynamic_preserved}};
+/// A rate of a row, of its voxels or its points.
+struct Rate {
+  const char* name;
+  const char* title;
+  Score EvaluationRow::*score;
+  double (Score::*value)() const;
+  int decimals = 3;
+
+  double of(const EvaluationRow& row) const { return (row.*score.*value)(); }
+};
+constexpr Rate kRates[] = {{"pr", "PR %", &EvaluationRow::voxels, &Score::kept},
+                           {"rr", "RR %", &EvaluationRow::voxels, &Score::removed},
+                           {"f1", "F1", &EvaluationRow::voxels, &Score::f1, 4},
+                           {"sa", "SA %", &EvaluationRow::points, &Score::kept},
+                           {"da", "DA %", &EvaluationRow::points, &Score::removed},
+                           {"aa", "AA %", &EvaluationRow::points, &Score::associated},
+                           {"ha", "HA %", &EvaluationRow::points, &Score::harmonic}};
+
+/// The rates and the counts of the voxels or the points of a row.
+Json to_json(const EvaluationRow& row, Score EvaluationRow::*score) {
+  Json json;
+  for (const Rate& rate : kRates) {
+    if (rate.score == score) json[rate.name] = json_number(rate.of(row));
+  }
+  const Score& counts = row.*score;
+  const bool is_of_voxels = score == &EvaluationRow::voxels;
+  json["static_total"] = counts.static_total;
+  json[is_of_voxels ? "static_preserved" : "static_kept"] = counts.static_kept;
+  json["dynamic_total"] = counts.dynamic_total;
+  if (is_of_voxels) {
+    json["dynamic_preserved"] = counts.dynamic_total - counts.dynamic_removed;
+  } else {
+    json["dynamic_removed"] = counts.dynamic_removed;
+  }
+  return json;
 }
 
-Json to_json(const PointScore& score) {
-  return {{"sa", json_number(score.static_accuracy())},
-          {"da", json_number(score.dynamic_accuracy())},
-          {"aa", json_number(score.associated_accuracy())},
-          {"ha", json_number(score.harmonic_accuracy())},
-          {"static_total", score.static_total},
-          {"static_kept", score.static_kept},
-          {"dynamic_total", score.dynamic_total},
-          {"dynamic_removed", score.dynamic_removed}};
-}
-
-Json to_json(const ObjectScore& score) {
-  return {{"static_kept_percent", json_number(score.kept())},
-          {"dynamic_removed_percent", json_number(score.removed())},
-          {"static_total", score.static_total},
-          {"static_kept", score.static_kept},
-          {"dynamic_total", score.dynamic_total},
-          {"dynamic_removed", score.dynamic_removed}};
+Json to_json(const Score& objects) {
+  return {{"static_kept_percent", json_number(objects.kept())},
+          {"dynamic_removed_percent", json_number(objects.removed())},
+          {"static_total", objects.static_total},
+          {"static_kept", objects.static_kept},
+          {"dynamic_total", objects.dynamic_total},
+          {"dynamic_removed", objects.dynamic_removed}};
 }
 
 /// Without ground, which has no objects.
@@ -122,19 +138,19 @@ std::string to_table(const Evaluation& evaluation) {
        << "PR RR F1: voxels of " << format_number(config.voxel, 3) << " m, "
        << range_text(config.min_range, config.max_range)
        << "; SA DA AA HA, objects: " << range_text(config.min_range, config.point_max_range)
-       << "\nkept, left: instances of " << ObjectScore::kMinPoints
+       << "\nkept, left: instances of " << ObjectLimits::kMinPoints
        << " and more points; static ones that keep 90 % (people left out), moving ones that lose "
           "95 %\n";
-  TextTable table({"", "PR %", "RR %", "F1", "SA %", "DA %", "AA %", "HA %", "kept %", "left %"});
+  std::vector<std::string> titles = {""};
+  for (const Rate& rate : kRates) titles.emplace_back(rate.title);
+  titles.insert(titles.end(), {"kept %", "left %"});
+  TextTable table(titles);
   for (const EvaluationRow& row : evaluation.rows) {
-    table.add({row.name, format_number(row.voxels.preservation_rate(), 3),
-               format_number(row.voxels.rejection_rate(), 3), format_number(row.voxels.f1(), 4),
-               format_number(row.points.static_accuracy(), 3),
-               format_number(row.points.dynamic_accuracy(), 3),
-               format_number(row.points.associated_accuracy(), 3),
-               format_number(row.points.harmonic_accuracy(), 3),
-               row.objects ? format_number(row.objects->kept(), 1) : "-",
-               row.objects ? format_number(row.objects->removed(), 1) : "-"});
+    std::vector<std::string> cells = {row.name};
+    for (const Rate& rate : kRates) cells.push_back(format_number(rate.of(row), rate.decimals));
+    cells.push_back(row.objects ? format_number(row.objects->kept(), 1) : "-");
+    cells.push_back(row.objects ? format_number(row.objects->removed(), 1) : "-");
+    table.add(cells);
   }
   text << table.to_string();
   for (const EvaluationRow& row : evaluation.rows) {
@@ -181,8 +197,9 @@ std::string to_json(const Evaluation& evaluation) {
 
   Json rows = Json::array();
   for (const EvaluationRow& row : evaluation.rows) {
-    Json json = {
-        {"name", row.name}, {"voxels", to_json(row.voxels)}, {"points", to_json(row.points)}};
+    Json json = {{"name", row.name},
+                 {"voxels", to_json(row, &EvaluationRow::voxels)},
+                 {"points", to_json(row, &EvaluationRow::points)}};
     if (row.objects) json["objects"] = to_json(*row.objects);
     const std::vector<ClassScore> classes = classes_of_objects(row);
     if (!classes.empty()) json["object_classes"] = to_json(classes);
@@ -207,16 +224,12 @@ std::string to_csv(const Evaluation& evaluation) {
           "dynamic_objects_removed\n";
   for (const EvaluationRow& row : evaluation.rows) {
     text << csv_field(row.name);
-    for (const double value :
-         {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1(),
-          row.points.static_accuracy(), row.points.dynamic_accuracy(),
-          row.points.associated_accuracy(), row.points.harmonic_accuracy()}) {
-      text << ',' << format_number(value, 6, "");
-    }
+    for (const Rate& rate : kRates) text << ',' << format_number(rate.of(row), 6, "");
+    const Score& voxels = row.voxels;
     for (const std::uint64_t value :
-         {row.voxels.static_total, row.voxels.static_preserved, row.voxels.dynamic_total,
-          row.voxels.dynamic_preserved, row.points.static_total, row.points.static_kept,
-          row.points.dynamic_total, row.points.dynamic_removed}) {
+         {voxels.static_total, voxels.static_kept, voxels.dynamic_total,
+          voxels.dynamic_total - voxels.dynamic_removed, row.points.static_total,
+          row.points.static_kept, row.points.dynamic_total, row.points.dynamic_removed}) {
       text << ',' << value;
     }
     if (row.objects) {

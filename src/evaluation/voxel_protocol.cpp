@@ -57,18 +57,18 @@ void VoxelProtocol::resolve(const LabelledScan& scan) {
   voxelise(scan, is_forked, [this](const ScanVoxel& voxel) { compare(voxel); });
 }
 
-VoxelScore VoxelProtocol::score(std::size_t row) const {
-  VoxelScore score;
+Score VoxelProtocol::score(std::size_t row) const {
+  Score score;
   const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
   for (std::size_t number = 0; number < voxels_.size(); ++number) {
     const Voxel& voxel = voxels_[number];
     if (voxel.fork == kNoIndex) {  // the estimate has the same point
-      detail::count(score, voxel.shared.truth(), true);
+      score.add(voxel.shared.truth(), 1, 1);
       continue;
     }
     const VoxelPoint raw = *point(voxel, kIdentity);
-    detail::count(score, raw.truth,
-                  detail::is_preserved(raw, keys_[number], *grid_, index_, point_at));
+    const bool is_kept = detail::is_preserved(raw, keys_[number], *grid_, index_, point_at);
+    score.add(raw.truth, 1, is_kept ? 1 : 0);
   }
   return score;
 }

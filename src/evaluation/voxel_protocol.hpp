@@ -47,7 +47,7 @@ class VoxelProtocol {
   void resolve(const LabelledScan& scan);
 
   /// Score of a Row: kIdentity, kOracle, or kFirstEstimate + e.
-  VoxelScore score(std::size_t row) const;
+  Score score(std::size_t row) const;
 
   /// Calls `visit(VoxelPoint)` for each voxel point of the raw map (row kIdentity) or of the map of
   /// an estimate.

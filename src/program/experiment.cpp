@@ -214,8 +214,7 @@ void table1(const Table1Options& options) {
                 "published");
     }
     for (const EvaluationRow& row : result.rows) {
-      table.add({task.name, row.name},
-                {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1()},
+      table.add({task.name, row.name}, {row.voxels.kept(), row.voxels.removed(), row.voxels.f1()},
                 "measured");
     }
     json.push_back({{"sequence", task.name},
@@ -281,10 +280,9 @@ void sweep(const SweepOptions& options) {
   ResultTable table({name, "PR %", "RR %", "F1", "SA %", "DA %", "HA %"}, 1,
                     name + ",pr,rr,f1,sa,da,ha", options.csv);
   for (const EvaluationRow& row : measure(options, variants)) {
-    const evaluation::PointScore& points = row.points;
-    table.add({row.name},
-              {row.voxels.preservation_rate(), row.voxels.rejection_rate(), row.voxels.f1(),
-               points.static_accuracy(), points.dynamic_accuracy(), points.harmonic_accuracy()});
+    const evaluation::Score& points = row.points;
+    table.add({row.name}, {row.voxels.kept(), row.voxels.removed(), row.voxels.f1(), points.kept(),
+                           points.removed(), points.harmonic()});
   }
   table.write();
 }

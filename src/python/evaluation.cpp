@@ -94,13 +94,13 @@ JudgedScan make_scan(std::size_t index, const py::handle& points, const py::hand
 
 py::dict to_dict(const evaluation::EvaluationRow& row) {
   py::dict result;
-  result["PR"] = row.voxels.preservation_rate();
-  result["RR"] = row.voxels.rejection_rate();
+  result["PR"] = row.voxels.kept();
+  result["RR"] = row.voxels.removed();
   result["F1"] = row.voxels.f1();
-  result["SA"] = row.points.static_accuracy();
-  result["DA"] = row.points.dynamic_accuracy();
-  result["AA"] = row.points.associated_accuracy();
-  result["HA"] = row.points.harmonic_accuracy();
+  result["SA"] = row.points.kept();
+  result["DA"] = row.points.removed();
+  result["AA"] = row.points.associated();
+  result["HA"] = row.points.harmonic();
   if (row.objects) {
     result["kept"] = row.objects->kept();
     result["left"] = row.objects->removed();

@@ -91,8 +91,7 @@ using Scores = std::vector<double>;
 const std::vector<std::string> kScoreNames = {"F1", "SA", "DA", "objects"};
 
 Scores scores_of(const evaluation::EvaluationRow& row) {
-  return {100 * row.voxels.f1(), row.points.static_accuracy(), row.points.dynamic_accuracy(),
-          row.objects->kept()};
+  return {100 * row.voxels.f1(), row.points.kept(), row.points.removed(), row.objects->kept()};
 }
 
 void print_row(const std::string& name, const Scores& scores) {

@@ -66,26 +66,26 @@ TEST_CASE("exact poses: the check of poses changes no verdict") {
 }
 
 TEST_CASE("noise, a jump and a drift of poses cost little") {
-  const evaluation::VoxelScore exact = score(street(), judged(street()).final);
+  const evaluation::Score exact = score(street(), judged(street()).final);
   REQUIRE(exact.f1() > 0.95);
 
   const auto scored = [](const std::vector<SimulatedScan>& scans) {
     return score(street(), judged(scans).final);
   };
   CHECK(scored(with_noise(0.03, 0.1)).f1() == Approx(exact.f1()).margin(0.006));
-  const evaluation::VoxelScore noisy = scored(with_noise(0.1, 0.3));
-  CHECK(noisy.preservation_rate() >= 98.5);
+  const evaluation::Score noisy = scored(with_noise(0.1, 0.3));
+  CHECK(noisy.kept() >= 98.5);
   CHECK(noisy.f1() >= 0.93);
 
-  const evaluation::VoxelScore jump = scored(with_poses([](std::size_t i, Eigen::Isometry3d T) {
+  const evaluation::Score jump = scored(with_poses([](std::size_t i, Eigen::Isometry3d T) {
     if (i >= street().size() / 2) T.translation() += Eigen::Vector3d(0.3, 0.4, 0.0);
     return T;
   }));
-  CHECK(jump.preservation_rate() >= 98.0);
+  CHECK(jump.kept() >= 98.0);
   CHECK(jump.f1() == Approx(exact.f1()).margin(0.006));
 
   const Eigen::Vector3d first = street().front().T_world_sensor.translation();
-  const evaluation::VoxelScore drift = scored(with_poses([&](std::size_t, Eigen::Isometry3d T) {
+  const evaluation::Score drift = scored(with_poses([&](std::size_t, Eigen::Isometry3d T) {
     const double path = (T.translation() - first).norm();
     T.translation() += 0.01 * path * Eigen::Vector3d(0.8, 0.6, 0.1);
     return T;

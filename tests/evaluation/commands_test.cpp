@@ -400,8 +400,8 @@ TEST_CASE("Variants label every point once, each with its own configuration") {
       evaluate_variants(sequence, variants, Answer::kFinal, {}, nullptr);
   REQUIRE(result.rows.size() == 4);
   // Moving a box by 1 m per scan before an empty background is an easy case.
-  CHECK(result.rows[2].points.static_accuracy() > 95);
-  CHECK(result.rows[2].points.dynamic_accuracy() > 60);
+  CHECK(result.rows[2].points.kept() > 95);
+  CHECK(result.rows[2].points.removed() > 60);
 }
 
 TEST_CASE("The experiments run on any labelled sequence") {

@@ -39,18 +39,18 @@ std::vector<OwnedScan> street() {
 TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic points") {
   PointProtocol protocol(EvaluationConfig(), 1);
   for (const OwnedScan& scan : street()) protocol.add(scan.view());
-  const PointScore score = protocol.points(kFirstEstimate);
+  const Score score = protocol.points(kFirstEstimate);
   CHECK(score.static_total == 30);
   CHECK(score.static_kept == 25);
   CHECK(score.dynamic_total == 12);
   CHECK(score.dynamic_removed == 8);
-  CHECK(score.static_accuracy() == Approx(83.3333333));
-  CHECK(score.dynamic_accuracy() == Approx(66.6666667));
-  CHECK(score.associated_accuracy() == Approx(74.5355992));  // sqrt(83.33 * 66.67)
-  CHECK(score.harmonic_accuracy() == Approx(74.0740741));    // 2 * 83.33 * 66.67 / 150
-  CHECK(protocol.points(kIdentity).static_accuracy() == 100.0);
-  CHECK(protocol.points(kIdentity).dynamic_accuracy() == 0.0);
-  CHECK(protocol.points(kOracle).harmonic_accuracy() == 100.0);
+  CHECK(score.kept() == Approx(83.3333333));
+  CHECK(score.removed() == Approx(66.6666667));
+  CHECK(score.associated() == Approx(74.5355992));  // sqrt(83.33 * 66.67)
+  CHECK(score.harmonic() == Approx(74.0740741));    // 2 * 83.33 * 66.67 / 150
+  CHECK(protocol.points(kIdentity).kept() == 100.0);
+  CHECK(protocol.points(kIdentity).removed() == 0.0);
+  CHECK(protocol.points(kOracle).harmonic() == 100.0);
 }
 
 TEST_CASE("Every evaluation carries identity and oracle") {
@@ -60,15 +60,15 @@ TEST_CASE("Every evaluation carries identity and oracle") {
   CHECK(result.scans == 3);
   CHECK(result.points == 42);
   CHECK(result.rows[0].name == "identity");
-  CHECK(result.rows[0].voxels.preservation_rate() == 100.0);
-  CHECK(result.rows[0].voxels.rejection_rate() == 0.0);
+  CHECK(result.rows[0].voxels.kept() == 100.0);
+  CHECK(result.rows[0].voxels.removed() == 0.0);
   CHECK(result.rows[1].name == "oracle");
   CHECK(result.rows[1].voxels.f1() == 1.0);
-  CHECK(result.rows[1].points.harmonic_accuracy() == 100.0);
+  CHECK(result.rows[1].points.harmonic() == 100.0);
   // The road's voxels contain points of other scans. The four voxels of the car in scan 1 are kept.
-  CHECK(result.rows[2].voxels.preservation_rate() == 100.0);
+  CHECK(result.rows[2].voxels.kept() == 100.0);
   CHECK(result.rows[2].voxels.dynamic_total == 12);
-  CHECK(result.rows[2].voxels.dynamic_preserved == 4);
+  CHECK(result.rows[2].voxels.dynamic_total - result.rows[2].voxels.dynamic_removed == 4);
 }
 
 TEST_CASE("A map of the kept points gets the score of the labels if voxels do not mix classes") {
@@ -81,10 +81,10 @@ TEST_CASE("A map of the kept points gets the score of the labels if voxels do no
   }
   const Evaluation result = evaluate(source_of(scans), {"run"}, {{"map.ply", map}});
   REQUIRE(result.rows.size() == 4);
-  CHECK(result.rows[3].voxels.preservation_rate() == result.rows[2].voxels.preservation_rate());
-  CHECK(result.rows[3].voxels.rejection_rate() == result.rows[2].voxels.rejection_rate());
+  CHECK(result.rows[3].voxels.kept() == result.rows[2].voxels.kept());
+  CHECK(result.rows[3].voxels.removed() == result.rows[2].voxels.removed());
   // Point-wise, the map covers the road that scan 2 lost.
-  CHECK(result.rows[3].points.static_accuracy() == 100.0);
+  CHECK(result.rows[3].points.kept() == 100.0);
   CHECK(*result.rows[3].foreign_points == 0);
 }
 
@@ -123,7 +123,7 @@ TEST_CASE("All reports have equal numbers") {
   const auto json = nlohmann::json::parse(to_json(result));
   CHECK(json["rows"].size() == 3);
   CHECK(json["rows"][2]["name"] == "my \"run\"");
-  CHECK(json["rows"][2]["voxels"]["rr"].get<double>() == result.rows[2].voxels.rejection_rate());
+  CHECK(json["rows"][2]["voxels"]["rr"].get<double>() == result.rows[2].voxels.removed());
   CHECK(json["settings"]["voxel"] == 0.2);
   CHECK(json["settings"]["unlabeled"] == "ignore");
   CHECK(json["errors"]["by_class"].size() == 2);

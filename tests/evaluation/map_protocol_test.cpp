@@ -11,8 +11,8 @@ namespace dynains::evaluation::testing {
 namespace {
 
 struct Result {
-  VoxelScore voxels;
-  PointScore points;
+  Score voxels;
+  Score points;
   std::uint64_t foreign;
 };
 
@@ -44,7 +44,7 @@ TEST_CASE("Map points far from all measured points are left out and counted") {
   const std::vector<Eigen::Vector3d> map = {{0.5, 0.5, 0.5}, {9, 9, 9}, {1e30, 0, 0}, {0, kNan, 0}};
   const Result result = run({scan}, map, map_settings(1.0, 0.05));
   CHECK(result.foreign == 3);
-  CHECK(result.voxels.static_preserved == 1);
+  CHECK(result.voxels.static_kept == 1);
 }
 
 TEST_CASE("A measured point is in the map up to the radius, inclusive") {
@@ -55,14 +55,14 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   scan.add(12.5F, 0.5F, 0.5F, kMovingCar);
   const std::vector<Eigen::Vector3d> map = {
       {0.75, 0.5, 0.5}, {4.7578125, 0.5, 0.5}, {12.5, 0.5, 0.5}};
-  const PointScore score = run({scan}, map, map_settings(1.0, 0.25)).points;
+  const Score score = run({scan}, map, map_settings(1.0, 0.25)).points;
   CHECK(score.static_total == 2);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_total == 2);
   CHECK(score.dynamic_removed == 1);
-  CHECK(score.static_accuracy() == Approx(50.0));
-  CHECK(score.associated_accuracy() == Approx(50.0));
-  CHECK(score.harmonic_accuracy() == Approx(50.0));
+  CHECK(score.kept() == Approx(50.0));
+  CHECK(score.associated() == Approx(50.0));
+  CHECK(score.harmonic() == Approx(50.0));
 }
 
 TEST_CASE("Map files get the score of the simple reference implementation", "[reference]") {
@@ -86,7 +86,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
     const Result result = run(scans, map, with);
 
     std::vector<VoxelPoint> measured;
-    PointScore points;
+    Score points;
     for (const OwnedScan& scan : scans) {
       for (std::size_t i = 0; i < scan.truth.size(); ++i) {
         const Eigen::Vector3d p = scan.view().point(i);

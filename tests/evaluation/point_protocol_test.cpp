@@ -38,7 +38,7 @@ TEST_CASE("A static object is kept with 90 % of its points, a moving one removed
   add_object(scan, label(kCar, 2), 100, 89);
   add_object(scan, label(kMovingCar, 3), 100, 5);
   add_object(scan, label(kMovingCar, 4), 100, 6);
-  const ObjectScore score = protocol_of(scan).objects(kFirst);
+  const Score score = protocol_of(scan).objects(kFirst);
   CHECK(score.static_total == 2);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_total == 2);
@@ -84,7 +84,7 @@ TEST_CASE("Objects that move at times are one object for each class") {
   OwnedScan scan;
   add_object(scan, label(kCar, 7), 100, 100);
   add_object(scan, label(kMovingCar, 7), 100, 0);
-  const ObjectScore score = protocol_of(scan).objects(kFirst);
+  const Score score = protocol_of(scan).objects(kFirst);
   CHECK(score.static_kept == 1);
   CHECK(score.dynamic_removed == 1);
 }

@@ -69,9 +69,9 @@ inline std::vector<VoxelPoint> reference_map(const std::vector<OwnedScan>& scans
   return voxelise(all, settings.voxel);
 }
 
-inline VoxelScore reference_score(const std::vector<VoxelPoint>& raw,
-                                  const std::vector<VoxelPoint>& estimate, double edge) {
-  VoxelScore score;
+inline Score reference_score(const std::vector<VoxelPoint>& raw,
+                             const std::vector<VoxelPoint>& estimate, double edge) {
+  Score score;
   for (const VoxelPoint& point : raw) {
     double nearest = std::numeric_limits<double>::infinity();
     Truth truth = Truth::kIgnored;
@@ -85,18 +85,18 @@ inline VoxelScore reference_score(const std::vector<VoxelPoint>& raw,
     const bool preserved = nearest < edge * std::sqrt(3.0) / 2 && truth == point.truth;
     if (point.truth == Truth::kStatic) {
       ++score.static_total;
-      score.static_preserved += preserved;
+      score.static_kept += preserved;
     } else {
       ++score.dynamic_total;
-      score.dynamic_preserved += preserved;
+      score.dynamic_removed += !preserved;
     }
   }
   return score;
 }
 
-inline bool same(const VoxelScore& a, const VoxelScore& b) {
-  return a.static_total == b.static_total && a.static_preserved == b.static_preserved &&
-         a.dynamic_total == b.dynamic_total && a.dynamic_preserved == b.dynamic_preserved;
+inline bool same(const Score& a, const Score& b) {
+  return a.static_total == b.static_total && a.static_kept == b.static_kept &&
+         a.dynamic_total == b.dynamic_total && a.dynamic_removed == b.dynamic_removed;
 }
 
 }  // namespace dynains::evaluation::testing

@@ -21,15 +21,15 @@ void check_identity_and_oracle(const std::string& name) {
         [&](std::size_t i, evaluation::LabelledScan& scan) { return sequence.read(i, scan); }, {},
         {}, config);
     const evaluation::EvaluationRow& identity = result.rows[0];
-    CHECK(identity.voxels.preservation_rate() == 100.0);
-    CHECK(identity.voxels.rejection_rate() == 0.0);
+    CHECK(identity.voxels.kept() == 100.0);
+    CHECK(identity.voxels.removed() == 0.0);
     CHECK(identity.voxels.dynamic_total > 1000);
     // If points of both classes share a voxel, the oracle moves the centroid of that voxel. By the
     // protocol, it can then lose a few static voxels.
     const evaluation::EvaluationRow& oracle = result.rows[1];
-    CHECK(oracle.voxels.preservation_rate() > 99.99);
-    CHECK(oracle.voxels.rejection_rate() == 100.0);
-    CHECK(oracle.points.harmonic_accuracy() == 100.0);
+    CHECK(oracle.voxels.kept() > 99.99);
+    CHECK(oracle.voxels.removed() == 100.0);
+    CHECK(oracle.points.harmonic() == 100.0);
   }
 }
 

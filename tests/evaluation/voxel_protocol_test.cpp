@@ -23,7 +23,7 @@ VoxelProtocol run(const std::vector<OwnedScan>& scans, const EvaluationConfig& w
   return protocol;
 }
 
-VoxelScore estimate_score(const std::vector<OwnedScan>& scans, double voxel = 1.0) {
+Score estimate_score(const std::vector<OwnedScan>& scans, double voxel = 1.0) {
   return run(scans, settings(voxel), 1).score(kFirstEstimate);
 }
 
@@ -45,11 +45,11 @@ TEST_CASE("PR and RR count voxel points of the raw map") {
   scan.add(6.5F, 0.5F, 0.5F, kRoad, 0);
   scan.add(8.5F, 0.5F, 0.5F, kMovingCar, 0);
   scan.add(10.5F, 0.5F, 0.5F, kMovingCar, 1);
-  const VoxelScore score = estimate_score({scan});
+  const Score score = estimate_score({scan});
   CHECK(score.static_total == 4);
   CHECK(score.dynamic_total == 2);
-  CHECK(score.preservation_rate() == Approx(75.0));
-  CHECK(score.rejection_rate() == Approx(50.0));
+  CHECK(score.kept() == Approx(75.0));
+  CHECK(score.removed() == Approx(50.0));
   CHECK(score.f1() == Approx(0.6));  // 2 * 75 * 50 / 125
 }
 
@@ -59,7 +59,7 @@ TEST_CASE("The radius is sqrt(3) / 2 of an edge, exclusive") {
     OwnedScan scan;
     scan.add(0.25F, 0.5F, 0.5F, kRoad, 0);
     scan.add(kept, 0.5F, 0.5F, kRoad, 1);
-    return estimate_score({scan}).static_preserved;
+    return estimate_score({scan}).static_kept;
   };
   CHECK(preserved(1.115F) == 2);  // 0.865 apart
   CHECK(preserved(1.117F) == 1);  // 0.867 apart
@@ -94,28 +94,28 @@ TEST_CASE("Streaming gives the score of the simple reference implementation", "[
         CHECK(same(protocol.score(row), reference_score(raw, estimate, with.voxel)));
       }
       // The scene is hard enough to detect a wrong rule.
-      const VoxelScore score = protocol.score(kFirstEstimate);
-      CHECK(score.preservation_rate() < 95);
-      CHECK(score.rejection_rate() < 95);
+      const Score score = protocol.score(kFirstEstimate);
+      CHECK(score.kept() < 95);
+      CHECK(score.removed() < 95);
     }
   }
 }
 
 TEST_CASE("Coordinates far from the origin do not change the score") {
   auto scans = mixed_scans(11, 4, 600);
-  const VoxelScore here = run(scans, settings(0.25), 2).score(2);
+  const Score here = run(scans, settings(0.25), 2).score(2);
   // Multiples of the edge that are exact in binary, so that the same points share voxels.
   for (OwnedScan& scan : scans) {
     scan.T_world_sensor.pretranslate(Eigen::Vector3d(500000.0, 5400000.0, 256.0));
   }
-  const VoxelScore there = run(scans, settings(0.25), 2).score(2);
+  const Score there = run(scans, settings(0.25), 2).score(2);
   CHECK(here.static_total == there.static_total);
   CHECK(same(here, there));
 }
 
 TEST_CASE("Shares of zero points are not numbers") {
   const VoxelProtocol nothing = run({}, settings(0.2), 1);
-  CHECK(std::isnan(nothing.score(0).preservation_rate()));
+  CHECK(std::isnan(nothing.score(0).kept()));
   CHECK(std::isnan(nothing.score(0).f1()));
 
   OwnedScan bad;

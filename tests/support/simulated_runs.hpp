@@ -74,8 +74,8 @@ inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedSc
 }
 
 /// PR, RR and F1 of ERASOR.
-inline evaluation::VoxelScore score(const std::vector<simulation::SimulatedScan>& scans,
-                                    const StaticPoints& in_map) {
+inline evaluation::Score score(const std::vector<simulation::SimulatedScan>& scans,
+                               const StaticPoints& in_map) {
   return evaluate(scans, in_map, {"run"}).rows[2].voxels;
 }
 

@@ -18,54 +18,37 @@ inline double percent(std::uint64_t part, std::uint64_t whole) {
 /// Harmonic mean; 0 if both are 0, NaN if one is NaN.
 inline double harmonic_mean(double a, double b) { return a + b == 0 ? 0 : 2 * a * b / (a + b); }
 
-/// ERASOR's protocol (Lim et al., RA-L 2021): numbers of voxel points of the raw map, and of those
-/// that are preserved in the map of the estimate.
-struct VoxelScore {
-  std::uint64_t static_total = 0;
-  std::uint64_t static_preserved = 0;
-  std::uint64_t dynamic_total = 0;
-  std::uint64_t dynamic_preserved = 0;
-
-  double preservation_rate() const { return percent(static_preserved, static_total); }  ///< PR, %
-  double rejection_rate() const {                                                       ///< RR, %
-    return percent(dynamic_total - dynamic_preserved, dynamic_total);
-  }
-  /// F1, in [0, 1]; NaN without static or without dynamic points.
-  double f1() const { return harmonic_mean(preservation_rate(), rejection_rate()) / 100; }
-};
-
-/// KTH's protocol (Zhang et al., ITSC 2023): numbers of measured points, and of correctly
-/// classified ones.
-struct PointScore {
+/// Numbers of things that stand and of things that move, and of right verdicts on them.
+struct Score {
   std::uint64_t static_total = 0;
   std::uint64_t static_kept = 0;
   std::uint64_t dynamic_total = 0;
   std::uint64_t dynamic_removed = 0;
 
-  double static_accuracy() const { return percent(static_kept, static_total); }        ///< SA, %
-  double dynamic_accuracy() const { return percent(dynamic_removed, dynamic_total); }  ///< DA, %
-  double associated_accuracy() const {                                                 ///< AA, %
-    return std::sqrt(static_accuracy() * dynamic_accuracy());
+  void add(Truth truth, std::uint64_t total, std::uint64_t kept) {
+    if (truth == Truth::kDynamic) {
+      dynamic_total += total;
+      dynamic_removed += total - kept;
+    } else {
+      static_total += total;
+      static_kept += kept;
+    }
   }
-  double harmonic_accuracy() const {  ///< HA, %
-    return harmonic_mean(static_accuracy(), dynamic_accuracy());
-  }
+
+  double kept() const { return percent(static_kept, static_total); }          ///< PR or SA, %
+  double removed() const { return percent(dynamic_removed, dynamic_total); }  ///< RR or DA, %
+  /// F1, in [0, 1]; NaN if nothing stands or nothing moves.
+  double f1() const { return harmonic() / 100; }
+  double associated() const { return std::sqrt(kept() * removed()); }   ///< AA, %
+  double harmonic() const { return harmonic_mean(kept(), removed()); }  ///< HA, %
 };
 
-/// Numbers of objects of one estimate. An object is all points of the recording with one label:
-/// class, but for ground, and instance id, which is not 0.
-struct ObjectScore {
+/// An object is all points of the recording with one label: class, but for ground, and instance id,
+/// which is not 0.
+struct ObjectLimits {
   static constexpr std::uint64_t kMinPoints = 50;  ///< of an object that is judged
-  static constexpr double kKept = 0.90;
-  static constexpr double kRemoved = 0.95;
-
-  std::uint64_t static_total = 0;  ///< without people
-  std::uint64_t static_kept = 0;   ///< that keep at least a share of kKept of their points
-  std::uint64_t dynamic_total = 0;
-  std::uint64_t dynamic_removed = 0;  ///< that lose at least a share of kRemoved
-
-  double kept() const { return percent(static_kept, static_total); }          ///< %
-  double removed() const { return percent(dynamic_removed, dynamic_total); }  ///< %
+  static constexpr double kKept = 0.90;            ///< least share of points of one that is kept
+  static constexpr double kRemoved = 0.95;         ///< of one that is removed
 };
 
 /// Objects and points of one class. Objects with few points count by points only.
@@ -73,7 +56,7 @@ struct ClassScore {
   std::uint16_t id = 0;  ///< SemanticKITTI class
   Truth truth = Truth::kStatic;
   std::uint64_t objects = 0;  ///< with enough points
-  std::uint64_t right = 0;    ///< objects that are kept or removed as in ObjectScore
+  std::uint64_t right = 0;    ///< objects that are kept or removed as of ObjectLimits
   std::uint64_t points = 0;
   std::uint64_t points_kept = 0;
 

@@ -87,15 +87,5 @@ bool is_preserved(const VoxelPoint& raw, VoxelKey key, const VoxelGrid& grid,
   return same;
 }
 
-inline void count(VoxelScore& score, Truth truth, bool preserved) {
-  if (truth == Truth::kStatic) {
-    ++score.static_total;
-    score.static_preserved += preserved;
-  } else {
-    ++score.dynamic_total;
-    score.dynamic_preserved += preserved;
-  }
-}
-
 }  // namespace detail
 }  // namespace dynains::evaluation

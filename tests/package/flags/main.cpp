@@ -170,10 +170,10 @@ void score(const std::vector<std::unique_ptr<Scan>>& scans,
   Checksum sum;
   const std::vector<Eigen::Vector3d> points = {{1.0, 2.0, 0.5}, {3.0, 4.0, 0.25}};
   for (const auto& row : dynains::evaluation::evaluate(source, {"run"}, {{"map", points}}).rows) {
-    sum.add(row.voxels.preservation_rate());
-    sum.add(row.voxels.rejection_rate());
-    sum.add(row.points.static_accuracy());
-    sum.add(row.points.dynamic_accuracy());
+    sum.add(row.voxels.kept());
+    sum.add(row.voxels.removed());
+    sum.add(row.points.kept());
+    sum.add(row.points.removed());
   }
   sum.print("evaluation");
 }
