@@ -12,18 +12,15 @@
 namespace dynains {
 namespace {
 
-constexpr float kBelief = 0.95F;      // of points that the second pass removes
-constexpr double kPlaceShare = 0.75;  // of the memory; the rest is for the ground
-
-std::size_t bytes_of(double megabytes) { return static_cast<std::size_t>(1e6 * megabytes); }
+constexpr float kBelief = 0.95F;  // of points that the second pass removes
 
 }  // namespace
 
 Visit::Visit(ByteStore& store, const SecondPassConfig& config)
     : config_(config),
       store_(store),
-      places_(store, bytes_of(kPlaceShare * config.memory)),
-      ground_(store, bytes_of((1.0 - kPlaceShare) * config.memory)),
+      places_(store, config.memory),
+      ground_(store, config.memory),
       references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
 
 // Axes of the places: which way is up is told by the ground of the first scan, not by the world.
@@ -60,7 +57,7 @@ bool Visit::test(const std::function<bool()>& keep_going) {
   std::array<detail::Visibility, 2> visibility;
   RecordingReference reference, next;
   Background reader;
-  Background* const other = config_.threads > 1 ? &reader : nullptr;
+  Background* const other = config_.has_second_thread ? &reader : nullptr;
   if (!kept_.empty()) read(kept_.front(), next);
   for (std::size_t i = 0; i < kept_.size(); ++i) {
     if (!keep_going()) return false;

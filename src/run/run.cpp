@@ -195,7 +195,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
     SecondPassConfig config;
     config.static_policy = plan.settings.static_policy;
     config.evidence = plan.settings.config.evidence;
-    config.threads = outputs.one_thread ? 1 : 2;
+    config.has_second_thread = !outputs.one_thread;
     results.wait_for(second_pass.emplace(store, config));
   } else {
     results.watch(returns);

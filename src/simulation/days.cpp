@@ -18,14 +18,13 @@ enum class ChangeKind { kContainer, kFence, kTree };
 /// Something that stands on the pavement from one day to another.
 struct Change {
   ChangeKind kind;
-  int first_day, last_day;
+  int first_day;
+  int last_day = std::numeric_limits<int>::max();
 };
 
-constexpr int kAlways = std::numeric_limits<int>::max();
 constexpr Change kChanges[] = {
-    {ChangeKind::kContainer, 2, 3}, {ChangeKind::kFence, 3, kAlways},
-    {ChangeKind::kTree, 1, 1},      {ChangeKind::kContainer, 3, kAlways},
-    {ChangeKind::kFence, 1, 2},     {ChangeKind::kTree, 1, 3},
+    {ChangeKind::kContainer, 2, 3}, {ChangeKind::kFence, 3},    {ChangeKind::kTree, 1, 1},
+    {ChangeKind::kContainer, 3},    {ChangeKind::kFence, 1, 2}, {ChangeKind::kTree, 1, 3},
 };
 
 /// Class, size and shape of a change.

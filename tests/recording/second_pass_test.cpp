@@ -316,11 +316,11 @@ TEST_CASE("neither memory nor threads change the second pass") {
   Recorded recording = with_parked_car();
   const Counts counts = sum(count(recording, kCar));
   CHECK(counts.removed > 0);
-  for (const double memory : {0.0, 160.0}) {
-    for (const int threads : {1, 2}) {
+  for (const std::size_t memory : {std::size_t{0}, SecondPassConfig().memory}) {
+    for (const bool has_second_thread : {false, true}) {
       SecondPassConfig config = short_first_pass();
       config.memory = memory;
-      config.threads = threads;
+      config.has_second_thread = has_second_thread;
       const Counts others = sum(count(recording, kCar, true, removes_nothing, config));
       CHECK(others.removed == counts.removed);
       CHECK(others.kept == counts.kept);
@@ -352,6 +352,6 @@ TEST_CASE("the second pass refuses scans out of order and verdicts of another si
   VerdictArrays whole = arrays;
   CHECK_FALSE(pass.revise(scan.points, 0, whole));
   SecondPassConfig config;
-  config.threads = 3;
+  config.evidence.margin = -1.0;
   CHECK_THROWS_AS(SecondPass(store, config), ConfigError);
 }

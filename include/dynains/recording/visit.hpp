@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
-#include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
@@ -24,25 +23,12 @@ namespace dynains {
 
 struct SecondPassConfig {
   StaticPolicy static_policy = StaticPolicy::kAlways;
-  double memory = 160;  ///< MB
-  int threads = 1;
+  /// Bytes of places, and of ground, in memory, if those around the sensor take less.
+  std::size_t memory = std::size_t{80} << 20U;
+  bool has_second_thread = false;  ///< which tests places, too
   /// Of the first pass: the margins hold for the second one, too, and so does what the first one
   /// has compared.
   FreeSpaceConfig evidence;
-
-  template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"memory", self.memory, closed(0, 1e6), "MB",
-                      "places and ground in memory, if those around the sensor take less"});
-    visitor(Parameter{"threads", self.threads, closed(1, 2), "",
-                      "2: a second thread tests places, too"});
-  }
-
-  /// Throws ConfigError.
-  void validate() const {
-    validate_parameters("SecondPass", *this);
-    evidence.validate();
-  }
 };
 
 /// Numbers of points that left, and that came back.
