@@ -49,8 +49,8 @@ Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec
 }
 
 Primitive make_tapered_box(const Material& material, Vec3 centre, Vec3 half, float taper_x,
-                           float taper_y, const Mat3& rotation) {
-  Primitive result = make_primitive(Shape::kBox, material, centre, half, rotation);
+                           float taper_y) {
+  Primitive result = make_primitive(Shape::kBox, material, centre, half);
   result.taper_x = taper_x / half.x;
   result.taper_y = taper_y / half.y;
   return result;

@@ -38,7 +38,7 @@ struct Primitive {
 Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec3 half,
                          const Mat3& rotation = {});
 Primitive make_tapered_box(const Material& material, Vec3 centre, Vec3 half, float taper_x,
-                           float taper_y, const Mat3& rotation = {});
+                           float taper_y);
 
 /// The primitive in another frame.
 Primitive transformed(const Rigid& T_target_source, const Primitive& source);

@@ -220,18 +220,18 @@ double Traffic::wanted_acceleration(const Driver& driver) const {
       if (to_end < 0.1) return -v / 0.1;
     }
   }
+  constexpr double comfort = 1.5;  // m/s^2
   // Intelligent driver model: Treiber, Hennecke, Helbing, "Congested traffic states", 2000.
   const double ratio = v / cruise;
-  double acceleration = driver.comfort * (1 - ratio * ratio * ratio * ratio);
+  double acceleration = comfort * (1 - ratio * ratio * ratio * ratio);
   if (blocked) {
     const double closing = v - speed_ahead;
     const double wanted =
-        driver.rest_gap +
-        std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(driver.comfort * 2.0)));
+        driver.rest_gap + std::max(0.0, 1.1 * v + v * closing / (2 * std::sqrt(comfort * 2.0)));
     const double share = wanted / std::max(gap, 0.1);
-    acceleration -= driver.comfort * share * share;
+    acceleration -= comfort * share * share;
   }
-  return std::clamp(acceleration, -7.0, driver.comfort);
+  return std::clamp(acceleration, -7.0, comfort);
 }
 
 Vec2 Traffic::wanted_velocity(Walker& walker) {
@@ -240,7 +240,7 @@ Vec2 Traffic::wanted_velocity(Walker& walker) {
     ++walker.goal;
     if (walker.goal == walker.goals.size()) {
       walker.goal = 0;
-      if (walker.there_and_back) std::reverse(walker.goals.begin(), walker.goals.end());
+      std::reverse(walker.goals.begin(), walker.goals.end());
     }
     to_goal = walker.goals[walker.goal] - walker.position;
   }

@@ -67,7 +67,6 @@ class Traffic {
     double s = 0;  ///< of the vehicle's middle
     double speed = 0;
     double cruise = 10;          ///< m/s
-    double comfort = 1.5;        ///< m/s^2
     bool stays_at_end = false;   ///< parks at the end of the route instead of leaving the world
     bool waits_for_gap = false;  ///< starts only if no vehicle comes from behind
     bool yields = false;         ///< gives way to vehicles that are about to cross
@@ -83,11 +82,10 @@ class Traffic {
     std::size_t object = 0;
     Vec2 position;
     double heading = 0;
-    std::vector<Vec2> goals;  ///< visited in order
-    bool there_and_back = true;
-    double pace = 1.3;  ///< m/s
-    double start = 0;   ///< s; stands still before
-    double stop = 1e9;  ///< s; stands still from then on
+    std::vector<Vec2> goals;  ///< visited in order, there and back
+    double pace = 1.3;        ///< m/s
+    double start = 0;         ///< s; stands still before
+    double stop = 1e9;        ///< s; stands still from then on
     Vec2 velocity;
     std::size_t goal = 0;
     double phase = 0;
@@ -106,9 +104,10 @@ class Traffic {
   /// New vehicles enter a lane at its start.
   struct Flow {
     std::size_t lane = 0;
-    double spacing = 40;                                           ///< m, about
-    double speed = 12;                                             ///< m/s, about
-    double trucks = 0.1, buses = 0.05, vans = 0.15, cyclists = 0;  ///< shares
+    double spacing = 40;                         ///< m, about
+    double speed = 12;                           ///< m/s, about
+    double trucks = 0, buses = 0, cyclists = 0;  ///< shares
+    double vans = 0.15;                          ///< share
     double next_gap = 0;
   };
 

@@ -227,14 +227,14 @@ void Builder::ego(std::size_t lane, double s, double usual_speed) {
   driver.schedule = {{middle - 0.5 * config_.halt, 0}, {middle + 0.5 * config_.halt, speed}};
 }
 
-void Builder::walker(std::vector<Vec2> goals, double pace, double start, double stop, Kind kind) {
+void Builder::walker(std::vector<Vec2> goals, double pace, double start, double stop) {
   Traffic& t = world_.traffic;
   // Nobody starts inside something.
   for (const Vec2 corner : {Vec2{0.5, 0}, Vec2{-0.5, 0}, Vec2{0, 0.5}, Vec2{0, -0.5}}) {
     if (!t.fixed.is_free({goals[0] + corner, 0, 0.1, 0.1}, 0)) return;
   }
   Traffic::Walker walker;
-  walker.object = t.add_object(kind);
+  walker.object = t.add_object(Kind::kPedestrian);
   walker.position = goals[0];
   const Vec2 towards = goals.size() > 1 ? goals[1] - goals[0] : Vec2{1, 0};
   walker.heading = std::atan2(towards.y, towards.x);

@@ -80,8 +80,7 @@ class Builder {
   void ego(std::size_t lane, double s, double usual_speed);
 
   /// A person who walks along `goals`, from `goals[0]`.
-  void walker(std::vector<Vec2> goals, double pace, double start = 0, double stop = 1e9,
-              Kind kind = Kind::kPedestrian);
+  void walker(std::vector<Vec2> goals, double pace, double start = 0, double stop = 1e9);
 
   /// People on the pavements of a street between arc lengths.
   void pavement_walkers(const Street& street, double from, double to, int number);

@@ -276,8 +276,8 @@ World parking_level(const Config& config, Random& random, bool roofed) {
   const double from = kAisle.start - 30, to = kAisle.start + drive + 60;
   const std::vector<Place> places = find_places(builder, random, street, roofed);
   fill_places(builder, random, street, places, occupied, from, to);
-  fill_lane(builder, forward, 45, kAisle.speed, 0, 0, 0);
-  fill_lane(builder, backward, 40, kAisle.speed, 0, 0, 0);
+  fill_lane(builder, {forward, 45, kAisle.speed});
+  fill_lane(builder, {backward, 40, kAisle.speed});
   add_walkers(builder, random, street, from, to);
   if (roofed) {
     roof_over(builder, random, street);

@@ -75,7 +75,7 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
     const std::vector<StopLine> lines{{middle - main.half_width - 3, i, 1}};
     for (const double lateral : {-kLaneHalf, kLaneHalf}) {
       const std::size_t lane = builder.lane(side, lateral, lines);
-      fill_lane(builder, lane, random.uniform(30, 60), speed * 0.8, 0.05, 0.05, 0.1);
+      fill_lane(builder, {lane, random.uniform(30, 60), speed * 0.8, 0.05, 0.05, 0.1});
     }
     add_turning_car(builder, side, crossings[i].main_s, i, speed);
   }
@@ -88,16 +88,9 @@ void make_robot(Traffic& traffic) {
   traffic.drivers[0].foresight = 0.2;
 }
 
-void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed, double trucks,
-               double buses, double cyclists) {
+void fill_lane(Builder& builder, Traffic::Flow flow) {
   if (!builder.lively()) return;
-  Traffic::Flow flow;
-  flow.lane = lane;
-  flow.spacing = spacing / std::max(builder.config().traffic, 1e-3);
-  flow.speed = speed;
-  flow.trucks = trucks;
-  flow.buses = buses;
-  flow.cyclists = cyclists;
+  flow.spacing /= std::max(builder.config().traffic, 1e-3);
   builder.traffic().fill(flow);
 }
 

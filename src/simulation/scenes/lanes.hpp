@@ -20,9 +20,8 @@ StreetLanes add_crossing_traffic(Builder& builder, const std::vector<Crossing>& 
 /// Makes the ego vehicle a robot, which keeps less distance than a car.
 void make_robot(Traffic& traffic);
 
-/// Vehicles all along a lane, `spacing` metres apart on average; shares of kinds.
-void fill_lane(Builder& builder, std::size_t lane, double spacing, double speed, double trucks,
-               double buses, double cyclists);
+/// Vehicles all along a lane, as many as the configuration asks for.
+void fill_lane(Builder& builder, Traffic::Flow flow);
 
 /// Cars that leave their places and cars that park, along the stretch that is driven.
 void add_parking_moves(Builder& builder, double from, double to, int number, double speed);

@@ -106,8 +106,8 @@ void add_vehicles(Builder& builder, Random& random, const StreetLanes& lanes, do
                cyclists = random.uniform(0, 0.25);
   const double spacing = random.uniform(20, 80), oncoming_spacing = random.uniform(14, 70);
   const double oncoming_speed = speed * random.uniform(0.6, 1.4);
-  fill_lane(builder, lanes.forward, spacing, speed, trucks, buses, cyclists);
-  fill_lane(builder, lanes.backward, oncoming_spacing, oncoming_speed, trucks, buses, cyclists);
+  fill_lane(builder, {lanes.forward, spacing, speed, trucks, buses, cyclists});
+  fill_lane(builder, {lanes.backward, oncoming_spacing, oncoming_speed, trucks, buses, cyclists});
 }
 
 }  // namespace

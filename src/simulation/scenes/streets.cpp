@@ -167,8 +167,8 @@ World urban(const Config& config, Random random) {
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
     if (half_width > 5) add_parking_moves(builder, kBefore - 20, end, builder.count(8), 7);
-    fill_lane(builder, lanes.forward, 38, speed, 0.08, 0.05, 0.06);
-    fill_lane(builder, lanes.backward, 30, speed, 0.08, 0.05, 0.06);
+    fill_lane(builder, {lanes.forward, 38, speed, 0.08, 0.05, 0.06});
+    fill_lane(builder, {lanes.backward, 30, speed, 0.08, 0.05, 0.06});
   }
   Frontage look;
   look.buildings = random.uniform(0.55, 0.95);
@@ -204,8 +204,8 @@ World hill(const Config& config, Random random) {
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
     if (street.half_width > 5) add_parking_moves(builder, kBefore - 20, end, builder.count(4), 7);
-    fill_lane(builder, lanes.forward, 40, speed, 0.1, 0.05, 0.05);
-    fill_lane(builder, lanes.backward, 32, speed, 0.1, 0.05, 0.05);
+    fill_lane(builder, {lanes.forward, 40, speed, 0.1, 0.05, 0.05});
+    fill_lane(builder, {lanes.backward, 32, speed, 0.1, 0.05, 0.05});
   }
   Frontage look;
   look.buildings = random.uniform(0.3, 0.65);
@@ -234,8 +234,8 @@ World vegetation(const Config& config, Random random) {
   const Street& street = builder.street(0);
   const std::size_t forward = builder.lane(street, -1.6), backward = builder.lane(street, 1.6);
   builder.ego(forward, kBefore, speed);
-  fill_lane(builder, forward, 75, speed, 0.05, 0, 0.15);
-  fill_lane(builder, backward, 60, 1.3 * speed, 0.05, 0, 0.2);
+  fill_lane(builder, {forward, 75, speed, 0.05, 0, 0.15});
+  fill_lane(builder, {backward, 60, 1.3 * speed, 0.05, 0, 0.2});
   const double trees = random.uniform(40, 80), bushes = random.uniform(50, 100);
   builder.plant(street, 4.4, 45, trees, bushes);
   for (const int side : {-1, 1}) {
@@ -285,8 +285,8 @@ World stop_and_go(const Config& config, Random random) {
       const double s = kBefore + random.uniform(-25, 80), start = random.uniform(1, 10);
       builder.leaving_car(street, s, side * 8.28, side * 5.2, start, 7);
     }
-    fill_lane(builder, back_inner, 25, speed, 0.08, 0.05, 0);
-    fill_lane(builder, back_outer, 22, 0.8 * speed, 0.08, 0.08, 0.05);
+    fill_lane(builder, {back_inner, 25, speed, 0.08, 0.05});
+    fill_lane(builder, {back_outer, 22, 0.8 * speed, 0.08, 0.08, 0.05});
   }
   Frontage look;
   look.buildings = random.uniform(0.6, 0.95);
@@ -310,8 +310,8 @@ World canopy(const Config& config, Random random) {
   const double end = kBefore + travel(config, speed) + 40;
   if (builder.lively()) {
     add_parking_moves(builder, kBefore - 20, end, builder.count(5), 6);
-    fill_lane(builder, lanes.forward, 30, speed, 0.1, 0.05, 0.06);
-    fill_lane(builder, lanes.backward, 24, 1.2 * speed, 0.1, 0.05, 0.06);
+    fill_lane(builder, {lanes.forward, 30, speed, 0.1, 0.05, 0.06});
+    fill_lane(builder, {lanes.backward, 24, 1.2 * speed, 0.1, 0.05, 0.06});
   }
   cover_street(builder, random, street);
   add_arcades(builder, random, street);
@@ -351,10 +351,10 @@ World highway(const Config& config, Random random) {
     const auto lead_kind = random.chance(0.3) ? Kind::kTruck : Kind::kCar;
     const std::size_t lead = traffic.add_object(lead_kind);
     traffic.add_driver(lead, ego_right ? right : left, kBefore + random.uniform(32, 48), cruise);
-    fill_lane(builder, right, 70, 0.93 * speed, 0.35, 0.05, 0);
-    fill_lane(builder, left, 65, 1.2 * speed, 0.02, 0.02, 0);
-    fill_lane(builder, far_left, 65, 1.2 * speed, 0.02, 0.02, 0);
-    fill_lane(builder, far_right, 60, 0.93 * speed, 0.35, 0.05, 0);
+    fill_lane(builder, {right, 70, 0.93 * speed, 0.35, 0.05});
+    fill_lane(builder, {left, 65, 1.2 * speed, 0.02, 0.02});
+    fill_lane(builder, {far_left, 65, 1.2 * speed, 0.02, 0.02});
+    fill_lane(builder, {far_right, 60, 0.93 * speed, 0.35, 0.05});
   }
   auto rail = [](Random&) { return guard_rail_model(8); };
   add_barrier(builder, street, 0, 8, rail);

@@ -257,7 +257,7 @@ World forest(const Config& config, Random random) {
   builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
   add_trees(builder, random, street);
   builder.plant(street, street.half_width + 0.3, 20, 0, random.uniform(60, 120));
-  if (builder.lively()) fill_lane(builder, builder.lane(street, 0.5), 35, 4, 0, 0, 1);
+  if (builder.lively()) fill_lane(builder, {builder.lane(street, 0.5), 35, 4, 0, 0, 1});
   add_people(builder, random, street, start - 40, start + drive + 50);
   return builder.finish();
 }
