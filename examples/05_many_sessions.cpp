@@ -51,8 +51,7 @@ void add_session(dynains::City& city, const char* name, double begin, bool has_b
   dynains::SessionInfo session;
   session.name = name;
   session.begin = begin;
-  dynains::ByteStore store;
-  dynains::SessionWriter writer(city, session, store);
+  dynains::SessionWriter writer(city, session);
   for (std::uint32_t number = 0; number < 8; ++number) {
     const double y = static_cast<double>(number) - 4.0;
     const Scan scan = measure(y, has_box);
@@ -61,6 +60,7 @@ void add_session(dynains::City& city, const char* name, double begin, bool has_b
     writer.add({scan.x, scan.y, scan.z}, scan.verdicts, {}, T_world_sensor, number);
   }
   writer.commit();
+  city.reload();
 }
 
 /// Points of the map after session number `last` in the middle of the box.

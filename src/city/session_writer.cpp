@@ -27,12 +27,12 @@ void remove_temporaries(const City& city) {
 
 }  // namespace
 
-SessionWriter::SessionWriter(City& city, SessionInfo session, ByteStore& store, Mode mode)
+SessionWriter::SessionWriter(const City& city, SessionInfo session, Mode mode)
     : city_(city),
       session_(std::move(session)),
       mode_(mode),
-      store_(store),
-      points_(city.grid(), kLookRange, store),
+      store_(city.folder()),
+      points_(city.grid(), kLookRange, store_),
       references_(/*most_scans=*/10, session_.evidence.lateral_margin) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +
@@ -67,8 +67,11 @@ void SessionWriter::check() {
 }
 
 void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
-                        Span<const std::uint32_t> labels, const Pose& T_world_sensor,
+                        Span<const std::uint32_t> labels, const Pose& T_session_sensor,
                         std::uint32_t scan) {
+  const Pose T_world_sensor =
+      session_.alignment ? orthonormalized(session_.alignment->T_city_session * T_session_sensor)
+                         : T_session_sensor;
   ++session_.scans;
   points_.add(points, verdicts, labels, T_world_sensor, scan);
   const RecordingReference* const reference =
@@ -110,7 +113,6 @@ void SessionWriter::prepare() {
 void SessionWriter::commit() {
   if (!file_) prepare();
   file_->commit();
-  city_.reload();
 }
 
 }  // namespace dynains

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "command.hpp"
+#include "dynains/city/city.hpp"
+#include "dynains/city/session_writer.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
@@ -17,7 +19,7 @@
 #include "run/output_folder.hpp"
 #include "run/recorded_scans.hpp"
 #include "run/run_plan.hpp"
-#include "run/session_contribution.hpp"
+#include "run/session_request.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {
@@ -92,7 +94,7 @@ std::vector<std::uint8_t> static_points(const PointBuffer& points,
 StaticMapAccumulator build_map(const Recording& corrected, const Recording& original,
                                const std::vector<std::size_t>& scans, const fs::path& folder,
                                const StaticMapAccumulator::Config& config, bool quiet,
-                               SessionContribution* session) {
+                               SessionWriter* session) {
   StaticMapAccumulator map(config);
   const LabelFiles files(folder / "labels", folder / "causes");
   RecordedScan scan;
@@ -111,9 +113,10 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
         static_points(points, arrays.labels, folder / "labels" / (original.name(i) + ".label"));
     map.insert(points, keep, verdict.T_world_sensor);
     if (session != nullptr) {
-      session->add(scan, verdict,
-                   original.has_labels() ? original.read_labels(i) : std::vector<std::uint32_t>(),
-                   i);
+      const auto labels =
+          original.has_labels() ? original.read_labels(i) : std::vector<std::uint32_t>();
+      session->add(points, verdict.labels, labels, verdict.T_world_sensor,
+                   static_cast<std::uint32_t>(i));
     }
     progress.update(k + 1);
   }
@@ -222,9 +225,11 @@ void remap(RemapOptions& options) {
 
   const InterruptGuard interrupt;
   const std::string fingerprint = pose_fingerprint(corrected, range);
-  std::optional<SessionContribution> session;
+  std::optional<SessionWriter> session;
   if (!options.update.empty()) {
-    session.emplace(session_of(options, out, fingerprint), SessionWriter::Mode::kReplace);
+    const SessionRequest request = session_of(options, out, fingerprint);
+    session.emplace(City::open_or_make(request.city, request.grid), request.info,
+                    SessionWriter::Mode::kReplace);
   }
   StaticMapAccumulator::Config config;
   config.map_voxel = options.map_voxel.value_or(map_voxel);

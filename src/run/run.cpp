@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/city/city.hpp"
+#include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/recording/second_pass.hpp"
@@ -147,7 +149,7 @@ RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
 
 /// Puts all outputs in place, or keeps what a signal has left.
 void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
-             OutsideOutputs& outside, SessionContribution* session, RunOutcome& outcome) {
+             OutsideOutputs& outside, SessionWriter* session, RunOutcome& outcome) {
   if (!outcome.complete) {
     outcome.signal = InterruptGuard::signal();
     outcome.outputs.folder = out.path();
@@ -171,7 +173,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   std::vector<std::string> warnings = plan.sequence.warnings();
   const RunListener listener = with_memory(caller, warnings);
   const Agreement agreement = check_before(plan, listener);
-  std::optional<SessionContribution> session;
+  std::optional<SessionWriter> session;
   std::optional<SessionAlignment> alignment;
   // The results that are replaced may have added the session already.
   const std::string& name = plan.session.info.name;
@@ -181,7 +183,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   if (!plan.session.city.empty() && !has_session) {
     const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
     alignment = request.info.alignment;
-    session.emplace(request);
+    session.emplace(City::open_or_make(request.city, request.grid), request.info);
   }
 
   const InterruptGuard interrupt(listener.second_signal);

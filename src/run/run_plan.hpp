@@ -10,7 +10,7 @@
 #include "run_results.hpp"
 #include "run_settings.hpp"
 #include "scan_range.hpp"
-#include "session_contribution.hpp"
+#include "session_request.hpp"
 
 namespace dynains::program {
 

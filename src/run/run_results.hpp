@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clean_writer.hpp"
+#include "dynains/city/session_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
@@ -26,7 +27,6 @@
 #include "overview.hpp"
 #include "point_labels.hpp"
 #include "scan_range.hpp"
-#include "session_contribution.hpp"
 
 namespace dynains {
 class Returns;
@@ -101,7 +101,7 @@ class RunResults {
   /// Waits for the results of the last scan. Throws IoError.
   void finish();
   /// Final verdicts also go to `session`, which outlives this.
-  void contribute_to(SessionContribution& session) { session_ = &session; }
+  void contribute_to(SessionWriter& session) { session_ = &session; }
   /// Final verdicts are first ones, which `pass` takes; revise() completes the results. It outlives
   /// this.
   void wait_for(SecondPass& pass) { second_pass_ = &pass; }
@@ -139,7 +139,7 @@ class RunResults {
   std::unique_ptr<MapFile> map_;
   std::optional<MapAttributeTable> map_attributes_;
   bool needs_beliefs_;
-  SessionContribution* session_ = nullptr;
+  SessionWriter* session_ = nullptr;
   SecondPass* second_pass_ = nullptr;
   Returns* returns_ = nullptr;
   ComparedPoses compared_;

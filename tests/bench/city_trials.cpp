@@ -90,8 +90,7 @@ void add_day(City& city, const simulation::Config& config, Day& day) {
   SessionInfo info;
   info.name = "day" + std::to_string(config.day);
   info.begin = config.day;
-  ByteStore store;
-  SessionWriter writer(city, info, store);
+  SessionWriter writer(city, info);
   std::deque<simulation::SimulatedScan> open;
   const auto take_final = [&](const ScanVerdict& verdict) {
     const simulation::SimulatedScan scan = std::move(open.front());
@@ -119,6 +118,7 @@ void add_day(City& city, const simulation::Config& config, Day& day) {
   }
   remover.flush(take_final);
   writer.commit();
+  city.reload();
 }
 
 struct Count {

@@ -41,13 +41,13 @@ void add(City& city, const Session& session, const std::vector<test::BoxScan>& s
   info.name = session.name;
   info.begin = session.begin;
   info.fingerprint = session.name;
-  ByteStore store;
-  SessionWriter writer(city, info, store);
+  SessionWriter writer(city, info);
   std::uint32_t number = 0;
   for (const test::BoxScan& scan : scans) {
     writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, number++);
   }
   writer.commit();
+  city.reload();
 }
 
 void add(City& city, const Session& session) {
@@ -317,8 +317,8 @@ TEST_CASE("a city: the file of a session has the points of the session, tile by 
   const test::BoxScan scan = test::scan_boxes({kParkedCar}, 0.0, 0.0);
   SessionInfo info;
   info.name = "monday";
+  SessionWriter writer(city, info);
   ByteStore store;
-  SessionWriter writer(city, info, store);
   SessionPoints all(grid, kLookRange, store);
   // Away, back, and over the same places again, at other heights within their voxels.
   for (std::uint32_t number = 0; number < 60; ++number) {
@@ -329,6 +329,7 @@ TEST_CASE("a city: the file of a session has the points of the session, tile by 
     all.add(scan.points, scan.verdicts, scan.labels, T_world_sensor, number);
   }
   writer.commit();
+  city.reload();
   const SessionInfo session = city.sessions().at(0);
   CHECK(session.points == all.size());
   std::size_t tiles = 0;
@@ -390,8 +391,7 @@ TEST_CASE("a city: another grid or version and a name that leads out are refused
   CHECK_THROWS_AS(City(folder.path() / "nothing"), IoError);
   SessionInfo outside;
   outside.name = "../monday";
-  ByteStore store;
-  CHECK_THROWS_AS(SessionWriter(city, outside, store), ConfigError);
+  CHECK_THROWS_AS(SessionWriter(city, outside), ConfigError);
 }
 
 TEST_CASE("a city: every damage is named by path and position") {
@@ -444,10 +444,9 @@ TEST_CASE("a city: a session that is not committed changes nothing") {
   const auto before = test::read_tree(city.folder());
   SessionInfo info;
   info.name = "tuesday";
-  ByteStore store;
   const test::BoxScan scan = test::scan_boxes({}, 0.0, 0.0);
   {
-    SessionWriter writer(city, info, store);
+    SessionWriter writer(city, info);
     writer.add(scan.points, scan.verdicts, scan.labels, scan.T_world_sensor, 0);
     // Another writer changes nothing for this one.
     add(city, kDays[2]);

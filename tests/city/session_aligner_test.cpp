@@ -40,14 +40,14 @@ void add(City& city, const std::string& name, const Scans& scans,
          const Eigen::Isometry3d& T_city_session = Eigen::Isometry3d::Identity()) {
   SessionInfo info;
   info.name = name;
-  ByteStore store;
-  SessionWriter writer(city, info, store);
+  SessionWriter writer(city, info);
   std::uint32_t number = 0;
   for (const test::BoxScan& scan : scans) {
     writer.add(scan.points, scan.verdicts, scan.labels, T_city_session * scan.T_world_sensor,
                number++);
   }
   writer.commit();
+  city.reload();
 }
 
 SessionAlignment align(const City& city, const Scans& scans,
@@ -180,8 +180,8 @@ TEST_CASE("alignment: the file of the session keeps it") {
   alignment.uncertainty = 0.0071;
   alignment.sessions = {"friday", "monday"};
   info.alignment = alignment;
-  ByteStore store;
-  SessionWriter(city, info, store).commit();
+  SessionWriter(city, info).commit();
+  city.reload();
   const auto read = city.sessions().front().alignment;
   REQUIRE(read);
   CHECK(read->T_city_session.matrix() == alignment.T_city_session.matrix());

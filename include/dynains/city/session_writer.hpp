@@ -18,8 +18,8 @@ namespace dynains {
 class Folder;
 
 /// Takes the final verdicts of a session scan by scan, and adds the session to a city at once by
-/// commit(). Until prepare(), all data waits in a store, so that the memory does not grow with the
-/// length of the way if the store is a file. Exceptions of the store come out of all functions.
+/// commit(). Until prepare(), all data waits in a file without a name in the folder of the city.
+/// Errors of files throw IoError.
 class SessionWriter {
  public:
   enum class Mode {
@@ -27,15 +27,15 @@ class SessionWriter {
     kReplace  ///< the city has one; commit() puts this one in its place in one step
   };
 
-  /// `session`: all but what is found here. `city` and `store` outlive this. Throws ConfigError for
-  /// an invalid name, UsageError if the city has a session of this name or of this fingerprint,
-  /// IoError.
-  SessionWriter(City& city, SessionInfo session, ByteStore& store, Mode mode = Mode::kNew);
+  /// `session`: all but what is found here. Throws ConfigError for an invalid name, UsageError if
+  /// the city has a session of this name or of this fingerprint, IoError.
+  SessionWriter(const City& city, SessionInfo session, Mode mode = Mode::kNew);
 
   /// Adds one scan. `points`: m, sensor frame. `verdicts`: final verdict by point. `labels`: label
-  /// of the recording by point, or empty. `scan`: its number; ascending.
+  /// of the recording by point, or empty. `T_session_sensor` is moved by SessionInfo::alignment.
+  /// `scan`: its number; ascending.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const std::uint32_t> labels,
-           const Pose& T_world_sensor, std::uint32_t scan);
+           const Pose& T_session_sensor, std::uint32_t scan);
 
   /// Writes the session to the disk, so that nothing but its name is left to commit(). No scan can
   /// be added then, and the city is locked until the end of this object. Throws IoError, and
@@ -49,10 +49,10 @@ class SessionWriter {
  private:
   void check();
 
-  City& city_;
+  City city_;
   SessionInfo session_;
   Mode mode_;
-  ByteStore& store_;
+  ByteStore store_;
   SessionPoints points_;
   RecordingReferences references_;
   std::vector<std::uint8_t> bytes_;

@@ -1,7 +1,8 @@
-#include "session_contribution.hpp"
+#include "session_request.hpp"
 
 #include <algorithm>
 
+#include "dynains/city/city.hpp"
 #include "dynains/city/session_aligner.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"
@@ -63,22 +64,6 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
   }
   request.info.alignment = aligner.align(*request.T_city_start);
   return request;
-}
-
-SessionContribution::SessionContribution(const SessionRequest& request, SessionWriter::Mode mode)
-    : city_(City::open_or_make(request.city, request.grid)),
-      store_(city_.folder()),
-      writer_(city_, request.info, store_, mode) {
-  if (request.info.alignment) T_city_session_ = request.info.alignment->T_city_session;
-}
-
-void SessionContribution::add(const RecordedScan& scan, const ScanVerdict& verdict,
-                              const std::vector<std::uint32_t>& labels, std::size_t number) {
-  copy_points(scan, points_);
-  const Pose T_city_sensor = T_city_session_
-                                 ? orthonormalized(*T_city_session_ * verdict.T_world_sensor)
-                                 : verdict.T_world_sensor;
-  writer_.add(points_, verdict.labels, labels, T_city_sensor, static_cast<std::uint32_t>(number));
 }
 
 }  // namespace dynains::program
