@@ -13,9 +13,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const char* name(Truth truth) { return truth == Truth::kDynamic ? "dynamic" : "static"; }
-const char* name(Unlabeled unlabeled) {
-  return unlabeled == Unlabeled::kIgnore ? "ignore" : "static";
-}
 
 std::string range_text(double min, double max) {
   std::string text = format_number(min, 1) + " m ";
@@ -133,7 +130,7 @@ std::string to_table(const Evaluation& evaluation) {
   const EvaluationConfig& config = evaluation.config;
   std::ostringstream text;
   text << evaluation.scans << " scans, " << evaluation.points << " points; dynamic: classes "
-       << config.truth.dynamic_classes() << "; unlabeled: " << name(config.truth.unlabeled())
+       << config.truth.dynamic_classes() << "; unlabeled: " << plain_value(config.truth.unlabeled())
        << '\n'
        << "PR RR F1: voxels of " << format_number(config.voxel, 3) << " m, "
        << range_text(config.min_range, config.max_range)
@@ -193,7 +190,7 @@ std::string to_json(const Evaluation& evaluation) {
     settings[parameter.name] = parameter.value;
   });
   settings["classes"] = evaluation.config.truth.dynamic_classes();
-  settings["unlabeled"] = name(evaluation.config.truth.unlabeled());
+  settings["unlabeled"] = plain_value(evaluation.config.truth.unlabeled());
 
   Json rows = Json::array();
   for (const EvaluationRow& row : evaluation.rows) {

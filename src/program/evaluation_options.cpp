@@ -38,8 +38,7 @@ evaluation::EvaluationConfig EvaluationOptions::config() const {
   evaluation::EvaluationConfig config = config_;
   if (max_range_option_->count() > 0) config.max_range = config.point_max_range = max_range_;
   config.truth =
-      evaluation::TruthClasses(classes_, unlabeled_ == "static" ? evaluation::Unlabeled::kStatic
-                                                                : evaluation::Unlabeled::kIgnore);
+      evaluation::TruthClasses(classes_, value_of_name<evaluation::Unlabeled>(unlabeled_).value());
   config.validate();
   return config;
 }

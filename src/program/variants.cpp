@@ -38,7 +38,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
     for (std::size_t v = 0; v < removers.size(); ++v) {
       const FrameResult frame = naming_scan(sequence.sequence(), sequence.index(i), [&] {
         return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
-                                scan.T_world_sensor, scan.time);
+                                scan.T_world_sensor, sequence.sequence().time(sequence.index(i)));
       });
       if (answer == Answer::kNewest) {
         take(v, frame.newest);

@@ -116,14 +116,11 @@ py::dict evaluate_arrays(const py::sequence& points, const py::sequence& poses,
       kept.size() != points.size()) {
     throw std::invalid_argument("evaluate: points, poses, truth and kept need as many scans each");
   }
-  if (unlabeled != "ignore" && unlabeled != "static") {
-    throw ConfigError("unlabeled = '" + unlabeled + "': expected 'ignore' or 'static'");
-  }
+  const auto treatment = value_of_name<evaluation::Unlabeled>(unlabeled);
+  if (!treatment) throw ConfigError("unlabeled = '" + unlabeled + "': expected ignore or static");
   EvaluationConfig config;
   assign_all(config, settings);
-  config.truth = evaluation::TruthClasses(dynamic_classes, unlabeled == "static"
-                                                               ? evaluation::Unlabeled::kStatic
-                                                               : evaluation::Unlabeled::kIgnore);
+  config.truth = evaluation::TruthClasses(dynamic_classes, *treatment);
   std::vector<JudgedScan> scans;
   for (std::size_t i = 0; i < points.size(); ++i) {
     scans.push_back(make_scan(i, points[i], poses[i], truth[i], kept[i]));

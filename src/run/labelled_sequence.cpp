@@ -70,7 +70,6 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   scan.xyz = scan_.points.xyzi.data();
   scan.stride = 4;
   scan.T_world_sensor = sequence_.T_world_sensor(index);
-  scan.time = sequence_.time(index);
   scan.truth = scan_.truth;
   scan.in_map = scan_.in_map;
   scan.causes = scan_.causes;

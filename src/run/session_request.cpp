@@ -34,15 +34,10 @@ bool SessionRequest::is_fulfilled() const {
 SessionRequest reposed_session(const std::filesystem::path& folder, const std::string& name,
                                const std::string& fingerprint) {
   const City city(folder);
-  for (const SessionInfo& session : city.sessions()) {
-    if (session.name != name) continue;
-    SessionRequest request{folder, session, city.grid(), {}};
-    request.info.fingerprint = fingerprint;
-    request.info.alignment.reset();
-    return request;
-  }
-  throw ConfigError(folder.string() + ": has no session \"" + name +
-                    "\"; name the session of the run by --session");
+  SessionRequest request{folder, city.sessions()[city.number_of(name)], city.grid(), {}};
+  request.info.fingerprint = fingerprint;
+  request.info.alignment.reset();
+  return request;
 }
 
 SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range) {

@@ -21,7 +21,6 @@ namespace {
 std::vector<OwnedScan> street() {
   std::vector<OwnedScan> scans(3);
   for (std::size_t s = 0; s < scans.size(); ++s) {
-    scans[s].time = 0.1 * static_cast<double>(s);
     for (int i = 0; i < 10; ++i) {
       const auto y = 5.0F + static_cast<float>(i);
       scans[s].add(4.0F, y, 0.5F, kRoad, s == 2 && i < 5 ? 0 : 1);

@@ -21,7 +21,6 @@ struct OwnedScan {
   std::vector<std::uint8_t> in_map;
   std::vector<std::uint8_t> causes;
   Eigen::Isometry3d T_world_sensor = Eigen::Isometry3d::Identity();
-  double time = 0;
 
   void add(float x, float y, float z, std::uint32_t label, unsigned held_by = 0) {
     xyz.insert(xyz.end(), {x, y, z});
@@ -33,7 +32,6 @@ struct OwnedScan {
     LabelledScan scan;
     scan.xyz = xyz.data();
     scan.T_world_sensor = T_world_sensor;
-    scan.time = time;
     scan.truth = truth;
     scan.in_map = in_map;
     scan.causes = causes;
@@ -65,7 +63,6 @@ inline std::vector<OwnedScan> mixed_scans(std::uint64_t seed, std::size_t scans,
     OwnedScan& scan = result[s];
     scan.T_world_sensor = Eigen::Translation3d(500.0 + random.uniform(0, 0.5), -300.0, 2.0) *
                           Eigen::AngleAxisd(random.uniform(-0.2, 0.2), Eigen::Vector3d::UnitZ());
-    scan.time = 0.1 * static_cast<double>(s);
     for (std::size_t i = 0; i < points_per_scan; ++i) {
       const bool moving = chance(random, 0.4);
       const std::uint32_t label = chance(random, 0.1) ? 0 : moving ? kMovingCar : kRoad;

@@ -65,7 +65,6 @@ inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedSc
     scan.xyz = scans[i].xyzi.data();
     scan.stride = 4;
     scan.T_world_sensor = scans[i].T_world_sensor;
-    scan.time = scans[i].time;
     scan.truth = scans[i].labels;
     scan.in_map = in_map[i];
     return true;

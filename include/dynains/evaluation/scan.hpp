@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -27,8 +26,7 @@ struct LabelledScan {
   const float* xyz = nullptr;  ///< x y z of each point, m, sensor frame
   std::size_t stride = 3;      ///< floats per point, at least 3
   Pose T_world_sensor = Pose::Identity();
-  double time = std::numeric_limits<double>::quiet_NaN();  ///< s; NaN if unknown
-  Span<const std::uint32_t> truth;                         ///< SemanticKITTI labels
+  Span<const std::uint32_t> truth;  ///< SemanticKITTI labels
   /// Bit e is set if the map of estimate e contains the point. Empty if no map contains a point.
   Span<const std::uint8_t> in_map;
   /// Cause of each verdict of estimate 0 (dynains::evaluation::Cause). May be empty.

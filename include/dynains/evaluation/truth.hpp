@@ -1,6 +1,7 @@
 // Ground truth of a point: SemanticKITTI class ids reduced to static, dynamic and ignored.
 #pragma once
 
+#include <array>
 #include <bitset>
 #include <cstdint>
 #include <string>
@@ -19,6 +20,7 @@ enum class Unlabeled : std::uint8_t {
   kIgnore,
   kStatic,  ///< as in the published tables
 };
+constexpr std::array<const char*, 2> value_names(Unlabeled) { return {"ignore", "static"}; }
 
 /// SemanticKITTI label word: class in the lower, instance in the upper 16 bits.
 constexpr std::uint16_t semantic_class(std::uint32_t label) {
