@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "dynains/evaluation/causes.hpp"
 #include "dynains/evaluation/text_table.hpp"
 
 namespace dynains::evaluation {
