@@ -23,11 +23,9 @@ namespace {
 
 constexpr double kLeastAgreement = 0.5;       // share; wrong poses of a moving sensor stay below it
 constexpr std::size_t kFewestCompared = 200;  // compared points of a sample
-constexpr std::size_t kFewestMotions = 6;     // registered, for a decision
 constexpr std::size_t kFewestPairs = 3;       // of neighbours, for a statement about their error
 constexpr std::size_t kPairs = 8;             // of a sample
-constexpr double kExact = 0.03;  // m at points 10 m away; registrations are worse rarely
-constexpr double kRough = 0.4;   // m at points 10 m away; more is not inexact but wrong
+constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
 constexpr double kInexact =
     0.05;  // m, from one scan to the next, of places and at points 10 m away
 constexpr double kNever = std::numeric_limits<double>::infinity();

@@ -223,14 +223,22 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
   return rotations;
 }
 
-/// Scans at which chains begin, evenly spread. `scans`: at least 2.
-std::vector<std::size_t> starts_of_chains(std::size_t scans) {
+/// Scans at which chains begin, evenly spread over those behind which the poses move, if these are
+/// enough. A recording that stands for most of the time says in the rest what its poses mean. It
+/// has two scans or more.
+std::vector<std::size_t> starts_of_chains(const Recording& recording) {
   constexpr std::size_t kChains = 12, kApart = 4;
+  std::vector<std::size_t> all, moving;
+  for (std::size_t i = 0; i + 1 < recording.size(); ++i) {
+    all.push_back(i);
+    if (extent_of(motion_between(recording, i, i + 1)) > kExact) moving.push_back(i);
+  }
+  const std::vector<std::size_t>& scans = moving.size() < kFewestMotions ? all : moving;
   std::vector<std::size_t> starts;
-  const std::size_t count = std::min(kChains, scans - 1);
+  const std::size_t count = std::min(kChains, scans.size());
   for (std::size_t offset = 0; offset < kApart; ++offset) {
     for (std::size_t k = offset; k < count; k += kApart) {
-      starts.push_back(count == 1 ? 0 : k * (scans - 2) / (count - 1));
+      starts.push_back(scans[count == 1 ? 0 : k * (scans.size() - 1) / (count - 1)]);
     }
   }
   return starts;
@@ -276,7 +284,7 @@ std::vector<RegisteredMotion> register_motions(
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice) {
   std::vector<RegisteredMotion> motions;
   if (recording.size() < 2) return motions;
-  const std::vector<std::size_t> starts = starts_of_chains(recording.size());
+  const std::vector<std::size_t> starts = starts_of_chains(recording);
   std::optional<Pose> elsewhere;
   for (std::size_t number = 0; number < starts.size(); number += 2) {
     const auto chains =

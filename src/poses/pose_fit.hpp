@@ -12,6 +12,9 @@
 
 namespace dynains {
 
+inline constexpr double kExact = 0.03;  ///< m at points 10 m away; registrations are worse rarely
+inline constexpr std::size_t kFewestMotions = 6;  ///< registered, for a decision
+
 /// Motion of the sensor between two scans, by their registration.
 struct RegisteredMotion {
   std::size_t chain;   ///< motions of one chain begin at one scan
@@ -23,10 +26,11 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. The
-/// given poses are one of several first guesses. Pairs that determine no motion are left out, and
-/// those whose landmarks meet better under the given poses. Places that follow each other are far
-/// apart: `suffice` tells of the motions so far whether further places are needed. Throws IoError.
+/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If the
+/// poses move at 6 places or more, no others are taken. The given poses are one of several first
+/// guesses. Pairs that determine no motion are left out, and those whose landmarks meet better
+/// under the given poses. Places that follow each other are far apart: `suffice` tells of the
+/// motions so far whether further places are needed. Throws IoError.
 std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);

@@ -92,6 +92,15 @@ TEST_CASE("Right poses of a sparse sensor that comes to rest are no other record
   CHECK(diagnosis_with(drive, 0.2).verdict != PoseVerdict::kAgree);
 }
 
+TEST_CASE("A drive that stands for most of the time tells what its poses mean") {
+  const Drive drive(drive_of(simulation::Scene::kVegetation, simulation::Sensor::kVlp16, 60, 112));
+  CHECK(diagnose(Recording(drive.path())).sound());
+  const Diagnosis d =
+      diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }));
+  CHECK(d.verdict == PoseVerdict::kOtherwise);
+  CHECK(d.proposal.convention.invert);
+}
+
 TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it moves") {
   auto config = drive_of(simulation::Scene::kHighway, simulation::Sensor::kMid360, 30, 603);
   const auto standing = [&](double metres_per_second) {
