@@ -84,13 +84,7 @@ inline Pose rotated(const Pose& T_a_c, const Eigen::Matrix3d& R_b_c) {
   return T_a_b;
 }
 
-inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) {
-  Eigen::Matrix3d result;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) result(i, j) = R(j, i);
-  }
-  return result;
-}
+inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) { return R.transpose(); }
 
 /// Covariance (row-major, 6 x 6) of an error e of a pose T_c_a, if `covariance` is that of an error
 /// of T_c_b. An error is a translation (m) and a rotation (rad) along the axes of the inner frame:
@@ -156,31 +150,10 @@ inline Pose scaled_motion(const Pose& T_a_b, double ratio) {
   return result;
 }
 
-inline bool is_finite(const Pose& T) {
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) {
-      if (!std::isfinite(T(i, j))) return false;
-    }
-  }
-  return true;
-}
-
 /// Largest deviation of an element of R^T R from identity. `T` must be finite.
 inline double rotation_error(const Pose& T) {
-  double largest = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const double product = T(0, i) * T(0, j) + T(1, i) * T(1, j) + T(2, i) * T(2, j);
-      largest = std::max(largest, std::abs(product - (i == j ? 1.0 : 0.0)));
-    }
-  }
-  return largest;
-}
-
-inline double rotation_determinant(const Pose& T) {
-  return T(0, 0) * (T(1, 1) * T(2, 2) - T(1, 2) * T(2, 1)) -
-         T(0, 1) * (T(1, 0) * T(2, 2) - T(1, 2) * T(2, 0)) +
-         T(0, 2) * (T(1, 0) * T(2, 1) - T(1, 1) * T(2, 0));
+  const Eigen::Matrix3d R = T.linear();
+  return (R.transpose().lazyProduct(R) - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
 }
 
 }  // namespace detail
@@ -188,12 +161,12 @@ inline double rotation_determinant(const Pose& T) {
 /// Throws PoseError unless `T` is finite, rigid and within kMaxTranslation. The message starts with
 /// `name`.
 inline void validate_pose(const std::string& name, const Pose& T) {
-  if (!detail::is_finite(T)) throw PoseError(name + " has NaN or infinite entries");
+  if (!T.matrix().allFinite()) throw PoseError(name + " has NaN or infinite entries");
   if (T(3, 0) != 0.0 || T(3, 1) != 0.0 || T(3, 2) != 0.0 || T(3, 3) != 1.0) {
     throw PoseError(name + " is no transform: its last row must be 0 0 0 1");
   }
   const double error = detail::rotation_error(T);
-  const double determinant = detail::rotation_determinant(T);
+  const double determinant = T.linear().determinant();
   if (error > kRotationTolerance || determinant < 0.0) {
     std::ostringstream text;
     text << name << " is not rigid: R^T R differs from identity by " << error << " (at most "

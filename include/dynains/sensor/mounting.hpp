@@ -63,19 +63,9 @@ inline Eigen::Vector3d up_of_mounting(double pitch, double roll) {
 
 namespace detail {
 
-// Operations on vectors without the expressions of Eigen, which take longer to compile.
+// Plain sums, because the order of Eigen's depends on the instruction set.
 inline double dot(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
-}
-inline Eigen::Vector3d cross(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
-          a.x() * b.y() - a.y() * b.x()};
-}
-inline Eigen::Vector3d difference(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return {a.x() - b.x(), a.y() - b.y(), a.z() - b.z()};
-}
-inline Eigen::Vector3d scaled(double factor, const Eigen::Vector3d& a) {
-  return {factor * a.x(), factor * a.y(), factor * a.z()};
 }
 inline Eigen::Vector3d multiplied(const Eigen::Matrix3d& R, const Eigen::Vector3d& a) {
   const auto row = [&](int i) { return dot({R(i, 0), R(i, 1), R(i, 2)}, a); };
@@ -177,11 +167,11 @@ class MountingEstimator {
       const Eigen::Vector3d& a = cells_[random() % cells_.size()];
       const Eigen::Vector3d& b = cells_[random() % cells_.size()];
       const Eigen::Vector3d& c = cells_[random() % cells_.size()];
-      const Eigen::Vector3d normal = cross(difference(b, a), difference(c, a));
+      const Eigen::Vector3d normal = (b - a).cross(c - a);
       const double area = std::sqrt(dot(normal, normal));
       if (!(area > 4.0)) continue;
       GroundHypothesis ground;
-      ground.up = scaled((normal.z() * side > 0.0 ? 1.0 : -1.0) / area, normal);
+      ground.up = (normal.z() * side > 0.0 ? 1.0 : -1.0) / area * normal;
       ground.height = -dot(ground.up, a);
       if (!is_possible(ground, side)) continue;
       const float found = score(ground);
@@ -234,7 +224,7 @@ class MountingEstimator {
     }
     if (!(m.count >= 10.0)) return false;
     const Plane plane = fit_plane(m);
-    ground.up = scaled(side, {plane.normal_x, plane.normal_y, plane.normal_z});
+    ground.up = side * Eigen::Vector3d(plane.normal_x, plane.normal_y, plane.normal_z);
     ground.height = -dot(ground.up, {plane.mean_x, plane.mean_y, plane.mean_z});
     return is_possible(ground, side);
   }
