@@ -203,9 +203,8 @@ class OccupancyDescriptor {
         wrapped_low = min(wrapped_low, on);
         wrapped_high = max(wrapped_high, on);
       };
-      for_bounding_ranges([&](const PointRange& part) {
-        detail::for_overlapping_slices<Packs>(part.begin, part.end, extend);
-      });
+      for_bounding_ranges(
+          [&](const PointRange& part) { detail::for_slices<Packs>(part.begin, part.end, extend); });
       range_min_ = smallest(range_low);
       range_max = largest(range_high);
       z_min_ = smallest(z_low);
@@ -343,7 +342,7 @@ class OccupancyDescriptor {
     };
     detail::with_packs([&](auto packs) {
       for (const PointRange& part : cluster_.scan(k)) {
-        detail::for_overlapping_slices<decltype(packs)>(part.begin, part.end, raise);
+        detail::for_slices<decltype(packs)>(part.begin, part.end, raise);
       }
     });
   }

@@ -52,8 +52,8 @@ void with_packs(Kernel&& kernel) {
 template <class Packs, class Kernel>
 [[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t count, Kernel&& kernel);
 template <class Packs, class Kernel>
-[[gnu::always_inline, gnu::flatten]] void for_overlapping_slices(std::size_t begin, std::size_t end,
-                                                                 Kernel&& kernel);
+[[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t begin, std::size_t end,
+                                                     Kernel&& kernel);
 #endif
 
 /// Points per step of loops that pass over them twice: they fit the L1 cache.
@@ -121,35 +121,17 @@ struct PackSlice : Packs {
   }
 };
 
-/// A slice of arrays with at least a pack of readable numbers behind their end.
-template <class Packs, bool kTail>
-struct PaddedPackSlice : PackSlice<Packs, kTail> {
-  using PackSlice<Packs, kTail>::PackSlice;
-  typename Packs::Float load(const float* from) const {
-    return Packs::Float::load(from + this->begin);
-  }
-};
-
-/// Calls `kernel(PackSlice)` for [0, count) in order. For use within a kernel of with_packs.
+/// Calls `kernel(PackSlice)` for [begin, end) in order. For use within a kernel of with_packs.
 template <class Packs, class Kernel>
-void for_slices(std::size_t count, Kernel&& kernel) {
-  std::size_t begin = 0;
-  for (; begin + Packs::kCount <= count; begin += Packs::kCount) {
+void for_slices(std::size_t begin, std::size_t end, Kernel&& kernel) {
+  for (; begin + Packs::kCount <= end; begin += Packs::kCount) {
     kernel(PackSlice<Packs, false>(begin, begin + Packs::kCount));
   }
-  if (begin < count) kernel(PackSlice<Packs, true>(begin, count));
+  if (begin < end) kernel(PackSlice<Packs, true>(begin, end));
 }
-
-/// Calls `kernel(PaddedPackSlice)` for [begin, end). The last slice ends at `end` and is full, so
-/// that it overlaps the slice before; only if there are fewer indices than a pack has numbers, the
-/// one slice is shorter.
 template <class Packs, class Kernel>
-void for_overlapping_slices(std::size_t begin, std::size_t end, Kernel&& kernel) {
-  if (end - begin < Packs::kCount) return kernel(PaddedPackSlice<Packs, true>(begin, end));
-  for (; begin + Packs::kCount < end; begin += Packs::kCount) {
-    kernel(PaddedPackSlice<Packs, false>(begin, begin + Packs::kCount));
-  }
-  kernel(PaddedPackSlice<Packs, false>(end - Packs::kCount, end));
+void for_slices(std::size_t count, Kernel&& kernel) {
+  for_slices<Packs>(0, count, kernel);
 }
 
 /// Calls `kernel(PackSlice)` for [0, count) in order, with the packs of with_packs().
