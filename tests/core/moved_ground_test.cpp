@@ -70,7 +70,7 @@ float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::
 
 TEST_CASE("heights equal those of a least-squares fit to points that do not rise") {
   Random random(71);
-  SurroundingGround ground(80.0);
+  SurroundingGround ground;
   std::size_t known = 0, unknown = 0, rising = 0;
   for (int round = 0; round < 40; ++round) {
     const double x = random.uniform(-60.0, 60.0), y = random.uniform(-60.0, 60.0);

@@ -16,6 +16,7 @@
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
 #include "dynains/verdict.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::detail {
 
@@ -26,44 +27,33 @@ class SurroundingGround {
   /// Height above ground with too few points for a plane.
   static constexpr float kUnknown = std::numeric_limits<float>::infinity();
 
-  /// `max_range`: m; points beyond are assigned to the outermost cells.
-  explicit SurroundingGround(double max_range)
-      : half_(std::ceil(static_cast<float>(max_range / kCell)) + 2.0F),
-        width_(2 * static_cast<std::size_t>(half_)),
-        number_of_(width_ * width_, 0) {
-    cells_.reserve(number_of_.size() + 1);  // uses address space only
-    used_.reserve(number_of_.size());
-    forget();
-  }
-
   /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
   /// the plane of all points, since these may belong to an object, and points of cells without a
   /// plane.
   void assign(PointsView points, float rise) {
-    forget();
+    numbers_.clear();
+    cells_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const float x = points.x[i], y = points.y[i], z = points.z[i];
-      add(x, y, z, 1.0, cell_at(index_of(x, y)).all);
+      add(x, y, z, 1.0, cell_at(x, y).all);
     }
-    for (const std::size_t index : used_) {
-      Cell& cell = cells_[number_of_[index]];
-      cell.plane = plane_around(index, &Cell::all);
+    for (Cell& cell : cells_) {
+      cell.plane = plane_around(cell, &Cell::all);
       cell.kept = cell.all;
     }
     for (std::size_t i = 0; i < points.size(); ++i) {
       const float x = points.x[i], y = points.y[i], z = points.z[i];
-      Cell& cell = cell_at(index_of(x, y));
+      Cell& cell = cell_at(x, y);
       if (cell.plane.height(x, y, z) >= rise) add(x, y, z, -1.0, cell.kept);
     }
   }
 
   /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
   float height(float x, float y, float z) {
-    const std::size_t index = index_of(x, y);
-    Cell& cell = cell_at(index);
+    Cell& cell = cell_at(x, y);
     if (!cell.has_final_plane) {
       cell.has_final_plane = true;
-      cell.plane = plane_around(index, &Cell::kept);
+      cell.plane = plane_around(cell, &Cell::kept);
     }
     return cell.plane.height(x, y, z);
   }
@@ -83,36 +73,18 @@ class SurroundingGround {
     }
   };
   struct Cell {
+    VoxelKey place;
     PlaneMoments all, kept;  // of all its points, and of those that do not rise
     Plane plane;             // through all points around; if it is final, through the kept ones
     bool has_final_plane = false;
   };
 
-  // Cell 0 is the empty cell of all unused places.
-  void forget() {
-    for (const std::size_t index : used_) number_of_[index] = 0;
-    used_.clear();
-    cells_.assign(1, Cell());
-  }
-
-  // Index of the cell of a point, never a cell at the border of the grid.
-  std::size_t index_of(float x, float y) const {
-    const float last = 2.0F * half_ - 2.0F;
-    const auto line = [&](float coordinate) {
-      const float place = coordinate / static_cast<float>(kCell) + half_;
-      return static_cast<std::size_t>(
-          static_cast<std::int32_t>(std::min(std::max(place, 1.0F), last)));
-    };
-    return line(y) * width_ + line(x);
-  }
-
-  Cell& cell_at(std::size_t index) {
-    std::uint32_t& number = number_of_[index];
-    if (number == 0) {
-      number = static_cast<std::uint32_t>(cells_.size());
-      used_.push_back(index);
-      cells_.emplace_back();
-    }
+  Cell& cell_at(float x, float y) {
+    constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
+    const VoxelKey place =
+        voxel_key(floor_to<std::int32_t>(x * kPerMetre), floor_to<std::int32_t>(y * kPerMetre), 0);
+    const std::uint32_t number = numbers_.insert(place);
+    if (number == cells_.size()) cells_.push_back({place, {}, {}, {}, false});
     return cells_[number];
   }
 
@@ -121,12 +93,12 @@ class SurroundingGround {
   }
 
   // Plane through the points of a cell and of the cells around it.
-  Plane plane_around(std::size_t index, PlaneMoments Cell::*moments) const {
+  Plane plane_around(const Cell& cell, PlaneMoments Cell::*moments) const {
     PlaneMoments sum;
-    for (const std::size_t row : {index - width_, index, index + width_}) {
-      for (const std::size_t place : {row - 1, row, row + 1}) {
-        sum += cells_[number_of_[place]].*moments;
-      }
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t beside =
+          numbers_.find(cell.place + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (beside != kNoIndex) sum += cells_[beside].*moments;
     }
     return fit(sum);
   }
@@ -154,10 +126,7 @@ class SurroundingGround {
     return plane;
   }
 
-  float half_;                            // cells from the sensor to the border
-  std::size_t width_;                     // of the grid, in cells
-  std::vector<std::uint32_t> number_of_;  // row-major: index in cells_
-  std::vector<std::size_t> used_;         // indices of the non-zero entries of number_of_
+  VoxelHashTable<> numbers_;  // of the cells
   std::vector<Cell> cells_;
 };
 
@@ -173,8 +142,7 @@ class MovedGround {
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
         footprint_(std::max(config.footprint, kLeastCell),
-                   removes_footprint_ ? config.evidence_range : 0.0),
-        around_(config.evidence_range) {}
+                   removes_footprint_ ? config.evidence_range : 0.0) {}
 
   void adapt(const SensorModel& sensor) {
     // The lowest return of an object may lie one gap between two beams above its foot.
