@@ -59,7 +59,7 @@ class SurroundingGround {
   }
 
  private:
-  static constexpr double kCell = 2.0;  // m
+  static constexpr float kCell = 2.0F;  // m
   // Fewer points, or points on a line, do not define a plane.
   static constexpr double kLeastPoints = 8.0;
   static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
@@ -80,9 +80,8 @@ class SurroundingGround {
   };
 
   Cell& cell_at(float x, float y) {
-    constexpr auto kPerMetre = static_cast<float>(1.0 / kCell);
     const VoxelKey place =
-        voxel_key(floor_to<std::int32_t>(x * kPerMetre), floor_to<std::int32_t>(y * kPerMetre), 0);
+        voxel_key(floor_to<std::int32_t>(x / kCell), floor_to<std::int32_t>(y / kCell), 0);
     const std::uint32_t number = numbers_.insert(place);
     if (number == cells_.size()) cells_.push_back({place, {}, {}, {}, false});
     return cells_[number];
