@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "dynains/pose.hpp"
@@ -106,6 +108,19 @@ TEST_CASE("the map holds the first measured point of every voxel, exactly, and n
     CHECK(map.size() == expected.size());
     CHECK((sorted_points(map) == expected));
   }
+}
+
+TEST_CASE("a map that has moved grows on, and has no copy that would change the original") {
+  STATIC_REQUIRE(!std::is_copy_constructible_v<StaticMapAccumulator>);
+  STATIC_REQUIRE(!std::is_copy_assignable_v<StaticMapAccumulator>);
+  PointBuffer points;
+  points.push_back(1.0F, 1.0F, 1.0F);
+  StaticMapAccumulator map = make_map(0.2);
+  map.insert(points, {}, Pose::Identity());
+  StaticMapAccumulator moved = std::move(map);
+  points.push_back(1.3F, 1.0F, 1.0F);
+  moved.insert(points, {}, Pose::Identity());
+  CHECK(sorted_points(moved).size() == 2);
 }
 
 TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {

@@ -118,6 +118,9 @@ class StaticMapAccumulator {
       : config_((config.validate(), config)),
         voxel_(config.map_voxel > 0.0 ? config.map_voxel : 0.2),
         keep_all_(config.map_voxel == 0.0) {}
+  // A copy would know the blocks of the original.
+  StaticMapAccumulator(StaticMapAccumulator&&) = default;
+  StaticMapAccumulator& operator=(StaticMapAccumulator&&) = default;
 
   const Config& config() const { return config_; }
 
