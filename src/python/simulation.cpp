@@ -85,8 +85,7 @@ void bind_simulation(py::module_& module) {
       describe_settings<simulation::Config>();
   py::class_<Simulator>(module, "Simulator", doc.c_str())
       .def(py::init(&make_simulator), py::arg("scene") = "urban", py::arg("sensor") = "hdl64",
-           py::arg("labelling") = "ever",
-           "Raises ConfigError for unknown names and other values.")
+           py::arg("labelling") = "ever", "Raises ConfigError for unknown names and other values.")
       .def("__len__", &Simulator::size)
       .def("__getitem__", &scan_of, py::arg("index"), "Scan `index` as SimulatedScan.")
       .def("write", &write, py::arg("folder"),

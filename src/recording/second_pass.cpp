@@ -17,7 +17,9 @@ void check_sizes(PointsView points, std::size_t labels, std::size_t causes, std:
 }  // namespace
 
 SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
-    : config_((config.evidence.validate(), config)), store_(store), returns_(store, config.evidence) {}
+    : config_((config.evidence.validate(), config)),
+      store_(store),
+      returns_(store, config.evidence) {}
 
 void SecondPass::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
   if (verdict.scan != scans_.size() || is_decided_) {
