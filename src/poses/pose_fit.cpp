@@ -223,15 +223,17 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
   return rotations;
 }
 
-/// Scans at which chains begin, evenly spread over those behind which the poses move, if these are
-/// enough. A recording that stands for most of the time says in the rest what its poses mean. It
-/// has two scans or more.
+/// Scans at which chains begin, evenly spread over those where the poses move for three steps or
+/// more, if these are enough. A recording that stands for most of the time says in the rest what
+/// its poses mean; one step alone may be a jump of the poses. It has two scans or more.
 std::vector<std::size_t> starts_of_chains(const Recording& recording) {
   constexpr std::size_t kChains = 12, kApart = 4;
   std::vector<std::size_t> all, moving;
+  std::size_t steps = 0;  // that move, up to here
   for (std::size_t i = 0; i + 1 < recording.size(); ++i) {
     all.push_back(i);
-    if (extent_of(motion_between(recording, i, i + 1)) > kExact) moving.push_back(i);
+    steps = extent_of(motion_between(recording, i, i + 1)) > kExact ? steps + 1 : 0;
+    for (std::size_t k = steps == 3 ? i - 2 : i; steps >= 3 && k <= i; ++k) moving.push_back(k);
   }
   const std::vector<std::size_t>& scans = moving.size() < kFewestMotions ? all : moving;
   std::vector<std::size_t> starts;

@@ -101,6 +101,15 @@ TEST_CASE("A drive that stands for most of the time tells what its poses mean") 
   CHECK(d.proposal.convention.invert);
 }
 
+TEST_CASE("Jumps of the poses of a slow sensor are no other reading of them") {
+  auto config = drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 80, 1);
+  config.ego_speed = 0.15;
+  const Diagnosis d = diagnose(Drive(config).with_poses([](std::size_t i, const Pose& T) {
+    return i % 9 == 8 ? Pose(Eigen::Translation3d(0.0, 0.07, 0.0) * T) : T;
+  }));
+  CHECK(d.verdict == PoseVerdict::kAgree);
+}
+
 TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it moves") {
   auto config = drive_of(simulation::Scene::kHighway, simulation::Sensor::kMid360, 30, 603);
   const auto standing = [&](double metres_per_second) {
