@@ -174,7 +174,7 @@ class MountingEstimator {
       ground.up = (normal.z() * side > 0.0 ? 1.0 : -1.0) / area * normal;
       ground.height = -dot(ground.up, a);
       if (!is_possible(ground, side)) continue;
-      const float found = score(ground);
+      const float found = score(ground, best_score);
       if (found <= best_score) continue;
       best_score = found;
       best = ground;
@@ -183,24 +183,35 @@ class MountingEstimator {
   }
 
   // Score of a plane: the weighted number of cells on it, minus half the number of cells below it.
-  float score(const GroundHypothesis& ground) const {
-    const Float8 x(static_cast<float>(ground.up.x()));
-    const Float8 y(static_cast<float>(ground.up.y()));
-    const Float8 z(static_cast<float>(ground.up.z()));
-    const Float8 height(static_cast<float>(ground.height));
-    const Float8 zero(0.0F), one(1.0F), half(0.5F);
-    const Float8 slope(static_cast<float>(0.5 / kOnGround));
-    const Float8 below(static_cast<float>(-kBelow));
-    Float8 total(0.0F);
+  // For a plane that cannot reach `best` some number that is no larger.
+  float score(const GroundHypothesis& ground, float best) const {
     // Ignores the cells of the last, incomplete pack.
-    const std::size_t count = std::min(kScored, cells_.size()) / kPackWidth * kPackWidth;
-    for (std::size_t i = 0; i < count; i += kPackWidth) {
-      const Float8 distance = (x * Float8::load(&scored_.x[i]) + y * Float8::load(&scored_.y[i])) +
-                              (z * Float8::load(&scored_.z[i]) + height);
-      // The weight decreases with distance, so that the plane fits the middle of a rough ground.
-      total = total + max(one - abs(distance) * slope, zero) - keep(distance < below, half);
-    }
-    return sum(total);
+    const std::size_t count = scored_.size() / kPackWidth * kPackWidth;
+    float found = 0.0F;
+    with_packs([&](auto packs) {
+      using Float = typename decltype(packs)::Float;
+      const Float x(static_cast<float>(ground.up.x()));
+      const Float y(static_cast<float>(ground.up.y()));
+      const Float z(static_cast<float>(ground.up.z()));
+      const Float height(static_cast<float>(ground.height));
+      const Float zero(0.0F), one(1.0F), half(0.5F);
+      const Float slope(static_cast<float>(0.5 / kOnGround));
+      const Float below(static_cast<float>(-kBelow));
+      Float total(0.0F);
+      for (std::size_t begin = 0; begin < count; begin += kStepPoints) {
+        const std::size_t end = std::min(count, begin + kStepPoints);
+        for (std::size_t i = begin; i < end; i += kPackWidth) {
+          const Float distance = (x * Float::load(&scored_.x[i]) + y * Float::load(&scored_.y[i])) +
+                                 (z * Float::load(&scored_.z[i]) + height);
+          // The weight decreases with distance, so that the plane fits the middle of a rough
+          // ground.
+          total = total + max(one - abs(distance) * slope, zero) - keep(distance < below, half);
+        }
+        found = sum(total);
+        if (found + static_cast<float>(count - end) <= best) return;
+      }
+    });
+    return found;
   }
 
   static bool is_possible(const GroundHypothesis& ground, double side) {
