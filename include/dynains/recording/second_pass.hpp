@@ -20,7 +20,7 @@ namespace dynains {
 /// The first pass judges a scan by the scans around it: DynaInsRemover. The second one judges it by
 /// all scans of its visit (see Returns). Poses are those by which the first pass compared the
 /// scans. Its verdicts stay in a visit that is so short that it has compared all scans, and in one
-/// with poses that it doubts.
+/// with scans that it doubts.
 ///
 /// Give all scans with their first verdicts to add(), call test(), and give all scans again to
 /// revise(), in the same order. Not for several callers at once. All functions throw what the store

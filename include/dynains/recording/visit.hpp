@@ -58,7 +58,7 @@ class Visit {
   std::uint32_t scans() const { return static_cast<std::uint32_t>(T_level_sensor_.size()); }
   /// Scans of the recording from the first one of the visit to the last one.
   std::uint32_t length() const { return last_ - first_ + 1; }
-  /// Whether the first pass has doubted the poses of a scan, so that scans may not fit.
+  /// Whether the first pass has doubted a scan: its poses, rays or units.
   bool is_suspicious() const { return is_suspicious_; }
   std::size_t place_count() const { return places_.size(); }
 
