@@ -162,7 +162,6 @@ void score(const std::vector<std::unique_ptr<Scan>>& scans,
     scan.xyz = scans[i]->xyzi.data();
     scan.stride = 4;
     scan.T_world_sensor = scans[i]->T_world_sensor;
-    scan.time = scans[i]->time;
     scan.truth = scans[i]->truth;
     scan.in_map = in_map[i];
     return true;
