@@ -223,9 +223,9 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
   return rotations;
 }
 
-/// Scans at which chains begin, evenly spread over those where the poses move for three steps or
-/// more, if these are enough. A recording that stands for most of the time says in the rest what
-/// its poses mean; one step alone may be a jump of the poses. It has two scans or more.
+/// Scans at which chains begin, evenly spread. A recording that stands for most of the time says in
+/// the rest what its poses mean: where they move for three steps or more, since one step alone may
+/// be a jump. It has two scans or more.
 std::vector<std::size_t> starts_of_chains(const Recording& recording) {
   constexpr std::size_t kChains = 12, kApart = 4;
   std::vector<std::size_t> all, moving;
@@ -235,7 +235,8 @@ std::vector<std::size_t> starts_of_chains(const Recording& recording) {
     steps = extent_of(motion_between(recording, i, i + 1)) > kExact ? steps + 1 : 0;
     for (std::size_t k = steps == 3 ? i - 2 : i; steps >= 3 && k <= i; ++k) moving.push_back(k);
   }
-  const std::vector<std::size_t>& scans = moving.size() < kFewestMotions ? all : moving;
+  const bool stands = 2 * moving.size() < all.size() && moving.size() >= kFewestMotions;
+  const std::vector<std::size_t>& scans = stands ? moving : all;
   std::vector<std::size_t> starts;
   const std::size_t count = std::min(kChains, scans.size());
   for (std::size_t offset = 0; offset < kApart; ++offset) {

@@ -26,11 +26,11 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If the
-/// poses move at 6 places or more, no others are taken. The given poses are one of several first
-/// guesses. Pairs that determine no motion are left out, and those whose landmarks meet better
-/// under the given poses. Places that follow each other are far apart: `suffice` tells of the
-/// motions so far whether further places are needed. Throws IoError.
+/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If it
+/// stands for most of the time, the places are where its poses move. The given poses are one of
+/// several first guesses. Pairs that determine no motion are left out, and those whose landmarks
+/// meet better under the given poses. Places that follow each other are far apart: `suffice` tells
+/// of the motions so far whether further places are needed. Throws IoError.
 std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);
