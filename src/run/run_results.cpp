@@ -226,9 +226,7 @@ void RunResults::add_scan(const RecordedScan& scan, const ScanVerdict& verdict) 
   const auto labels = has_labels ? recording_.read_labels(index) : std::vector<std::uint32_t>();
   if (map_attributes_) map_attributes_->add(scan, verdict, labels);
   if (session_ == nullptr) return;
-  PointBuffer points;
-  copy_points(scan, points);
-  session_->add(points, verdict.labels, labels, verdict.T_world_sensor,
+  session_->add(judged_.points, verdict.labels, labels, verdict.T_world_sensor,
                 static_cast<std::uint32_t>(index));
 }
 
