@@ -228,20 +228,22 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
 /// be a jump. It has two scans or more.
 std::vector<std::size_t> starts_of_chains(const Recording& recording) {
   constexpr std::size_t kChains = 12, kApart = 4;
-  std::vector<std::size_t> all, moving;
+  const std::size_t all = recording.size() - 1;
+  std::vector<std::size_t> moving;
   std::size_t steps = 0;  // that move, up to here
-  for (std::size_t i = 0; i + 1 < recording.size(); ++i) {
-    all.push_back(i);
+  for (std::size_t i = 0; i < all; ++i) {
     steps = extent_of(motion_between(recording, i, i + 1)) > kExact ? steps + 1 : 0;
-    for (std::size_t k = steps == 3 ? i - 2 : i; steps >= 3 && k <= i; ++k) moving.push_back(k);
+    if (steps == 3) moving.insert(moving.end(), {i - 2, i - 1});
+    if (steps >= 3) moving.push_back(i);
   }
-  const bool stands = 2 * moving.size() < all.size() && moving.size() >= kFewestMotions;
-  const std::vector<std::size_t>& scans = stands ? moving : all;
+  const bool stands = 2 * moving.size() < all && moving.size() >= kFewestMotions;
+  const std::size_t places = stands ? moving.size() : all;
   std::vector<std::size_t> starts;
-  const std::size_t count = std::min(kChains, scans.size());
+  const std::size_t count = std::min(kChains, places);
   for (std::size_t offset = 0; offset < kApart; ++offset) {
     for (std::size_t k = offset; k < count; k += kApart) {
-      starts.push_back(scans[count == 1 ? 0 : k * (scans.size() - 1) / (count - 1)]);
+      const std::size_t place = count == 1 ? 0 : k * (places - 1) / (count - 1);
+      starts.push_back(stands ? moving[place] : place);
     }
   }
   return starts;
