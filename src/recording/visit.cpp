@@ -39,6 +39,7 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPos
   is_suspicious_ = is_suspicious_ || compared.is_suspicious;
   T_level_sensor_.push_back(T);
   last_ = static_cast<std::uint32_t>(verdict.scan);
+  if (is_suspicious_) return;  // first verdicts stay
   places_.add(points, verdict.labels, verdict.causes, T, verdict.time, number);
   ground_.add(points, verdict.labels, T);
   const RecordingReference* const reference = references_.add(points, verdict.labels, T, number);
