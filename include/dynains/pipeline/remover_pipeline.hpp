@@ -1,4 +1,4 @@
-// What the facade calls of the pipeline.
+// The interface by which the facade calls the pipeline.
 #pragma once
 
 #include <cstddef>
