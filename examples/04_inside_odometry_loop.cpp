@@ -1,7 +1,7 @@
 // Behind an odometry: the pose of the newest scan is corrected, and its moving points are removed.
 #include <cmath>
 #include <cstdio>
-#include <dynains/adapters/odometry_corrector.hpp>
+#include <dynains/odometry/odometry.hpp>
 #include <vector>
 
 using Cloud = std::vector<Eigen::Vector3d>;
@@ -30,7 +30,7 @@ Eigen::Isometry3d register_motion(const Cloud& /*scan*/) {
 
 int main() {
   using dynains::PointLabel;
-  dynains::OdometryCorrector corrector;
+  dynains::Odometry corrector;
   Eigen::Isometry3d T_odometry = Eigen::Isometry3d::Identity();  // poses of the odometry alone
   double y = 0.0;                                                // m, corrected
   Cloud map;                                                     // replaces the map of the odometry
@@ -44,7 +44,7 @@ int main() {
     if (i > 0) T_odometry = T_odometry * register_motion(scan);
 
     // 2. Correct the pose of the odometry.
-    const auto result = corrector.correct(scan, T_odometry, time);
+    const auto result = corrector.push(scan, {}, time, T_odometry);
     y = result.T_world_sensor.translation().y();
 
     // 3. Insert the static points into the map. Points out of range are not judged and stay.

@@ -1,5 +1,5 @@
-// A small but complete LiDAR odometry (small_odometry.hpp) drives through a simulated street,
-// refines its poses as in docs/embedding.md, and compares both trajectories with the true poses.
+// A small but complete LiDAR odometry (small_odometry.hpp) drives through a simulated street. Its
+// poses are refined as in docs/embedding.md, and both trajectories compared with the true poses.
 //
 //   example_odometry [scene] [sensor] [scans] [seed]
 //
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <dynains/adapters/odometry_corrector.hpp>
+#include <dynains/odometry/odometry.hpp>
 #include <dynains/simulation/simulator.hpp>
 #include <vector>
 
@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   dynains::simulation::Simulator simulator(street);
 
   Odometry odometry;
-  dynains::OdometryCorrector corrector;
+  dynains::Odometry corrector;
   const Eigen::Isometry3d T_first_world = simulator.scan(0).T_world_sensor.inverse();
   Errors of_odometry, refined;
   std::size_t points = 0, dynamic = 0;
@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
     const dynains::simulation::SimulatedScan scan = simulator.scan(i);
     const Points cloud = points_of(scan);
     const Eigen::Isometry3d T_odometry = odometry.register_scan(cloud);
-    const auto result = corrector.correct(cloud, T_odometry, scan.time);
+    const auto result = corrector.push(cloud, {}, scan.time, T_odometry);
     for (const dynains::PointLabel label : result.frame.newest.labels) {
       dynamic += label == dynains::PointLabel::kDynamic ? 1 : 0;
     }

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "poses/scan_registration.hpp"
@@ -46,36 +45,54 @@ std::vector<Pose> motions_near(const Pose& T_map_near) {
 
 class Odometry::Loop {
  public:
-  explicit Loop(const Config& config) : config_(config), scan_(config.nearest, config.farthest) {}
+  Loop(const Config& config, const DynaInsRemover::Config& remover)
+      : config_(config), remover_config_(remover), scan_(config.nearest, config.farthest) {}
 
-  OdometryResult push(RawPoints<float> points, Span<const double> offsets, double time) {
-    check(points, offsets);
-    scan_.take(points, offsets);
+  OdometryResult push(const detail::CloudView& cloud, Span<const double> offsets, double time,
+                      std::optional<Pose> T_odometry_sensor) {
+    check(cloud, offsets);
+    if (T_odometry_sensor) {
+      validate_pose("T_odometry_sensor", *T_odometry_sensor);
+      T_odometry_sensor = orthonormalized(*T_odometry_sensor);
+    }
+    scan_.take(cloud, offsets);
     const double mean_time = time + scan_.mean_offset();
     check_time(mean_time);
     const double period = scan_count_ > 0 ? mean_time - mean_time_ : 1.0;
     OdometryResult result;
-    Pose T_last_newest = predicted_motion(period);
+    const Pose T_predicted = predicted_motion(period, T_odometry_sensor);
+    Pose T_last_newest = T_predicted;
     result.loss = register_scan(period, T_last_newest, result);
+    const bool is_lost = result.loss != OdometryLoss::kNone;
+    const bool is_taken = !is_lost || T_odometry_sensor;
+    if (is_lost && T_odometry_sensor) {
+      T_last_newest = T_predicted;
+      scan_.prepare(T_last_newest, period);
+      if (result.loss != OdometryLoss::kFewPoints) map_ = SurfaceGrid(true);
+    }
     const double stamp = 1.0 - scan_.mean_offset() / period;  // 0: last scan, 1: this one
-    if (first_ && result.loss == OdometryLoss::kNone) {
+    if (first_ && is_taken) {
       const double first_stamp = -first_->mean_offset() / period;
-      T_world_start_ = extrapolate(Pose::Identity(), T_last_newest, first_stamp);
+      const Pose T_world_start = extrapolate(Pose::Identity(), T_last_newest, first_stamp);
+      T_result_world_ = T_result_world_ * T_world_start.inverse();
     }
     if (scan_count_ > 0) {
-      result.T_world_sensor = T_world_start_.inverse() * T_world_last_ *
-                              extrapolate(Pose::Identity(), T_last_newest, stamp);
+      result.T_world_sensor =
+          T_result_world_ * T_world_last_ * extrapolate(Pose::Identity(), T_last_newest, stamp);
+    } else if (T_odometry_sensor) {
+      T_result_world_ = result.T_world_sensor = *T_odometry_sensor;
     }
-    if (result.loss == OdometryLoss::kNone) take(T_last_newest, period, mean_time, result);
+    if (!is_taken) return result;
+    if (T_odometry_sensor) T_odometry_last_ = *T_odometry_sensor;
+    take(T_last_newest, period, mean_time, result);
     return result;
   }
 
  private:
-  static void check(RawPoints<float> points, Span<const double> offsets) {
-    const std::size_t count = PointCloudTraits<RawPoints<float>>::size(points);
-    if (offsets.empty() || offsets.size() == count) return;
-    throw CloudError(std::to_string(offsets.size()) + " offsets for " + std::to_string(count) +
-                     " points; expected one for each, or none");
+  static void check(const detail::CloudView& cloud, Span<const double> offsets) {
+    if (offsets.empty() || offsets.size() == cloud.size()) return;
+    throw CloudError(std::to_string(offsets.size()) + " offsets for " +
+                     std::to_string(cloud.size()) + " points; expected one for each, or none");
   }
 
   void check_time(double mean_time) const {
@@ -84,8 +101,10 @@ class Odometry::Loop {
                     std::to_string(mean_time_) + " s");
   }
 
-  /// At constant velocity.
-  Pose predicted_motion(double period) const {
+  /// That of another odometry, or at constant velocity.
+  Pose predicted_motion(double period, const std::optional<Pose>& T_odometry_sensor) const {
+    if (T_odometry_sensor && scan_count_ > 0)
+      return T_odometry_last_.inverse() * *T_odometry_sensor;
     if (period_ <= 0.0) return Pose::Identity();
     return extrapolate(Pose::Identity(), T_last_newest_, period / period_);
   }
@@ -145,18 +164,15 @@ class Odometry::Loop {
   void take(const Pose& T_last_newest, double period, double mean_time, OdometryResult& result) {
     T_world_last_ = orthonormalized(T_world_last_ * T_last_newest);
     if (config_.remove) {
-      if (scan_count_ < 2) remover_.emplace(DynaInsRemover::Config::odometry());
+      if (scan_count_ < 2) remover_.emplace(remover_config_);
       if (first_) remover_->push(first_->cloud(), Pose::Identity(), mean_time_);
-      const FrameResult& frame = remover_->push(scan_.cloud(), T_world_last_, mean_time);
-      result.labels = frame.newest.labels;
-      result.began_epoch = frame.began_epoch;
-      result.plausibility = frame.plausibility;
+      result.frame = remover_->push(scan_.cloud(), T_world_last_, mean_time);
     }
     scan_.adapt();
     if (scan_count_ == 0) {
       first_ = scan_;
     } else {
-      add_to_map(result.labels);
+      add_to_map(result.frame.newest.labels);
       first_.reset();
       T_last_newest_ = T_last_newest;
       period_ = period;
@@ -178,14 +194,15 @@ class Odometry::Loop {
     centre_ = centre;
   }
 
-  // Poses of scans are those at the mean time of their points. The frame `world` is the first one;
-  // results refer to `start`, the sensor at the stamp of the first scan.
+  // Poses of scans are those at the mean time of their points. The frame `world` is the first one.
   Config config_;
+  DynaInsRemover::Config remover_config_;
   ScanPreparation scan_;
   std::optional<ScanPreparation> first_;  // until the motion of the first scan is known
   SurfaceGrid map_{true};
   std::optional<DynaInsRemover> remover_;
-  Pose T_world_start_ = Pose::Identity();
+  Pose T_result_world_ = Pose::Identity();
+  Pose T_odometry_last_ = Pose::Identity();
   Pose T_world_last_ = Pose::Identity();
   Pose T_last_newest_ = Pose::Identity();
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();  // m, of the map
@@ -194,16 +211,18 @@ class Odometry::Loop {
   std::size_t scan_count_ = 0;
 };
 
-Odometry::Odometry(const Config& config) {
+Odometry::Odometry(const Config& config, const DynaInsRemover::Config& remover) {
   config.validate();
-  loop_ = std::make_unique<Loop>(config);
+  remover.validate();
+  loop_ = std::make_unique<Loop>(config, remover);
 }
 Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
-OdometryResult Odometry::push(RawPoints<float> points, Span<const double> offsets, double time) {
-  return loop_->push(points, offsets, time);
+OdometryResult Odometry::register_scan(const detail::CloudView& cloud, Span<const double> offsets,
+                                       double time, const std::optional<Pose>& T_odometry_sensor) {
+  return loop_->push(cloud, offsets, time, T_odometry_sensor);
 }
 
 }  // namespace dynains

@@ -13,10 +13,11 @@ constexpr double kLongest = 0.5;  // s from the stamp, of offsets that can be ri
 
 }  // namespace
 
-void ScanPreparation::take(RawPoints<float> points, Span<const double> offsets) {
-  measured_.resize(3 * points.count);
-  for (std::size_t i = 0; i < points.count; ++i) {
-    std::copy_n(points.data + i * points.stride, 3, &measured_[3 * i]);
+void ScanPreparation::take(const detail::CloudView& cloud, Span<const double> offsets) {
+  measured_.resize(3 * cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    float* const p = &measured_[3 * i];
+    cloud.copy(i, 1, p, p + 1, p + 2);
   }
   offsets_.assign(offsets.begin(), offsets.end());
   double sum = 0.0;

@@ -23,7 +23,7 @@ class ScanPreparation {
   ScanPreparation(double nearest, double farthest) : nearest_(nearest), farthest_(farthest) {}
 
   /// Copies a scan. `offsets`: s from the stamp, empty or one per point.
-  void take(RawPoints<float> points, Span<const double> offsets);
+  void take(const detail::CloudView& cloud, Span<const double> offsets);
   /// s from the stamp; 0 without offsets. A registration of points that are de-skewed to this time
   /// hardly changes with an error of the velocity.
   double mean_offset() const { return mean_offset_; }

@@ -33,7 +33,7 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
                         const std::function<void(std::size_t, std::size_t)>& progress,
                         std::vector<Pose>& poses) {
   const InterruptGuard interrupt;
-  Odometry odometry{OdometryConfig()};
+  Odometry odometry;
   PoseEstimate estimate;
   RecordedScan scan;
   ReadAhead scans(recording, range.first, range.last,
@@ -50,8 +50,8 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
     }
     if (result.free_directions > 0) ++estimate.uncertain_scans;
     TimingRow& row = estimate.timing.rows.emplace_back();
-    row.began_epoch = result.began_epoch;
-    row.plausibility = result.plausibility;
+    row.began_epoch = result.frame.began_epoch;
+    row.plausibility = result.frame.plausibility;
     poses.push_back(result.T_world_sensor);
     progress(poses.size(), range.size());
   }

@@ -26,6 +26,16 @@ TEST_CASE("16 numbers are a pose in either order") {
   CHECK(pose_from_column_major(kColumns.data()).isApprox(expected(), 1e-12));
 }
 
+TEST_CASE("Matrices and transforms of float and double are poses") {
+  const Eigen::Isometry3d T = expected();
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = T.matrix();
+  CHECK(to_pose(T).isApprox(T, 0.0));
+  CHECK(to_pose(T.matrix()).isApprox(T, 0.0));
+  CHECK(to_pose(rows).isApprox(T, 0.0));
+  CHECK(to_pose(Eigen::Affine3d(T)).isApprox(T, 0.0));
+  CHECK(to_pose(T.cast<float>()).isApprox(T, 1e-6));
+}
+
 TEST_CASE("16 numbers in the wrong order are refused with this reason") {
   CHECK_THROWS_WITH(pose_from_row_major(kColumns.data()),
                     "16 numbers read as a row-major pose have the translation in the last row: "

@@ -23,6 +23,17 @@ std::vector<TimeDoubt> doubts_of(double interval) {
   return doubts_at(remover, {0, interval, 2 * interval, 3 * interval, 4 * interval});
 }
 
+TEST_CASE("an epoch that the caller begins is told, and has no residual") {
+  const std::vector<Scan> scans = drive(yard(), 4, 5.0);
+  DynaInsRemover remover;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    if (i == 2) remover.start_epoch();
+    const FrameResult frame = remover.push(scans[i].points, scans[i].T_world_sensor.matrix());
+    CHECK(frame.began_epoch.has_value() == (i == 0 || i == 2));
+    CHECK(frame.pose_residual.has_value() == (i == 1 || i == 3));
+  }
+}
+
 TEST_CASE("a residual names the scan that its motion begins with, also after a refused push") {
   const std::vector<Scan> scans = drive(yard(), 4, 5.0);
   DynaInsRemover remover;

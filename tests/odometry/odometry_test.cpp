@@ -70,7 +70,7 @@ TEST_CASE("In a hall and in a crowd, poses are found to centimetres, with and wi
 /// Median of the errors of the motion from scan to scan, m, for stamps `shift` s after the first
 /// point of each scan.
 double error_of_motion(const std::vector<simulation::SimulatedScan>& scans, double shift) {
-  Odometry odometry{OdometryConfig()};
+  Odometry odometry;
   std::vector<double> errors;
   Pose T_world_estimated = Pose::Identity(), T_world_exact = Pose::Identity();
   for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
@@ -123,7 +123,7 @@ TEST_CASE("Some lost scans are bridged, and a longer gap ends the track") {
   simulation::Config config = place(simulation::Scene::kUrban, 26);
   config.ego_speed = 10.0;
   simulation::Simulator street(config);
-  Odometry odometry{OdometryConfig()};
+  Odometry odometry;
   const Pose T_first_world = street.scan(0).T_world_sensor.inverse();
   const auto push = [&](std::size_t i) {
     const auto scan = street.scan(i);
@@ -141,6 +141,45 @@ TEST_CASE("Some lost scans are bridged, and a longer gap ends the track") {
   CHECK(push(15).first == OdometryLoss::kNone);
 }
 
+TEST_CASE("Behind another odometry, its wrong motions are corrected, and its first pose stays") {
+  simulation::Simulator hall(place(simulation::Scene::kHall, 12));
+  Odometry odometry;
+  for (std::size_t i = 0; i < hall.size(); ++i) {
+    const auto scan = hall.scan(i);
+    Pose T_wrong = scan.T_world_sensor;
+    T_wrong.translation().y() += 0.05 * static_cast<double>(i);
+    const OdometryResult found = odometry.push(points_of(scan), {}, scan.time, T_wrong);
+    CHECK(found.frame.newest.labels.size() == points_of(scan).count);
+    const double error =
+        (found.T_world_sensor.translation() - scan.T_world_sensor.translation()).norm();
+    CHECK(error < (i == 0 ? 1e-9 : 0.1));
+  }
+}
+
+TEST_CASE("Behind another odometry, a scan that does not fit keeps its motion") {
+  simulation::Simulator hall(place(simulation::Scene::kHall, 8));
+  simulation::Simulator street(place(simulation::Scene::kUrban, 8));
+  Odometry odometry;
+  const auto push = [&](const simulation::SimulatedScan& scan, double x, double time) {
+    return odometry.push(points_of(scan), {}, time, Pose(Eigen::Translation3d(x, 0, 0)));
+  };
+  double x = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    x = push(hall.scan(0), 7.0, 0.1 * static_cast<double>(i)).T_world_sensor.translation().x();
+  }
+  CHECK(x == Approx(7.0).margin(0.02));
+  const OdometryResult lost = push(street.scan(4), 9.0, 0.4);
+  CHECK(lost.loss == OdometryLoss::kNoOverlap);
+  CHECK(lost.T_world_sensor.translation().x() == Approx(x + 2.0));
+  CHECK(lost.frame.newest.labels.size() == points_of(street.scan(4)).count);
+  const std::vector<Eigen::Vector3f> empty;
+  const Pose T_empty(Eigen::Translation3d(9.1, 0, 0));
+  CHECK(odometry.push(empty, {}, 0.45, T_empty).loss == OdometryLoss::kFewPoints);
+  const OdometryResult next = push(street.scan(4), 9.3, 0.5);  // the sensor stands
+  CHECK(next.loss == OdometryLoss::kNone);
+  CHECK(next.T_world_sensor.translation().x() == Approx(x + 2.0).margin(0.02));
+}
+
 TEST_CASE("Same scans, same bits") {
   const simulation::Config config = place(simulation::Scene::kCrowd, 8);
   const Drive a = drive(config, {}), b = drive(config, {});
@@ -152,7 +191,7 @@ TEST_CASE("Same scans, same bits") {
 TEST_CASE("A lost scan is told and does not enter the map") {
   simulation::Simulator hall(place(simulation::Scene::kHall, 8));
   simulation::Simulator street(place(simulation::Scene::kUrban, 8));
-  Odometry with_loss{OdometryConfig()}, without{OdometryConfig()};
+  Odometry with_loss, without;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto scan = hall.scan(i);
     with_loss.push(points_of(scan), {}, scan.time);
@@ -171,7 +210,7 @@ TEST_CASE("A lost scan is told and does not enter the map") {
 
 TEST_CASE("Wrong input throws and changes nothing") {
   simulation::Simulator hall(place(simulation::Scene::kHall, 3));
-  Odometry odometry{OdometryConfig()};
+  Odometry odometry;
   const auto first = hall.scan(0), second = hall.scan(1);
   odometry.push(points_of(first), {}, first.time);
   const std::vector<double> offsets(7, 0.0);
@@ -179,7 +218,9 @@ TEST_CASE("Wrong input throws and changes nothing") {
   CHECK_THROWS_AS(odometry.push(points_of(second), {}, first.time), PoseError);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_AS(odometry.push(points_of(second), {}, nan), PoseError);
-  CHECK_THROWS_AS(odometry.push({nullptr, 10, 4}, {}, second.time), CloudError);
+  CHECK_THROWS_AS(odometry.push(RawPoints<float>{nullptr, 10, 4}, {}, second.time), CloudError);
+  CHECK_THROWS_AS(odometry.push(points_of(second), {}, second.time, Eigen::Matrix4d::Zero()),
+                  PoseError);
   CHECK(odometry.push(points_of(second), {}, second.time).loss == OdometryLoss::kNone);
 }
 

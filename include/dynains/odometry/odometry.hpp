@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "dynains/compiled_remover.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
@@ -48,18 +49,17 @@ constexpr std::array<const char*, 4> value_names(OdometryLoss) {
 
 /// The answer to one scan.
 struct OdometryResult {
-  /// At the stamp, in the frame of the first scan at its stamp. After a loss: the predicted pose.
+  /// At the stamp, in the frame of the first scan at its stamp, or of the poses of another
+  /// odometry, whose first pose stays. After a loss: the predicted pose.
   Pose T_world_sensor = Pose::Identity();
   OdometryLoss loss = OdometryLoss::kNone;
   double fit = 1.0;  ///< mean weight of the points at planes and poles of the map, [0, 1]
   /// Number of directions of motion, of six, that the surfaces do not determine, as along a
   /// corridor. Along them the motion is the predicted one.
   int free_directions = 0;
-  /// Verdict of the remover without latency, one label per point, valid until the next push; empty
-  /// without `OdometryConfig::remove`, and after a loss.
-  Span<const PointLabel> labels;
-  std::optional<EpochReason> began_epoch;  ///< that of the remover, as in FrameResult
-  Plausibility plausibility;               ///< likewise
+  /// That of the remover, with the labels of the points as they were pushed; empty without
+  /// `OdometryConfig::remove`, and for a scan that does not enter the map.
+  FrameResult frame;
 };
 
 /// Scans in, poses out. Each scan is predicted at constant velocity, de-skewed to the mean time of
@@ -71,21 +71,38 @@ class Odometry {
  public:
   using Config = OdometryConfig;
 
-  /// Throws ConfigError.
-  explicit Odometry(const Config& config);
+  /// `remover`: parameters of the removal. Throws ConfigError.
+  explicit Odometry(const Config& config = {},
+                    const DynaInsRemover::Config& remover = DynaInsRemover::Config::odometry());
   Odometry(Odometry&&) noexcept;
   Odometry& operator=(Odometry&&) noexcept;
   ~Odometry();
 
-  /// Takes the next scan: points in m, sensor frame; NaN, infinity and the origin are no returns.
-  /// `offsets`: for each point the seconds from `time` (s) until it was measured, or none if the
-  /// points are all of one time; a point without a finite offset keeps its place. Throws CloudError
-  /// if the numbers of offsets and points differ, and PoseError if the mean time of the points is
-  /// not after that of the scan before; the state is then unchanged. A lost scan does not enter the
-  /// map.
-  OdometryResult push(RawPoints<float> points, Span<const double> offsets, double time);
+  /// Takes the next scan: any cloud with PointCloudTraits, in m, sensor frame; NaN, infinity and
+  /// the origin are no returns. `offsets`: for each point the seconds from `time` (s) until it was
+  /// measured, or none if the points are all of one time; a point without a finite offset keeps its
+  /// place. Throws CloudError if the numbers of offsets and points differ, and PoseError if the
+  /// mean time of the points is not after that of the scan before; the state is then unchanged. A
+  /// lost scan does not enter the map.
+  template <class Cloud>
+  OdometryResult push(const Cloud& cloud, Span<const double> offsets, double time) {
+    return register_scan(detail::CloudView(cloud), offsets, time, std::nullopt);
+  }
+
+  /// As above, behind another odometry: its motions replace the prediction at constant velocity, so
+  /// they stay along directions that the surfaces do not determine. `T_odometry_sensor`: its pose
+  /// of the sensor, without corrections, always at the same time within a scan. If the scan is
+  /// lost, its motion stays, and the map begins anew unless the points are too few.
+  template <class Cloud, class PoseLike>
+  OdometryResult push(const Cloud& cloud, Span<const double> offsets, double time,
+                      const PoseLike& T_odometry_sensor) {
+    return register_scan(detail::CloudView(cloud), offsets, time, to_pose(T_odometry_sensor));
+  }
 
  private:
+  OdometryResult register_scan(const detail::CloudView& cloud, Span<const double> offsets,
+                               double time, const std::optional<Pose>& T_odometry_sensor);
+
   class Loop;
   std::unique_ptr<Loop> loop_;
 };

@@ -20,7 +20,7 @@ struct KissIcpLookAlike {
 };
 
 void kiss_icp_loop(KissIcpLookAlike& odometry, const std::vector<Eigen::Vector3d>& points,
-                   const std::vector<double>& timestamps, double time,
+                   const std::vector<double>& offsets, double time,
                    std::vector<dynains::Pose>& trajectory) {
 #include "embedding_3.inc"
 }
