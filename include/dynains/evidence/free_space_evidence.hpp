@@ -54,17 +54,7 @@ class FreeSpaceEvidence {
         judge_(config),
         dynamic_grid_(config),
         moved_ground_(config),
-        records_(static_cast<std::size_t>(config.lookahead_scans) + 2) {
-    const detail::ReferenceSpan& span = references_.span();
-    for (int phase = 0; phase < span.sparse_step; ++phase) {
-      lags_before_.push_back(span.lags_before(phase));
-    }
-    for (int phase = 0; phase < span.step; ++phase) {
-      const auto delay = static_cast<int>(delay_of(static_cast<std::uint64_t>(phase)));
-      lags_after_.push_back(
-          detail::reference_lags(config.lookahead_scans - delay, span.step - phase, span.step));
-    }
-  }
+        records_(static_cast<std::size_t>(config.lookahead_scans) + 2) {}
 
   const Config& config() const { return config_; }
 
@@ -263,10 +253,10 @@ class FreeSpaceEvidence {
   }
 
   void test_against_earlier_references(std::uint64_t scan, Record& record) {
-    for (const int lag : lags_before_[record.since_begin % lags_before_.size()]) {
-      const auto back = static_cast<std::uint64_t>(lag);
-      if (back > record.since_begin) break;
-      const detail::ReferenceScan* const reference = references_.find(scan - back, record.epoch);
+    const auto lookback = static_cast<std::uint64_t>(config_.lookback_scans);
+    for (std::uint64_t age = 1; age <= record.since_begin && age <= lookback; ++age) {
+      if (!references_.span().compares(record.since_begin, static_cast<int>(age))) continue;
+      const detail::ReferenceScan* const reference = references_.find(scan - age, record.epoch);
       if (reference != nullptr) test(record, *reference, newest_visibility_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
@@ -275,7 +265,7 @@ class FreeSpaceEvidence {
 
   // Scans since the latest reference.
   std::uint64_t phase_of(const Record& record) const {
-    return record.since_begin % lags_after_.size();
+    return record.since_begin % static_cast<std::uint64_t>(config_.reference_step);
   }
 
   // Tests all samples of a scan against one reference. `memory`: of the thread.
@@ -303,17 +293,15 @@ class FreeSpaceEvidence {
 
   // Tests older scans of the phases with this delay against the newest image.
   void test_older_scans(std::uint64_t delay) {
-    if (references_.newest().scan + phase_of(record_of(newest_)) != newest_) return;
-    for (std::uint64_t phase = 0; phase < lags_after_.size(); ++phase) {
-      if (delay_of(phase) == delay) test_older_scans_of_phase(phase, references_.newest());
-    }
-  }
-  void test_older_scans_of_phase(std::uint64_t phase, const detail::ReferenceScan& reference) {
-    for (const int lag : lags_after_[phase]) {
-      const auto back = static_cast<std::uint64_t>(lag);
-      if (back > reference.scan) break;
-      Record& older = record_of(reference.scan - back);
-      if (older.epoch != reference.epoch) continue;
+    const detail::ReferenceScan& reference = references_.newest();
+    if (reference.scan + phase_of(record_of(newest_)) != newest_) return;
+    const int most = config_.lookahead_scans - static_cast<int>(delay);
+    for (int age = 1; age <= most && static_cast<std::uint64_t>(age) <= reference.scan; ++age) {
+      Record& older = record_of(reference.scan - static_cast<std::uint64_t>(age));
+      if (older.epoch != reference.epoch || delay_of(phase_of(older)) != delay ||
+          !detail::is_compared(age, config_.reference_step, most)) {
+        continue;
+      }
       test(older, reference, older_visibility_);
       update_own_log_odds(older);
     }
@@ -414,9 +402,7 @@ class FreeSpaceEvidence {
   std::uint64_t epoch_ = 0;         // number of the begun epochs
   std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
   std::uint64_t newest_ = 0;
-  std::vector<std::vector<int>> lags_before_;  // by scan since the begin, modulo their number
-  std::vector<std::vector<int>> lags_after_;   // by scans since the latest reference
-  std::vector<Record> records_;                // ring buffer, by scan number
+  std::vector<Record> records_;  // ring buffer, by scan number
   Judged provisional_, final_;
   std::vector<std::uint32_t> newest_number_of_point_, group_of_;
   std::vector<Verdict> groups_;                     // by number of the supervoxel

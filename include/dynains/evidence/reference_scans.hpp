@@ -25,20 +25,14 @@ namespace dynains::detail {
 inline constexpr std::array<int, 19> kReferenceLags = {2,  4,  6,  8,  10,  13,  16,  20,  25, 30,
                                                        40, 50, 65, 80, 100, 125, 150, 175, 200};
 
-/// The lags (scans) of kReferenceLags above `above` and up to `most`, each rounded up to a lag with
-/// lag % step == remainder % step; a result above `most` is rounded down instead. Ascending, unique
-/// and above `above`.
-inline std::vector<int> reference_lags(int most, int remainder, int step, int above = 0) {
-  const auto to_next = [&](int lag) { return ((remainder - lag) % step + step) % step; };
-  const int last = most >= 0 ? most + to_next(most) - (to_next(most) > 0 ? step : 0) : 0;
-  std::vector<int> lags;
-  for (const int reference_lag : kReferenceLags) {
-    if (reference_lag >= most + step) break;
-    if (reference_lag <= above) continue;
-    const int lag = std::min(reference_lag + to_next(reference_lag), last);
-    if (lag > (lags.empty() ? above : lags.back())) lags.push_back(lag);
-  }
-  return lags;
+/// Whether a scan is compared with the reference that is `age` scans away, if references are
+/// `spacing` scans apart and at most `most` scans away: the nearest one behind some lag above
+/// `above`. The farthest one also serves lags behind it.
+inline bool is_compared(int age, int spacing, int most, int above = 0) {
+  const auto lag = std::upper_bound(kReferenceLags.begin(), kReferenceLags.end(),
+                                    std::max(age - spacing, above));
+  const int last = age + spacing > most ? most + spacing - 1 : age;
+  return age > above && age <= most && lag != kReferenceLags.end() && *lag <= last;
 }
 
 /// Which scans are references, and for how long. Every `step`-th scan of an epoch is a reference
@@ -65,13 +59,14 @@ struct ReferenceSpan {
     const int sparse = lookback > near ? (lookback - near) / sparse_step + 1 : 0;
     return static_cast<std::size_t>(dense) + static_cast<std::size_t>(sparse);
   }
-  /// Distances (scans) from a scan to its earlier references, ascending. `phase`: number of the
-  /// scan since the begin of its epoch, modulo `sparse_step`.
-  std::vector<int> lags_before(int phase) const {
-    std::vector<int> lags = reference_lags(std::min(lookback, near), phase, step);
-    const std::vector<int> sparse = reference_lags(lookback, phase, sparse_step, near);
-    lags.insert(lags.end(), sparse.begin(), sparse.end());
-    return lags;
+  /// Whether a scan, `since_begin` scans after the first one of its epoch, is compared with the one
+  /// `age` scans before it.
+  bool compares(std::uint64_t since_begin, int age) const {
+    const int spacing = age <= near ? step : sparse_step;
+    if ((since_begin - static_cast<std::uint64_t>(age)) % static_cast<std::uint64_t>(spacing) != 0)
+      return false;
+    return age <= near ? is_compared(age, spacing, std::min(lookback, near))
+                       : is_compared(age, spacing, lookback, near);
   }
   /// Whether a reference is needed by scans `age` (scans) after it.
   bool needs(std::uint64_t since_begin, std::uint64_t age) const {
