@@ -129,8 +129,6 @@ TEST_CASE("only compact instances are presumed to move, from the sixth scan of a
   CHECK(is_presumed({11.7F, 2.9F}));
   CHECK_FALSE(is_presumed({12.6F, 2.9F}));
   CHECK_FALSE(is_presumed({11.7F, 3.6F}));
-  config.use_tracks = false;
-  CHECK_FALSE(is_presumed({2.0F, 1.5F}));
 }
 
 TEST_CASE("the evidence of scans before an instance and that of scans after it are kept apart") {
@@ -197,9 +195,6 @@ TEST_CASE("evidence from a later scan is carried along the track to scans beside
   CHECK(causes() == Causes{Cause::kAlongTrack});
   config.tau_track = 0.84;
   CHECK(causes() == Causes{Cause::kNoEvidence});
-  config.tau_track = 0.83;
-  config.use_tracks = false;
-  CHECK(causes() == Causes{Cause::kNoEvidence});
 }
 
 // In one scan, both are one instance, and one supervoxel at the border has few samples to see.
@@ -222,19 +217,15 @@ TEST_CASE("returns of a moved object do not contest a later object in its place"
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = 4;
   config.lookahead_scans = 0;
-  config.use_tracks = false;
+  config.tau_track = 0.99;
   config.dynamic_grid_ratio = 1.0;
-  for (const bool ignore_dynamic_returns : {false, true}) {
-    config.ignore_dynamic_returns = ignore_dynamic_returns;
-    Watch watch(config);
-    for (int i = 0; i < 4; ++i) watch.see(PointBuffer());
-    watch.see(car());
-    CHECK(watch.causes(4) == Causes{Cause::kFreeSpace});
-    for (int i = 0; i < 3; ++i) watch.see(PointBuffer());
-    watch.see(car());
-    CHECK(watch.causes(8) ==
-          Causes{ignore_dynamic_returns ? Cause::kFreeSpace : Cause::kTooLittleFree});
-  }
+  Watch watch(config);
+  for (int i = 0; i < 4; ++i) watch.see(PointBuffer());
+  watch.see(car());
+  CHECK(watch.causes(4) == Causes{Cause::kFreeSpace});
+  for (int i = 0; i < 3; ++i) watch.see(PointBuffer());
+  watch.see(car());
+  CHECK(watch.causes(8) == Causes{Cause::kFreeSpace});
 }
 
 // An object stands beside a hedge in one scan and is merged with it. The scans beside tell that the

@@ -205,9 +205,9 @@ Cause last_cause(const Scan& scan, const FreeSpaceConfig& config,
 }
 
 // Ten supervoxels, of which some are seen free twice and all others are hit.
-Cause cause_with_track(std::size_t free, float moved_on_track, bool use_tracks = true) {
+Cause cause_with_track(std::size_t free, float moved_on_track, double track_ratio = 0.1) {
   FreeSpaceConfig config;
-  config.use_tracks = use_tracks;
+  config.track_ratio = track_ratio;
   Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
   std::vector<Scan::Seen> seen(10, {0, 4});
   std::fill_n(seen.begin(), free, Scan::Seen{4, 0});
@@ -221,7 +221,7 @@ TEST_CASE("few free samples remove an instance only if enough samples along its 
   CHECK(cause_with_track(4, 10.1F) == Cause::kWithInstance);  // 0.1 of those of the track
   CHECK(cause_with_track(4, 9.9F) == Cause::kOccupied);
   CHECK(cause_with_track(5, 0.0F) == Cause::kWithInstance);  // half of its own are free
-  CHECK(cause_with_track(4, 0.0F, false) == Cause::kWithInstance);
+  CHECK(cause_with_track(4, 0.0F, 0.0) == Cause::kWithInstance);
 }
 
 TEST_CASE("a place that is hit again twice after it was free is seen through by chance") {

@@ -250,11 +250,6 @@ TEST_CASE("where the ground around is not known, all of it is removed from under
   const PointBuffer ground =
       street_about(20.0F, 0.0F, 5.0F, [](float x, float y) { return !RemovedBox::is_below(x, y); });
   CHECK(ground_that_goes(config, ground).size() == ground.size());
-
-  // Without the test of the ground, the plane of the ground around is not known.
-  config.test_ground = false;
-  const PointBuffer street = street_about(20.0F, 0.0F, 5.0F, kNothing);
-  CHECK(ground_that_goes(config, street).size() >= ground.size());
 }
 
 }  // namespace

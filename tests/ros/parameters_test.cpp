@@ -65,13 +65,13 @@ TEST_CASE("defaults stay exactly as they are") {
 
 TEST_CASE("values of the user are taken") {
   User user;
-  user.numbers = {{"max_range", 80.0}, {"lookahead_scans", 20}, {"use_tracks", 0}};
+  user.numbers = {{"max_range", 80.0}, {"lookahead_scans", 20}, {"presume_dynamic", 0}};
   user.names = {{"decision", "window"}};
   RemoverConfig config;
   set_parameters(config, user);
   CHECK(config.max_range == 80.0);
   CHECK(config.evidence.lookahead_scans == 20);
-  CHECK_FALSE(config.evidence.use_tracks);
+  CHECK_FALSE(config.evidence.presume_dynamic);
   CHECK(config.decision == dynains::Decision::kWindow);
 }
 

@@ -14,8 +14,7 @@ struct FreeSpaceConfig {
   double evidence_range = 80.0;  ///< m
   double supervoxel = 0.75;      ///< m
   int supervoxel_samples = 4;
-  double ground_sample = 1.2;  ///< m
-  bool test_ground = true;
+  double ground_sample = 1.2;    ///< m
   double margin = 0.25;          ///< m
   double margin_slope = 0.0075;  ///< m per m of range
   double lateral_margin = 0.07;  ///< m
@@ -28,8 +27,7 @@ struct FreeSpaceConfig {
   double large_removal_ratio = 0.5;
   double footprint = 0.3;         ///< m
   double footprint_rise = 0.025;  ///< m
-  bool use_tracks = true;
-  double tau_track = 0.87;  ///< form of Eq. 19
+  double tau_track = 0.87;        ///< form of Eq. 19
   double track_ratio = 0.1;
   double track_cell = 1.2;  ///< m
   double track_overlap = 0.25;
@@ -37,7 +35,6 @@ struct FreeSpaceConfig {
   double track_height = 4.5;       ///< m
   double dynamic_grid_cell = 0.6;  ///< m
   double dynamic_grid_ratio = 0.65;
-  bool ignore_dynamic_returns = true;
   bool presume_dynamic = true;
 
   /// For recordings: a verdict waits for 100 later scans.
@@ -81,9 +78,6 @@ struct FreeSpaceConfig {
                       "maximum number of samples of a supervoxel"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "edge of the voxels that have one ground sample each"});
-    visitor(Parameter{
-        "test_ground", self.test_ground, Bounds(), "",
-        "test the ground for free space, too; gives the ground around for footprint_rise"});
     visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
                       "a beam passes a sample if its range is larger by at least this much"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
@@ -115,8 +109,6 @@ struct FreeSpaceConfig {
     visitor(Parameter{
         "footprint_rise", self.footprint_rise, closed(0, 1), "m",
         "ground in the footprint is removed only if it lies this much above the ground around"});
-    visitor(Parameter{"use_tracks", self.use_tracks, Bounds(), "",
-                      "propagate beliefs along instances that overlap from scan to scan"});
     visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
                       "belief along its track from which an instance is dynamic (as Eq. 19)"});
     visitor(Parameter{"track_ratio", self.track_ratio, closed(0, 1), "",
@@ -136,8 +128,6 @@ struct FreeSpaceConfig {
     visitor(Parameter{"dynamic_grid_ratio", self.dynamic_grid_ratio, half_open_below(0, 1), "",
                       "ratio of dynamic to all samples of a cell above which the others are "
                       "removed, too; 1: never"});
-    visitor(Parameter{"ignore_dynamic_returns", self.ignore_dynamic_returns, Bounds(), "",
-                      "returns of surely dynamic points neither hit nor protect"});
     visitor(Parameter{
         "presume_dynamic", self.presume_dynamic, Bounds(), "",
         "the zero-latency verdict removes compact instances at places without "

@@ -140,11 +140,8 @@ class FreeSpaceEvidence {
     const Record& record = record_of(newest_);
     if (phase_of(record) != 0) return;
     const detail::InstanceEvidence& evidence = record.evidence;
-    is_moving_.clear();
-    if (config_.ignore_dynamic_returns) {
-      mark_points(
-          evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
-    }
+    mark_points(
+        evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
     mark_points(
         evidence.samples,
         [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
@@ -241,7 +238,6 @@ class FreeSpaceEvidence {
   }
 
   void link_to_previous(std::uint64_t scan, Record& record) {
-    if (!config_.use_tracks) return;
     detail::InstanceEvidence& evidence = record.evidence;
     linker_.measure(evidence.samples, detail::composed(T_origin_world_, record.T_world_sensor),
                     evidence.tracked);
@@ -308,7 +304,6 @@ class FreeSpaceEvidence {
   }
 
   void update_own_log_odds(Record& record) const {
-    if (!config_.use_tracks) return;
     detail::InstanceEvidence& evidence = record.evidence;
     for (std::size_t instance = 0; instance < evidence.tracked.instances.size(); ++instance) {
       Instance& tracked = evidence.tracked.instances[instance];
@@ -321,7 +316,6 @@ class FreeSpaceEvidence {
   // Propagates beliefs along tracks through all scans without a final verdict, forward and
   // backward.
   void propagate_beliefs(std::uint64_t newest) {
-    if (!config_.use_tracks) return;
     const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
     for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
       Record& record = record_of(scan);
@@ -361,7 +355,6 @@ class FreeSpaceEvidence {
   // Whether the instance of a supervoxel is small enough to move, and does not stand still by the
   // evidence on this scan. Slow vehicles around the sensor would pull its pose along.
   bool may_move(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
-    if (!config_.use_tracks) return false;
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
     return evidence.tracked.shapes[instance].carried &&
            !evidence.beliefs.counts[instance].stands_still();

@@ -143,15 +143,13 @@ struct GroundSamples {
 class GroundSampler {
  public:
   explicit GroundSampler(const FreeSpaceConfig& config)
-      : is_active_(config.test_ground), sampler_(config.ground_sample, config.evidence_range, 1) {}
+      : sampler_(config.ground_sample, config.evidence_range, 1) {}
 
-  /// Replaces `out` by the samples of one scan, without visibility; no samples if the ground is not
-  /// tested. `ground`: m, sensor frame.
+  /// Replaces `out` by the samples of one scan, without visibility. `ground`: m, sensor frame.
   void sample(PointsView ground, GroundSamples& out) {
     const std::size_t blocks = GroundFootprint::block_count(ground.size());
     ensure_capacity(out.run_begins, blocks);
     out.run_begins.assign(blocks, 0);
-    if (!is_active_) return;
     std::size_t runs = 0;
     for (std::size_t i = 0; i < blocks; ++i) {
       const PointsView block = GroundFootprint::block_of(ground, i * kWordBits);
@@ -175,7 +173,6 @@ class GroundSampler {
   }
 
  private:
-  bool is_active_;
   InstanceSampler sampler_;
   PointBuffer firsts_;                      // by run: its first point
   std::vector<std::uint32_t> instance_of_;  // by run: instance 0

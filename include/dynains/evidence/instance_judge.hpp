@@ -63,8 +63,7 @@ class InstanceJudge {
   using Verdict = EvidenceVerdict::Group;
 
   explicit InstanceJudge(const FreeSpaceConfig& config)
-      : use_tracks_(config.use_tracks),
-        presume_dynamic_(config.presume_dynamic),
+      : presume_dynamic_(config.presume_dynamic),
         track_ratio_(static_cast<float>(config.track_ratio)),
         track_level_(static_cast<float>(log_odds(config.tau_track))) {}
 
@@ -109,7 +108,7 @@ class InstanceJudge {
   /// a dynamic one.
   bool surely_moves(const InstanceEvidence& evidence, std::uint32_t supervoxel, Cause cause) const {
     if (cause == Cause::kFreeSpace || cause == Cause::kDynamicOccupancy) return true;
-    if (!use_tracks_ || !is_dynamic(cause) || cause == Cause::kPresumed) return false;
+    if (!is_dynamic(cause) || cause == Cause::kPresumed) return false;
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
     return 2 * counts.moved >= counts.decided &&
@@ -146,7 +145,7 @@ class InstanceJudge {
     if (updater.removes_whole(evidence.beliefs, instance) && track_agrees(evidence, instance)) {
       return Cause::kWithInstance;
     }
-    if (!use_tracks_ || !evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
+    if (!evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
     const float along_track = evidence.tracked.instances[instance].track_log_odds();
     level = std::max(level, along_track);
     if (along_track >= track_level_) return Cause::kAlongTrack;
@@ -157,7 +156,7 @@ class InstanceJudge {
   // free samples in one scan weigh little where the track stands still.
   bool track_agrees(const InstanceEvidence& evidence, std::size_t instance) const {
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    return !use_tracks_ || (2 * counts.moved >= counts.decided && counts.moved > 0) ||
+    return (2 * counts.moved >= counts.decided && counts.moved > 0) ||
            evidence.tracked.instances[instance].moved(track_ratio_);
   }
 
@@ -180,7 +179,6 @@ class InstanceJudge {
     return level == 0.0F ? 0.5F : 1.0F / (1.0F + std::exp(-level));
   }
 
-  bool use_tracks_;
   bool presume_dynamic_;
   float track_ratio_;
   float track_level_;
