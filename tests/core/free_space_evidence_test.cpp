@@ -190,23 +190,18 @@ TEST_CASE("evidence from a later scan is carried along the track to scans beside
     CHECK(watch.removes(1));
     return watch.causes(2);
   };
-  // Two units of 0.847, faded by 0.95: 1.61, a belief of 0.833.
-  config.tau_track = 0.83;
   CHECK(causes() == Causes{Cause::kAlongTrack});
-  config.tau_track = 0.84;
-  CHECK(causes() == Causes{Cause::kNoEvidence});
 }
 
 // In one scan, both are one instance, and one supervoxel at the border has few samples to see.
 TEST_CASE("an object that stood long before stays when an object that moved was merged with it") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookahead_scans = 0;
-  config.tau_track = 0.6;
   const PointBuffer passing = panel(10.0F, 1.2F, 3.2F, -1.5F, 0.5F);
   Watch watch(config);
   for (int i = 0; i < 21; ++i) watch.see(car());
   watch.see(both(car(), passing));
-  CHECK(watch.causes(21) == Causes{Cause::kFreeSpace, Cause::kWithInstance, Cause::kOccupied});
+  CHECK(watch.causes(21) == Causes{Cause::kFreeSpace, Cause::kNoEvidence, Cause::kOccupied});
   watch.see(car());
   CHECK(watch.predecessor() == 0);
   CHECK(watch.causes(22) == Causes{Cause::kOccupied});
@@ -217,7 +212,6 @@ TEST_CASE("returns of a moved object do not contest a later object in its place"
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = 4;
   config.lookahead_scans = 0;
-  config.tau_track = 0.99;
   config.dynamic_grid_ratio = 1.0;
   Watch watch(config);
   for (int i = 0; i < 4; ++i) watch.see(PointBuffer());
@@ -239,7 +233,7 @@ TEST_CASE("a hedge stays when an object was merged with it, or contests later in
   for (const bool by_tracks : {true, false}) {
     if (!by_tracks) {
       config.lookback_scans = 2;
-      config.track_ratio = 0.0;
+      config.track_overlap = 1.0;
     }
     Watch watch(config);
     for (int i = 0; i < 6; ++i) watch.see(hedge);

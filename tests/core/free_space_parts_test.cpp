@@ -262,58 +262,27 @@ TEST_CASE("instances that are too long, too high or a single sample are not carr
   }
 }
 
-TEST_CASE("belief along a track fades by 0.95 a scan, and is limited") {
-  constexpr float kUnit = 0.8472979F;  // log-odds of 0.7
-  const TrackBelief belief(kUnit);
-  TrackedInstances before, now;
-  before.instances.resize(1);
-  before.instances[0].own = 2.0F * kUnit;
-  belief.propagate(&TrackedInstances::Instance::past, nullptr, before);
-  CHECK(before.instances[0].past.log_odds == Approx(2.0F * kUnit));
-  now.instances.resize(1);
-  now.instances[0].past.instance = 0;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds == Approx(0.95F * 2.0F * kUnit));
-  // The sum is limited to four units above zero and one below.
-  now.instances[0].own = kUnit;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds == Approx((1.0F + 0.95F * 2.0F) * kUnit));
-  now.instances[0].own = -9.0F * kUnit;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds == Approx(-kUnit));
-  now.instances[0].own = 4.0F * kUnit;
-  belief.propagate(&TrackedInstances::Instance::past, &before, now);
-  CHECK(now.instances[0].past.log_odds == Approx(4.0F * kUnit));
-  // The future side behaves equally.
-  before.instances[0].future.instance = 0;
-  belief.propagate(&TrackedInstances::Instance::future, nullptr, now);
-  before.instances[0].own = 0.0F;
-  belief.propagate(&TrackedInstances::Instance::future, &now, before);
-  CHECK(before.instances[0].future.log_odds == Approx(0.95F * 4.0F * kUnit));
-}
-
-TEST_CASE("samples along a track are summed on both sides, and fade by 0.95 a scan") {
-  const TrackBelief belief(1.0F);
+TEST_CASE("samples along a track are summed on both sides, and fade") {
   using Instance = TrackedInstances::Instance;
-  std::vector<TrackedInstances> scans(3);
+  using Counts = std::vector<InstanceBeliefs::Counts>;
+  const std::array<Counts, 3> counts = {Counts{{50, 0, 40}}, {{50, 10, 40}}, {{50, 2, 40}}};
+  std::array<TrackedInstances, 3> scans;
   for (TrackedInstances& scan : scans) scan.instances.resize(1);
-  scans[0].instances[0].seen = {0.0F, 40.0F};
-  scans[1].instances[0].seen = {10.0F, 40.0F};
-  scans[2].instances[0].seen = {2.0F, 40.0F};
-  scans[1].instances[0].past.instance = 0;
-  scans[1].instances[0].future.instance = 0;
-  belief.propagate(&Instance::past, nullptr, scans[0]);
-  belief.propagate(&Instance::past, &scans[0], scans[1]);
-  belief.propagate(&Instance::future, nullptr, scans[2]);
-  belief.propagate(&Instance::future, &scans[2], scans[1]);
+  for (const auto side : {&Instance::past, &Instance::future}) {
+    (scans[1].instances[0].*side).instance = 0;
+  }
+  sum_along_tracks(&Instance::past, nullptr, counts[0], scans[0]);
+  sum_along_tracks(&Instance::past, &scans[0], counts[1], scans[1]);
+  sum_along_tracks(&Instance::future, nullptr, counts[2], scans[2]);
+  sum_along_tracks(&Instance::future, &scans[2], counts[1], scans[1]);
   const Instance& middle = scans[1].instances[0];
   CHECK(middle.past.seen.moved == Approx(10.0F));
-  CHECK(middle.past.seen.decided == Approx(40.0F + 0.95F * 40.0F));
+  CHECK(middle.past.seen.stood == Approx(30.0F + 0.8F * 40.0F));
   CHECK(middle.future.seen.moved == Approx(10.0F + 0.95F * 2.0F));
-  // 11.9 of 116 samples; those of the scan itself count once.
-  CHECK(middle.moved(0.1025F));
-  CHECK_FALSE(middle.moved(0.1027F));
-  CHECK(TrackedInstances::Instance().moved(0.15F));  // nothing is decided
+  CHECK(middle.future.seen.stood == Approx(30.0F + 0.8F * 38.0F));
+  // Those of the scan itself count once.
+  CHECK(middle.moved_ratio(counts[1][0]) == Approx(11.9F / (11.9F + 92.4F)));
+  CHECK(Instance().moved_ratio({}) == 0.0F);  // nothing is decided
 }
 
 std::vector<float> random_angles(std::size_t count, double low, double high, Random& random) {

@@ -69,10 +69,6 @@ struct Scan {
   }
   const Belief& belief(std::size_t supervoxel = 0) const { return beliefs.supervoxels[supervoxel]; }
   bool is_free(std::size_t supervoxel = 0) const { return updater.is_free(belief(supervoxel)); }
-  bool removes(bool is_large = false) {
-    beliefs.merged[0] = is_large ? 1 : 0;
-    return updater.removes_whole(beliefs, 0);
-  }
 
   InstanceBeliefUpdater updater;
   InstanceSamples samples;
@@ -163,65 +159,66 @@ TEST_CASE(
   CHECK(stands.is_free());
 }
 
-TEST_CASE("an instance is removed if a fifth of its known samples moved, a large one if half did") {
-  Scan enough(Instances{{2, 8}});
-  enough.see({{2, 0}, {0, 8}});
-  CHECK(enough.beliefs.counts[0].moved == 2);
-  CHECK(enough.beliefs.counts[0].decided == 10);
-  CHECK(enough.removes());
-
-  Scan too_little(Instances{{2, 9}});
-  too_little.see({{2, 0}, {0, 9}});
-  CHECK(too_little.beliefs.counts[0].decided == 11);
-  CHECK_FALSE(too_little.removes());
-
-  // A supervoxel without results does not count as known.
-  Scan hidden(Instances{{2, 9, 20}});
-  hidden.see({{2, 0}, {0, 8}, {0, 0}});
-  CHECK(hidden.beliefs.counts[0].decided == 11);
-  CHECK(hidden.beliefs.counts[0].total == 31);
-
-  for (const std::uint32_t moved : {4U, 5U}) {
-    Scan large(Instances{{moved, 5}});
-    large.see({{moved, 0}, {0, 5}});
-    CHECK(large.removes());
-    CHECK(large.removes(true) == (moved == 5));
-  }
-}
-
-// Cause of the last supervoxel of a scan whose only instance is tracked.
-Cause last_cause(const Scan& scan, const FreeSpaceConfig& config,
-                 const TrackedInstances::Instance& tracked) {
+// Cause of the last supervoxel of a scan with one instance. `others`: samples in other scans of its
+// track. `carried`: whether it is small enough for a track.
+Cause last_cause(const Scan& scan, const TrackedInstances::Seen& others = {}, bool carried = true) {
   InstanceEvidence evidence;
   evidence.samples = scan.samples;
   evidence.beliefs = scan.beliefs;
-  evidence.tracked.instances = {tracked};
+  const auto moved = static_cast<float>(scan.beliefs.counts[0].moved);
+  const auto stood = static_cast<float>(scan.beliefs.counts[0].stood());
+  evidence.tracked.instances.resize(1);
+  evidence.tracked.instances[0].past.seen = {moved + others.moved, stood + others.stood};
+  evidence.tracked.instances[0].future.seen = {moved, stood};
   evidence.tracked.shapes.resize(1);
-  evidence.tracked.shapes[0].carried = true;
-  InstanceJudge judge(config);
+  evidence.tracked.shapes[0].carried = carried;
+  InstanceJudge judge{FreeSpaceConfig()};
   std::vector<InstanceJudge::Verdict> verdicts;
   judge.judge(evidence, scan.updater, false, verdicts);
   return verdicts.back().cause;
 }
 
-// Ten supervoxels, of which some are seen free twice and all others are hit.
-Cause cause_with_track(std::size_t free, float moved_on_track, double track_ratio = 0.1) {
-  FreeSpaceConfig config;
-  config.track_ratio = track_ratio;
-  Scan scan(Instances{std::vector<std::uint32_t>(10, 4)});
-  std::vector<Scan::Seen> seen(10, {0, 4});
-  std::fill_n(seen.begin(), free, Scan::Seen{4, 0});
-  for (int i = 0; i < 2; ++i) scan.see(seen);
-  TrackedInstances::Instance tracked;
-  tracked.past.seen = {moved_on_track, 100.0F};
-  return last_cause(scan, config, tracked);
+TEST_CASE("an instance is removed if .22 of its known samples moved, a large one if half did") {
+  Scan enough(Instances{{22, 78}});
+  enough.see({{22, 0}, {0, 78}});
+  CHECK(enough.beliefs.counts[0].moved == 22);
+  CHECK(enough.beliefs.counts[0].decided == 100);
+  CHECK(last_cause(enough) == Cause::kWithInstance);
+
+  Scan too_little(Instances{{22, 79}});
+  too_little.see({{22, 0}, {0, 79}});
+  CHECK(too_little.beliefs.counts[0].decided == 101);
+  CHECK(last_cause(too_little) == Cause::kOccupied);
+
+  // A supervoxel without results does not count as known.
+  Scan hidden(Instances{{22, 79, 200}});
+  hidden.see({{22, 0}, {0, 78}, {0, 0}});
+  CHECK(hidden.beliefs.counts[0].decided == 101);
+  CHECK(hidden.beliefs.counts[0].total == 301);
+
+  for (const std::uint32_t moved : {4U, 5U}) {
+    Scan large(Instances{{moved, 5}});
+    large.see({{moved, 0}, {0, 5}});
+    CHECK(last_cause(large) == Cause::kWithInstance);
+    CHECK(last_cause(large, {}, false) == (moved == 5 ? Cause::kWithInstance : Cause::kOccupied));
+  }
 }
 
-TEST_CASE("few free samples remove an instance only if enough samples along its track moved") {
-  CHECK(cause_with_track(4, 10.1F) == Cause::kWithInstance);  // 0.1 of those of the track
-  CHECK(cause_with_track(4, 9.9F) == Cause::kOccupied);
-  CHECK(cause_with_track(5, 0.0F) == Cause::kWithInstance);  // half of its own are free
-  CHECK(cause_with_track(4, 0.0F, 0.0) == Cause::kWithInstance);
+TEST_CASE("the samples of all scans of a track count") {
+  Scan stands(Instances{{10, 10}});
+  stands.see({{0, 10}, {0, 10}});
+  CHECK(last_cause(stands) == Cause::kOccupied);
+  CHECK(last_cause(stands, {6.0F, 0.0F}) == Cause::kAlongTrack);  // 6 of 26
+  CHECK(last_cause(stands, {5.0F, 0.0F}) == Cause::kOccupied);
+  CHECK(last_cause(stands, {6.0F, 2.0F}) == Cause::kOccupied);
+
+  Scan moves(Instances{{10, 10}});
+  moves.see({{10, 0}, {0, 10}});
+  CHECK(last_cause(moves, {0.0F, 25.0F}) == Cause::kWithInstance);  // 10 of 45
+  CHECK(last_cause(moves, {0.0F, 26.0F}) == Cause::kOccupied);
+
+  CHECK(last_cause(Scan(Instances{{10, 10}})) == Cause::kNoEvidence);
+  CHECK(last_cause(Scan(Instances{{10, 10}}), {1.0F, 3.0F}) == Cause::kAlongTrack);
 }
 
 TEST_CASE("a place that is hit again twice after it was free is seen through by chance") {
@@ -257,7 +254,7 @@ TEST_CASE("what is hit from its own side is not free because another side sees t
     if (was_free) scan.see({{4, 0}, {1, 3}}, beside(10.0));
     for (int i = 0; i < 4; ++i) scan.see({{4, 0}, {4, 0}}, beside(angle));
     CHECK(scan.is_free(0) == scan.is_free(1));
-    CHECK(scan.removes() == scan.is_free());
+    CHECK(is_dynamic(last_cause(scan)) == scan.is_free());
     CHECK(scan.belief().hits == (scan.is_free() ? std::min(hits, 8) : 1));
     return scan.is_free();
   };
@@ -279,15 +276,12 @@ TEST_CASE("references that see little of an instance do not tell that it stands"
 }
 
 TEST_CASE("a part that eight references hit and none saw free stays when its instance moves") {
-  const FreeSpaceConfig config;
-  const auto cause = [&](int hits, bool was_free, float track_log_odds) {
+  const auto cause = [&](int hits, bool was_free, float moved_in_others) {
     Scan scan(Instances{{8, 4}});
-    const bool with_instance = track_log_odds <= 0.0F;
+    const bool with_instance = moved_in_others <= 0.0F;
     scan.see({{with_instance ? 8U : 0U, 0}, {was_free ? 4U : 0U, 0}});
     for (int i = 0; i < hits; ++i) scan.see({{0, 0}, {0, 4}});
-    TrackedInstances::Instance tracked;
-    tracked.past.log_odds = track_log_odds;
-    return last_cause(scan, config, tracked);
+    return last_cause(scan, {moved_in_others, 0.0F});
   };
   CHECK(cause(7, false, 0.0F) == Cause::kWithInstance);
   CHECK(cause(8, false, 0.0F) == Cause::kOccupied);

@@ -23,13 +23,11 @@ struct FreeSpaceConfig {
   double p_hit = 0.155;          ///< form of Eq. 18
   double tau_free = 0.65;        ///< form of Eq. 19
   double tau_contested = 0.9;    ///< form of Eq. 19
-  double removal_ratio = 0.2;
+  double removal_ratio = 0.22;
   double large_removal_ratio = 0.5;
   double footprint = 0.3;         ///< m
   double footprint_rise = 0.025;  ///< m
-  double tau_track = 0.87;        ///< form of Eq. 19
-  double track_ratio = 0.1;
-  double track_cell = 1.2;  ///< m
+  double track_cell = 1.2;        ///< m
   double track_overlap = 0.25;
   double track_length = 18.0;      ///< m
   double track_height = 4.5;       ///< m
@@ -101,7 +99,8 @@ struct FreeSpaceConfig {
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
                       "belief from which a supervoxel with hits was free (as Eq. 19)"});
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
-                      "ratio of free to decided samples from which the whole instance is removed"});
+                      "ratio of free to decided samples along its track from which the whole "
+                      "instance is removed"});
     visitor(Parameter{"large_removal_ratio", self.large_removal_ratio, half_open_below(0, 1), "",
                       "removal_ratio of instances beyond track_length or track_height"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
@@ -109,11 +108,6 @@ struct FreeSpaceConfig {
     visitor(Parameter{
         "footprint_rise", self.footprint_rise, closed(0, 1), "m",
         "ground in the footprint is removed only if it lies this much above the ground around"});
-    visitor(Parameter{"tau_track", self.tau_track, open(0.5, 1), "",
-                      "belief along its track from which an instance is dynamic (as Eq. 19)"});
-    visitor(Parameter{"track_ratio", self.track_ratio, closed(0, 1), "",
-                      "ratio of free to decided samples along its track that the removal of a "
-                      "whole instance needs if less than half of its own are free"});
     visitor(Parameter{"track_cell", self.track_cell, closed(0.2, 5), "m",
                       "cells whose overlap links instances of consecutive scans"});
     visitor(Parameter{"track_overlap", self.track_overlap, half_open_below(0, 1), "",

@@ -32,8 +32,8 @@
 namespace dynains {
 
 /// Tests the samples of each scan against the range images of reference scans before and after it.
-/// Sums the results as log-odds by supervoxel and by instance, separately for the past and the
-/// future, and propagates the log-odds along tracks of instances.
+/// Sums the results as log-odds by supervoxel, separately for the past and the future, and counts
+/// the supervoxels that moved along the tracks of instances.
 class FreeSpaceEvidence {
  public:
   using Config = FreeSpaceConfig;
@@ -50,7 +50,6 @@ class FreeSpaceEvidence {
         pose_correction_(config.pose_tolerance, config.track_length, config.track_height),
         updater_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
-        track_belief_(updater_.increment()),
         judge_(config),
         dynamic_grid_(config),
         moved_ground_(config),
@@ -106,7 +105,7 @@ class FreeSpaceEvidence {
         [&] {
           if (phase != 0) test_older_scans(phase);
         });
-    propagate_beliefs(scan);
+    sum_along_tracks(scan);
   }
 
   /// Judges the instances of scan number `scan` by the evidence of all observed scans: the newest
@@ -155,7 +154,7 @@ class FreeSpaceEvidence {
         [&] { pose_correction_.insert(record.T_world_sensor, split, may_move_); });
     if (delay_of(0) != 0) return;
     test_older_scans(0);
-    propagate_beliefs(newest_);
+    sum_along_tracks(newest_);
   }
 
   /// Alignment of the newest scan with earlier scans, in the frame of its pose.
@@ -256,7 +255,6 @@ class FreeSpaceEvidence {
       if (reference != nullptr) test(record, *reference, newest_visibility_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
-    update_own_log_odds(record);
   }
 
   // Scans since the latest reference.
@@ -299,37 +297,26 @@ class FreeSpaceEvidence {
         continue;
       }
       test(older, reference, older_visibility_);
-      update_own_log_odds(older);
     }
   }
 
-  void update_own_log_odds(Record& record) const {
-    detail::InstanceEvidence& evidence = record.evidence;
-    for (std::size_t instance = 0; instance < evidence.tracked.instances.size(); ++instance) {
-      Instance& tracked = evidence.tracked.instances[instance];
-      const detail::InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-      tracked.own = judge_.own_log_odds(evidence, updater_, instance);
-      tracked.seen = {static_cast<float>(counts.moved), static_cast<float>(counts.decided)};
-    }
-  }
-
-  // Propagates beliefs along tracks through all scans without a final verdict, forward and
+  // Sums samples along tracks through all scans without a final verdict, forward and
   // backward.
-  void propagate_beliefs(std::uint64_t newest) {
+  void sum_along_tracks(std::uint64_t newest) {
     const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
     for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
       Record& record = record_of(scan);
       const bool linked = scan > 0 && record_of(scan - 1).epoch == record.epoch;
-      track_belief_.propagate(&Instance::past,
-                              linked ? &record_of(scan - 1).evidence.tracked : nullptr,
-                              record.evidence.tracked);
+      detail::sum_along_tracks(&Instance::past,
+                               linked ? &record_of(scan - 1).evidence.tracked : nullptr,
+                               record.evidence.beliefs.counts, record.evidence.tracked);
     }
     for (std::uint64_t scan = newest + 1; scan-- > newest - open;) {
       Record& record = record_of(scan);
       const bool linked = scan < newest && record_of(scan + 1).epoch == record.epoch;
-      track_belief_.propagate(&Instance::future,
-                              linked ? &record_of(scan + 1).evidence.tracked : nullptr,
-                              record.evidence.tracked);
+      detail::sum_along_tracks(&Instance::future,
+                               linked ? &record_of(scan + 1).evidence.tracked : nullptr,
+                               record.evidence.beliefs.counts, record.evidence.tracked);
     }
   }
 
@@ -384,7 +371,6 @@ class FreeSpaceEvidence {
   detail::Visibility newest_visibility_, older_visibility_;
   Background* other_ = nullptr;
   detail::InstanceLinker linker_;
-  detail::TrackBelief track_belief_;
   detail::InstanceJudge judge_;
   detail::DynamicOccupancyGrid dynamic_grid_;
   detail::MovedGround moved_ground_;

@@ -115,6 +115,7 @@ struct InstanceBeliefs {
     std::uint32_t moved = 0;    ///< in free supervoxels
     std::uint32_t decided = 0;  ///< in free or occupied supervoxels
 
+    std::uint32_t stood() const { return decided - moved; }
     /// Whether enough samples are known, and none of them moved.
     bool stands_still() const {
       constexpr float kLeastKnown = 0.3F;  // ratio of known to all samples
@@ -137,14 +138,10 @@ class InstanceBeliefUpdater {
   using Counts = InstanceBeliefs::Counts;
 
   explicit InstanceBeliefUpdater(const FreeSpaceConfig& config)
-      : removal_ratio_(static_cast<float>(config.removal_ratio)),
-        large_removal_ratio_(static_cast<float>(config.large_removal_ratio)),
-        sum_(config.p_free, config.p_hit),
+      : sum_(config.p_free, config.p_hit),
         free_level_(static_cast<float>(log_odds(config.tau_free))),
         contested_level_(static_cast<float>(log_odds(config.tau_contested))) {}
 
-  /// Log-odds increment of one reference with free samples, l(p_free).
-  float increment() const { return sum_.increment(); }
   /// Log-odds from which a supervoxel without hits was free, l(tau_free).
   float free_level() const { return free_level_; }
 
@@ -191,15 +188,6 @@ class InstanceBeliefUpdater {
   bool is_free(const Belief& belief) const {
     return belief.turns < kTurnsByChance &&
            belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
-  }
-
-  /// Whether an instance is dynamic as a whole: enough of its decided samples are free,
-  /// large_removal_ratio of them if it is larger than one object.
-  bool removes_whole(const InstanceBeliefs& beliefs, std::size_t instance) const {
-    const Counts& counts = beliefs.counts[instance];
-    const float ratio = beliefs.merged[instance] != 0 ? large_removal_ratio_ : removal_ratio_;
-    return counts.moved > 0 &&
-           static_cast<float>(counts.moved) >= ratio * static_cast<float>(counts.decided);
   }
 
  private:
@@ -276,8 +264,6 @@ class InstanceBeliefUpdater {
     }
   }
 
-  float removal_ratio_;
-  float large_removal_ratio_;
   FreeSpaceSum sum_;
   float free_level_;
   float contested_level_;

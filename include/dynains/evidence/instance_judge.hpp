@@ -64,21 +64,8 @@ class InstanceJudge {
 
   explicit InstanceJudge(const FreeSpaceConfig& config)
       : presume_dynamic_(config.presume_dynamic),
-        track_ratio_(static_cast<float>(config.track_ratio)),
-        track_level_(static_cast<float>(log_odds(config.tau_track))) {}
-
-  /// Log-odds that an instance moved, by the free-space evidence on its own scan without its track:
-  /// positive if it is dynamic as a whole, negative if it stands still, 0 if unknown.
-  float own_log_odds(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
-                     std::size_t instance) const {
-    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    constexpr float kStill = -0.1F;  // increments of p_free, chosen on random worlds
-    float increments = counts.stands_still() ? kStill : 0.0F;
-    if (updater.removes_whole(evidence.beliefs, instance)) {
-      increments = 2 * counts.moved >= counts.decided ? 2.0F : 1.0F;
-    }
-    return increments * updater.increment();
-  }
+        removal_ratio_(static_cast<float>(config.removal_ratio)),
+        large_removal_ratio_(static_cast<float>(config.large_removal_ratio)) {}
 
   /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed.
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
@@ -88,8 +75,8 @@ class InstanceJudge {
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
-      float level = judge_alone(evidence.beliefs, updater, first, last, verdicts);
-      const Cause whole = cause_of_whole(evidence, updater, may_presume, instance, level);
+      const float level = judge_alone(evidence.beliefs, updater, first, last, verdicts);
+      const Cause whole = cause_of_whole(evidence, may_presume, instance);
       if (is_dynamic(whole)) {
         const Verdict verdict = {whole, as_probability(std::max(level, updater.free_level()))};
         for (std::uint32_t s = first; s < last; ++s) {
@@ -110,13 +97,16 @@ class InstanceJudge {
     if (cause == Cause::kFreeSpace || cause == Cause::kDynamicOccupancy) return true;
     if (!is_dynamic(cause) || cause == Cause::kPresumed) return false;
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
-    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    return 2 * counts.moved >= counts.decided &&
-           evidence.tracked.instances[instance].track_log_odds() >= track_level_;
+    return moved_ratio(evidence, instance) >= kSurelyMoved;
   }
 
  private:
   static constexpr std::size_t kLeastGroup = 4;  // samples
+  static constexpr float kSurelyMoved = 0.7F;    // ratio of moved to decided samples of a track
+
+  static float moved_ratio(const InstanceEvidence& evidence, std::size_t instance) {
+    return evidence.tracked.instances[instance].moved_ratio(evidence.beliefs.counts[instance]);
+  }
 
   // Writes static verdicts for supervoxels [first, last) and lists the free ones in `free_`.
   // Returns the largest log-odds of them.
@@ -138,26 +128,17 @@ class InstanceJudge {
     return belief.contested != 0 ? Cause::kOccupied : Cause::kNoEvidence;
   }
 
-  // Cause to remove an instance as a whole, or kNoEvidence. Raises `level` to the log-odds along
-  // the track of the instance if these are larger.
-  Cause cause_of_whole(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
-                       bool may_presume, std::size_t instance, float& level) const {
-    if (updater.removes_whole(evidence.beliefs, instance) && track_agrees(evidence, instance)) {
-      return Cause::kWithInstance;
+  // Cause to remove an instance as a whole, or kNoEvidence: enough of the decided samples along its
+  // track are free, in this scan or in others.
+  Cause cause_of_whole(const InstanceEvidence& evidence, bool may_presume,
+                       std::size_t instance) const {
+    const bool carried = evidence.tracked.shapes[instance].carried;
+    if (moved_ratio(evidence, instance) >= (carried ? removal_ratio_ : large_removal_ratio_)) {
+      return evidence.beliefs.counts[instance].moved > 0 ? Cause::kWithInstance
+                                                         : Cause::kAlongTrack;
     }
-    if (!evidence.tracked.shapes[instance].carried) return Cause::kNoEvidence;
-    const float along_track = evidence.tracked.instances[instance].track_log_odds();
-    level = std::max(level, along_track);
-    if (along_track >= track_level_) return Cause::kAlongTrack;
-    return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
-  }
-
-  // Whether half of the decided samples of an instance moved, or enough of those of its track: few
-  // free samples in one scan weigh little where the track stands still.
-  bool track_agrees(const InstanceEvidence& evidence, std::size_t instance) const {
-    const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    return (2 * counts.moved >= counts.decided && counts.moved > 0) ||
-           evidence.tracked.instances[instance].moved(track_ratio_);
+    return carried && may_presume && is_presumed(evidence, instance) ? Cause::kPresumed
+                                                                     : Cause::kNoEvidence;
   }
 
   // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
@@ -180,8 +161,8 @@ class InstanceJudge {
   }
 
   bool presume_dynamic_;
-  float track_ratio_;
-  float track_level_;
+  float removal_ratio_;
+  float large_removal_ratio_;
   SupervoxelGroups groups_;
   std::vector<std::uint32_t> free_;  // free supervoxels of the current instance
 };

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "dynains/evidence/instance_beliefs.hpp"
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -18,32 +19,26 @@ namespace dynains::detail {
 
 /// The instances of one scan, with links to the instances of the adjacent scans.
 struct TrackedInstances {
-  /// Sums of samples of the instances of a track; those of other scans count less.
+  /// Weighted sums of samples; those of another scan of the track count less.
   struct Seen {
-    float moved = 0.0F;    ///< in free supervoxels
-    float decided = 0.0F;  ///< in free or occupied supervoxels
+    float moved = 0.0F;  ///< in free supervoxels
+    float stood = 0.0F;  ///< in supervoxels that are occupied and not free
   };
   /// The part of a track in the past, or in the future, of a scan.
   struct Side {
     std::uint32_t instance = kNoCluster;  ///< linked instance of the adjacent scan, or kNoCluster
-    float log_odds = 0.0F;                ///< of motion, by this scan and the scans on this side
     Seen seen;                            ///< in this scan and the scans on this side
   };
   struct Instance {
-    float own = 0.0F;  ///< log-odds of motion, by the evidence on this scan alone
-    Seen seen;         ///< in this scan alone
     Side past;
     Side future;
 
-    /// Log-odds of motion, by the whole track. The own log-odds count once.
-    float track_log_odds() const {
-      return own + std::max(0.0F, past.log_odds - own) + std::max(0.0F, future.log_odds - own);
-    }
-    /// Whether at least `ratio` of the decided samples of the whole track moved, or none is
-    /// decided.
-    bool moved(float ratio) const {
-      const float decided = past.seen.decided + future.seen.decided - seen.decided;
-      return past.seen.moved + future.seen.moved - seen.moved >= ratio * decided;
+    /// Ratio of moved to decided samples of the whole track, 0 if none is decided. `own`: samples
+    /// in this scan, which both sides include.
+    float moved_ratio(const InstanceBeliefs::Counts& own) const {
+      const float moved = past.seen.moved + future.seen.moved - static_cast<float>(own.moved);
+      const float stood = past.seen.stood + future.seen.stood - static_cast<float>(own.stood());
+      return moved + stood > 0.0F ? moved / (moved + stood) : 0.0F;
     }
   };
   std::vector<Instance> instances;
@@ -78,7 +73,7 @@ class InstanceLinker {
         max_height_(static_cast<float>(max_height)),
         overlap_(static_cast<float>(overlap)) {}
 
-  /// Computes the shapes and the cells of the instances of one scan, and resets their log-odds. All
+  /// Computes the shapes and the cells of the instances of one scan, and resets their links. All
   /// linked scans must have one origin frame, which should be near them.
   void measure(const InstanceSamples& samples, const Pose& T_origin_sensor, TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
@@ -181,39 +176,24 @@ class InstanceLinker {
   std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
 };
 
-/// Propagates log-odds of motion along linked instances, with a fade factor per scan.
-class TrackBelief {
- public:
-  using Instance = TrackedInstances::Instance;
-  using Side = TrackedInstances::Side;
-
-  /// `unit`: log-odds increment of one reference with free samples.
-  explicit TrackBelief(float unit) : floor_(-1.0F * unit), ceiling_(4.0F * unit) {}
-
-  /// Computes the log-odds of a scan `now` on one side of time. `side`: &Instance::past or
-  /// &Instance::future. `adjacent`: the adjacent scan on that side, with its log-odds already
-  /// computed, or null.
-  void propagate(Side Instance::*side, const TrackedInstances* adjacent,
-                 TrackedInstances& now) const {
-    for (Instance& instance : now.instances) {
-      Side& own_side = instance.*side;
-      float inherited = 0.0F;
-      own_side.seen = instance.seen;
-      if (adjacent != nullptr && own_side.instance != kNoCluster) {
-        const Side& parent = adjacent->instances[own_side.instance].*side;
-        inherited = kFade * parent.log_odds;
-        own_side.seen.moved += kFade * parent.seen.moved;
-        own_side.seen.decided += kFade * parent.seen.decided;
-      }
-      own_side.log_odds = std::clamp(inherited + instance.own, floor_, ceiling_);
-    }
+/// Sums samples along linked instances, for a scan `now` and one side of time. `side`:
+/// &Instance::past or &Instance::future. `adjacent`: the adjacent scan on that side, with its sums
+/// already computed, or null. `counts`: by instance of the scan.
+inline void sum_along_tracks(TrackedInstances::Side TrackedInstances::Instance::*side,
+                             const TrackedInstances* adjacent,
+                             const std::vector<InstanceBeliefs::Counts>& counts,
+                             TrackedInstances& now) {
+  // Factors per scan, chosen on random worlds. An object that moved remains dynamic for some time
+  // while it stands.
+  constexpr float kMovedFade = 0.95F, kStoodFade = 0.8F;
+  for (std::size_t i = 0; i < now.instances.size(); ++i) {
+    TrackedInstances::Side& own = now.instances[i].*side;
+    own.seen = {static_cast<float>(counts[i].moved), static_cast<float>(counts[i].stood())};
+    if (adjacent == nullptr || own.instance == kNoCluster) continue;
+    const TrackedInstances::Seen& parent = (adjacent->instances[own.instance].*side).seen;
+    own.seen.moved += kMovedFade * parent.moved;
+    own.seen.stood += kStoodFade * parent.stood;
   }
-
- private:
-  static constexpr float kFade = 0.95F;  // factor per scan
-
-  float floor_;
-  float ceiling_;
-};
+}
 
 }  // namespace dynains::detail
