@@ -96,18 +96,15 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
   const Pose& T_level_sensor = T_level_sensor_[number];
   ground_.free_far(T_level_sensor.translation());
   RevisedPoints revised;
-  VoxelKey cell = 0;  // of the point before
-  const ChangedPlace* place = places_.changed(cell);
+  CellOfPoint at;
+  const ChangedPlace* place = nullptr;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointLabel label = verdict.labels[i];
     const bool is_removed = label == PointLabel::kDynamic;
     // Ground that left with the instance above it stays removed: it holds wheels and undersides.
     if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) continue;
     const Eigen::Vector3d point = world_point(points, i, T_level_sensor);
-    if (const VoxelKey next = cell_at(point); next != cell) {
-      cell = next;
-      place = places_.changed(cell);
-    }
+    if (at.go_to(point)) place = places_.changed(at.cell());
     const bool stands = place != nullptr && config_.static_policy == StaticPolicy::kLast &&
                         place->stands_since(number);
     if (is_removed) {

@@ -79,7 +79,7 @@ class TileHistory {
         newest = static_cast<std::uint32_t>(parts_.size() - 1);
       }
       const Eigen::Vector3d at = Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
-      const Eigen::Vector3d within = (at - corner_of(blocks_.keys[block], edge())) / edge();
+      const Eigen::Array3d within = (at - corner_of(blocks_.keys[block], edge())) / edge();
       parts_[newest].samples |= 1U << blocks_.values[block].samples.add(within);
       session.part_of.push_back(newest);
     }

@@ -18,22 +18,20 @@ namespace dynains {
 struct CellSamples {
   std::array<std::array<std::uint8_t, 3>, 8> samples;
   std::uint8_t count = 0;
+  std::uint32_t number_of = 0;  ///< 4 bits by octant: 1 + number of its sample, or 0
 
   /// Number of the sample in the octant of a point, which is this point if there was none.
   /// `within`: place of the point in the cube, [0, 1] along each axis.
-  std::size_t add(const Eigen::Vector3d& within) {
-    std::array<std::uint8_t, 3> sample;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double step = 256.0 * within[static_cast<Eigen::Index>(axis)];
-      sample[axis] = static_cast<std::uint8_t>(std::min(255.0, std::max(0.0, step)));
+  std::size_t add(const Eigen::Array3d& within) {
+    int bits = 0;
+    for (int axis = 0; axis < 3; ++axis) bits += within[axis] >= 0.5 ? 4 << axis : 0;
+    if (const std::uint32_t known = number_of >> bits & 15U; known > 0) return known - 1;
+    number_of |= (1U + count) << bits;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double step = std::min(255.0, std::max(0.0, 256.0 * within[axis]));
+      samples[count][static_cast<std::size_t>(axis)] = static_cast<std::uint8_t>(step);
     }
-    const auto is_beside = [&](const std::array<std::uint8_t, 3>& other) {
-      return ((sample[0] ^ other[0]) | (sample[1] ^ other[1]) | (sample[2] ^ other[2])) < 128;
-    };
-    std::size_t number = 0;
-    while (number < count && !is_beside(samples[number])) ++number;
-    if (number == count) samples[count++] = sample;
-    return number;
+    return count++;
   }
 };
 

@@ -24,14 +24,13 @@ class RecordingGround {
   /// Adds the ground points of a scan (m, sensor frame).
   void add(PointsView points, Span<const PointLabel> verdicts, const Pose& T_world_sensor) {
     Column* sum = nullptr;
-    VoxelKey column = 0;  // of the point before
+    CellOfPoint column;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (verdicts[i] != PointLabel::kGround) continue;
       const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
-      if (const VoxelKey next = column_at(point); sum == nullptr || next != column) {
-        column = next;
-        Tile& tile = tiles_.at(tile_of(column));
-        sum = &tile.values[tile.add(column)];
+      if (column.go_to({point.x(), point.y(), 0.0})) {
+        Tile& tile = tiles_.at(tile_of(column.cell()));
+        sum = &tile.values[tile.add(column.cell())];
       }
       sum->mean += (point.z() - sum->mean) / static_cast<double>(++sum->count);
     }

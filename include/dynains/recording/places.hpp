@@ -150,23 +150,21 @@ class RecordingPlaces {
            const Pose& T_world_sensor, double time, std::uint32_t scan) {
     if (epoch_begin_.goes_by(T_world_sensor.translation(), time) && epoch_ < UINT16_MAX) ++epoch_;
     Place* place = nullptr;
-    VoxelKey cell = 0;
+    CellOfPoint at;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const bool is_removed = verdicts[i] == PointLabel::kDynamic;
       const bool is_above_ground =
           verdicts[i] == PointLabel::kStatic || (is_removed && causes[i] != Cause::kUnderInstance);
       if (!is_above_ground) continue;
-      const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
-      if (const VoxelKey next = cell_at(point); place == nullptr || next != cell) {
-        cell = next;
-        Tile& tile = tiles_.at(tile_of(cell));
-        place = &tile.values[tile.add(cell)];
+      if (at.go_to(world_point(points, i, T_world_sensor))) {
+        Tile& tile = tiles_.at(tile_of(at.cell()));
+        place = &tile.values[tile.add(at.cell())];
       }
       if (!is_removed) place->kept.add(scan);
       // The first verdicts on points that are too far for looks say little of their place.
       const bool is_near = std::hypot(points.x[i], points.y[i]) <= static_cast<float>(kLookRange);
       if (is_near) place->first.add(is_removed, epoch_, scan);
-      place->samples.add((point - corner_of(cell)) / kWorldCell);
+      place->samples.add(at.within());
     }
     free_far(T_world_sensor.translation());
   }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -34,6 +35,33 @@ inline Eigen::Vector3d corner_of(VoxelKey cell, double edge = kWorldCell) {
   const auto at = [&](int axis) { return edge * static_cast<double>(voxel_index(cell, axis)); };
   return {at(0), at(1), at(2)};
 }
+
+/// The cell of one point after another: most lie in the cell of the point before.
+class CellOfPoint {
+ public:
+  /// Goes to the cell of a point (m, world frame). Returns whether it is another one.
+  bool go_to(const Eigen::Vector3d& point) {
+    if (is_within(point)) return false;
+    cell_ = cell_at(point);
+    corner_ = corner_of(cell_);
+    is_within(point);
+    return true;
+  }
+  VoxelKey cell() const { return cell_; }
+  /// Place of the point in the cell, about [0, 1] along each axis.
+  const Eigen::Array3d& within() const { return within_; }
+
+ private:
+  bool is_within(const Eigen::Vector3d& point) {
+    within_ = (point - corner_).array() / kWorldCell;
+    return within_.minCoeff() >= 0.0 && within_.maxCoeff() < 1.0;
+  }
+
+  VoxelKey cell_ = 0;
+  // m; no point lies in the first cell.
+  Eigen::Vector3d corner_ = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array3d within_ = Eigen::Array3d::Zero();
+};
 
 /// Point i (m, sensor frame) of a scan, m, world frame.
 inline Eigen::Vector3d world_point(PointsView points, std::size_t i, const Pose& T_world_sensor) {
