@@ -162,7 +162,8 @@ class RecordingPlaces {
       }
       if (!is_removed) place->kept.add(scan);
       // The first verdicts on points that are too far for looks say little of their place.
-      const bool is_near = std::hypot(points.x[i], points.y[i]) <= static_cast<float>(kLookRange);
+      const float squared = points.x[i] * points.x[i] + points.y[i] * points.y[i];
+      const bool is_near = squared <= static_cast<float>(kLookRange * kLookRange);
       if (is_near) place->first.add(is_removed, epoch_, scan);
       place->samples.add(at.within());
     }
