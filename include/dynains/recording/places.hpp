@@ -248,7 +248,6 @@ class RecordingPlaces {
           }
         });
     find_beside();
-    tiles_.rest();
   }
 
   /// The changed place in a cell, or a cell beside, after decide(); null: nothing has changed.
