@@ -361,8 +361,7 @@ class PlaneAligner {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
       const double loss = scale * scale / (scale * scale + match.distance * match.distance);
-      const double most = std::min(kMost, match.plane->points / 3.0);
-      const double share = most / (most + static_cast<double>(match.plane->matches));
+      const double share = kMost / (kMost + static_cast<double>(match.plane->matches));
       add(match,
           Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
                  arm[0] * n[1] - arm[1] * n[0], match.errors[0], match.errors[1], match.errors[2]},

@@ -49,7 +49,6 @@ class VoxelPlanes {
     bool is_fitted = false;
     bool is_flat = false;
     std::uint32_t matches = 0;  ///< number of matched points, for alignments
-    double points = 0.0;        ///< number of points of the fit
     /// Movement of the plane along its normal by each error of the sensor, m.
     std::array<double, kSensorErrors> moved = {};
 
@@ -145,11 +144,9 @@ class VoxelPlanes {
   // Fewer points lie on a plane by chance, for example in foliage.
   static constexpr double kFewestPoints = 12.0;
   static constexpr double kMostThickness = 0.06;  // standard deviation along the normal / edge
-  static constexpr double kMostFlatness = 0.04;   // smallest eigenvalue to the sum
-  static constexpr double kLeastBreadth = 0.04;   // product of the other two to their squared sum
 
-  static constexpr double kEdgeOn = 0.04;      // the same, of a plane that contains the beam
   static constexpr double kGrazing = 0.3;      // sine of the angle between beam and plane
+  static constexpr double kEdgeOn = 0.04;      // the same, of a plane that contains the beam
   static constexpr double kLeastLength = 0.2;  // m, standard deviation along the beam
 
   // The points of a voxel, relative to its centre.
@@ -212,24 +209,22 @@ class VoxelPlanes {
     if (moments.sums.count < kFewestPoints) return plane;
     const detail::Plane fitted = fit_plane(moments.sums);
     // Without the bias: the fit of three parameters takes up a part of the deviations.
-    const double flatness = fitted.flatness * moments.sums.count / (moments.sums.count - 3.0);
-    const double thickness_squared = flatness * fitted.spread;
+    const double thickness_squared =
+        fitted.flatness * fitted.spread * moments.sums.count / (moments.sums.count - 3.0);
     plane = {{fitted.normal_x, fitted.normal_y, fitted.normal_z},
              {centre(key, 0) + fitted.mean_x, centre(key, 1) + fitted.mean_y,
               centre(key, 2) + fitted.mean_z},
              true,
              false,
              0,
-             moments.sums.count,
              {}};
     for (std::size_t k = 0; k < kSensorErrors; ++k) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         plane.moved[k] +=
-            plane.normal[axis] * static_cast<double>(moments.errors[k][axis]) / plane.points;
+            plane.normal[axis] * static_cast<double>(moments.errors[k][axis]) / moments.sums.count;
       }
     }
-    plane.is_flat = flatness <= kMostFlatness && fitted.breadth >= kLeastBreadth &&
-                    thickness_squared <= kMostThickness * kMostThickness * edge_ * edge_ &&
+    plane.is_flat = thickness_squared <= kMostThickness * kMostThickness * edge_ * edge_ &&
                     !is_trace_of_beam(plane, moments.sums);
     return plane;
   }

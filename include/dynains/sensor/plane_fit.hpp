@@ -49,9 +49,6 @@ struct Plane {
   double mean_x = 0.0, mean_y = 0.0, mean_z = 0.0;
   double spread = 0.0;    ///< sum of the eigenvalues of the covariance
   double flatness = 0.0;  ///< smallest eigenvalue of the covariance, divided by their sum: [0, 1/3]
-  /// Product of the other two eigenvalues, divided by the square of their sum: [0, 1/4]. It is 0
-  /// for points on a line.
-  double breadth = 0.0;
 };
 
 /// Fits a plane by total least squares: the normal is the eigenvector of the smallest eigenvalue of
@@ -87,8 +84,6 @@ inline Plane fit_plane(const PlaneMoments& m) {
   }
   plane.spread = trace;
   plane.flatness = lambda / trace;
-  const double others = trace - lambda;
-  plane.breadth = (minors - lambda * others) / (others * others);
 
   // The normal is orthogonal to each row of (covariance - lambda I). The longest cross product of
   // two rows is the most accurate.
