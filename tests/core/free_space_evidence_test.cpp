@@ -114,8 +114,8 @@ TEST_CASE("only compact instances are presumed to move, from the sixth scan of a
   for (const Case& c : {
            Case{2.0F, 1.5F, 4, 0, false}, Case{2.0F, 1.5F, 5, 0, true},
            Case{2.0F, 1.5F, 9, 5, false}, Case{2.0F, 1.5F, 10, 5, true},
-           Case{14.7F, 1.5F, 5, 0, true}, Case{15.6F, 1.5F, 5, 0, false},
-           Case{2.0F, 3.4F, 5, 0, true}, Case{2.0F, 4.1F, 5, 0, false},
+           Case{17.7F, 1.5F, 5, 0, true}, Case{18.6F, 1.5F, 5, 0, false},
+           Case{2.0F, 4.4F, 5, 0, true}, Case{2.0F, 5.1F, 5, 0, false},
            Case{0.75F, 0.1F, 5, 0, false},  // twelve points of one supervoxel: four samples
            Case{0.78F, 0.1F, 5, 0, true},   // one more point in another supervoxel: five samples
        }) {

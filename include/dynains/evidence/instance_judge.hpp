@@ -145,13 +145,10 @@ class InstanceJudge {
   // vehicle ahead, or a static object that came into view.
   bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
     constexpr std::uint32_t kLeastSamples = 5;
-    constexpr float kMaxLength = 15.0F, kMaxHeight = 3.5F;  // m
-    constexpr float kMaxDecided = 0.1F;                     // ratio to all samples
+    constexpr float kMaxDecided = 0.1F;  // ratio to all samples
     if (!presume_dynamic_) return false;
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    const TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
-    return counts.total >= kLeastSamples && shape.length <= kMaxLength &&
-           shape.height <= kMaxHeight &&
+    return counts.total >= kLeastSamples &&
            static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);
   }
 
