@@ -125,7 +125,8 @@ bool Visit::belongs_to(const ChangedPlace& place, PointLabel label, const Eigen:
   return ground_.rise(point).value_or(0.0) >= kRise;
 }
 
-// Restores a removed point if it stands, or does not rise above the ground of all scans.
+// Restores a removed point if it stands, or if it does not rise above the ground of all scans and
+// no look passed it.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m
@@ -136,7 +137,7 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;
     verdict.causes[i] = Cause::kStands;
-  } else if (is_ground()) {
+  } else if (verdict.causes[i] != Cause::kFreeSpace && is_ground()) {
     verdict.labels[i] = PointLabel::kGround;
     verdict.causes[i] = Cause::kGround;
     verdict.instances[i] = kNoInstance;

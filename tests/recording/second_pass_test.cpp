@@ -276,19 +276,19 @@ TEST_CASE("what the first pass removed for a while comes back if what stands at 
   CHECK(count(recording, kCar, false, removes, last_policy())[turn + 13].kept == 0);
 }
 
-TEST_CASE("removed ground comes back, but not under an instance that moves") {
+TEST_CASE("removed ground comes back, but not if it was seen free or under what moves") {
   Recorded recording;
   recording.drive(street(), -15.0, 15.0);
   constexpr std::uint32_t kRoad = 40;
-  for (const Cause cause : {Cause::kWithInstance, Cause::kUnderInstance}) {
+  for (const Cause cause : {Cause::kWithInstance, Cause::kUnderInstance, Cause::kFreeSpace}) {
     const auto removes = [cause](std::size_t scan, std::uint32_t label) {
       return scan == 15 && label == kRoad ? cause : Cause::kUnknown;
     };
     const Counts road = count(recording, kRoad, true, removes)[15];
-    if (cause == Cause::kUnderInstance) {
-      CHECK(road.kept == 0);
-    } else {
+    if (cause == Cause::kWithInstance) {
       CHECK(road.kept > 3 * road.removed);
+    } else {
+      CHECK(road.kept == 0);
     }
   }
 }
