@@ -41,10 +41,10 @@ class CellOfPoint {
  public:
   /// Goes to the cell of a point (m, world frame). Returns whether it is another one.
   bool go_to(const Eigen::Vector3d& point) {
-    if (is_within(point)) return false;
+    if (locate(point)) return false;
     cell_ = cell_at(point);
     corner_ = corner_of(cell_);
-    is_within(point);
+    locate(point);
     return true;
   }
   VoxelKey cell() const { return cell_; }
@@ -52,7 +52,8 @@ class CellOfPoint {
   const Eigen::Array3d& within() const { return within_; }
 
  private:
-  bool is_within(const Eigen::Vector3d& point) {
+  // Sets the place of a point. Returns whether it lies in the cell.
+  bool locate(const Eigen::Vector3d& point) {
     within_ = (point - corner_).array() / kWorldCell;
     return within_.minCoeff() >= 0.0 && within_.maxCoeff() < 1.0;
   }
