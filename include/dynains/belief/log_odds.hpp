@@ -35,8 +35,6 @@ class FreeSpaceSum {
       : increment_(static_cast<float>(log_odds(p_free))),
         decrement_(static_cast<float>(log_odds(p_hit))) {}
 
-  float increment() const { return increment_; }
-
   /// Ratio of free to visible samples of a block in one reference scan. Empty if too few of its
   /// `samples` are visible: less than 30 %, or less than two unless it has only one.
   static std::optional<float> free_ratio(std::uint32_t free, std::uint32_t hit,

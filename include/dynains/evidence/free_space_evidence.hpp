@@ -300,8 +300,7 @@ class FreeSpaceEvidence {
     }
   }
 
-  // Sums samples along tracks through all scans without a final verdict, forward and
-  // backward.
+  // Sums samples along tracks through all scans without a final verdict, forward and backward.
   void sum_along_tracks(std::uint64_t newest) {
     const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
     for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
