@@ -156,14 +156,14 @@ TEST_CASE("evidence: a lead vehicle is presumed to move until its place was seen
   const std::vector<Scan> scans = drive(yard_with(van(9.0, 0.0, {10.0, 0.0, 0.0})), 16, 10.0);
   Config config;
   const Run result = run(config, scans);
-  CHECK(Causes(scans[4], result.newest[4], kAddedBox)[Cause::kPresumed] == 0);  // first scans
-  CHECK(Causes(scans[5], result.newest[5], kAddedBox).share(Cause::kPresumed) > 0.8);
+  CHECK(Causes(scans[1], result.newest[1], kAddedBox)[Cause::kPresumed] == 0);  // first scans
+  CHECK(Causes(scans[2], result.newest[2], kAddedBox).share(Cause::kPresumed) > 0.8);
   const Causes final(scans, result.final, kAddedBox);
   CHECK(final[Cause::kPresumed] == 0);
   CHECK(final.share(Cause::kFreeSpace) + final.share(Cause::kWithInstance) > 0.5);
 
   config.evidence.presume_dynamic = false;
-  const Causes silent(scans[5], run(config, scans).newest[5], kAddedBox);
+  const Causes silent(scans[2], run(config, scans).newest[2], kAddedBox);
   CHECK(silent.share(Cause::kNoEvidence) > 0.8);
 }
 

@@ -90,7 +90,7 @@ FreeSpaceConfig every_scan_a_reference() {
   return config;
 }
 
-TEST_CASE("only compact instances are presumed to move, from the sixth scan of an epoch on") {
+TEST_CASE("only compact instances are presumed to move, from the third scan of an epoch on") {
   struct Case {
     float length, height;
     std::size_t scan = 5;
@@ -112,8 +112,8 @@ TEST_CASE("only compact instances are presumed to move, from the sixth scan of a
     return at_once == Causes{Cause::kPresumed};
   };
   for (const Case& c : {
-           Case{2.0F, 1.5F, 4, 0, false}, Case{2.0F, 1.5F, 5, 0, true},
-           Case{2.0F, 1.5F, 9, 5, false}, Case{2.0F, 1.5F, 10, 5, true},
+           Case{2.0F, 1.5F, 1, 0, false}, Case{2.0F, 1.5F, 2, 0, true},
+           Case{2.0F, 1.5F, 6, 5, false}, Case{2.0F, 1.5F, 7, 5, true},
            Case{17.7F, 1.5F, 5, 0, true}, Case{18.6F, 1.5F, 5, 0, false},
            Case{2.0F, 4.4F, 5, 0, true}, Case{2.0F, 5.1F, 5, 0, false},
            Case{0.75F, 0.1F, 5, 0, false},  // twelve points of one supervoxel: four samples

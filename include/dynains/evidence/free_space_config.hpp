@@ -125,7 +125,7 @@ struct FreeSpaceConfig {
     visitor(Parameter{
         "presume_dynamic", self.presume_dynamic, Bounds(), "",
         "the zero-latency verdict removes compact instances at places without "
-        "earlier evidence, from the sixth scan of an epoch on; no effect with lookahead_scans 0"});
+        "earlier evidence, from the third scan of an epoch on; no effect with lookahead_scans 0"});
   }
 };
 

@@ -321,10 +321,10 @@ class FreeSpaceEvidence {
 
   void judge_instances(bool is_final, Judged& judged) {
     const Record& record = record_of(judged.scan);
-    // In the first scans of an epoch, nearly everything is without evidence of earlier scans.
-    constexpr std::uint64_t kFirstScans = 5;
-    const bool may_presume = !is_final && record.since_begin >= kFirstScans;
-    judge_.judge(record.evidence, updater_, may_presume, judged.supervoxels);
+    // Everything is without evidence in a scan that no earlier one is compared with.
+    const bool was_compared =
+        record.since_begin >= static_cast<std::uint64_t>(detail::kReferenceLags.front());
+    judge_.judge(record.evidence, updater_, !is_final && was_compared, judged.supervoxels);
   }
 
   void judge_by_dynamic_grid(Judged& judged) {
