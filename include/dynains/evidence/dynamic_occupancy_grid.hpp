@@ -84,10 +84,9 @@ class DynamicOccupancyGrid {
   static constexpr std::uint32_t kSamplesPerDynamic = 4;
   static constexpr std::size_t kPrefetchDistance = 32;  // samples
 
-  // Presumed instances are not counted: they have no evidence of motion.
+  // Presumed instances count as static: they have no evidence of motion.
   static Count count_of(Cause cause) {
-    if (cause == Cause::kPresumed) return Count::kNone;
-    return is_dynamic(cause) ? Count::kDynamic : Count::kStatic;
+    return is_dynamic(cause) && cause != Cause::kPresumed ? Count::kDynamic : Count::kStatic;
   }
 
   static std::size_t line_of(VoxelKey key) { return voxel_hash(key) >> 8 & (kLines - 1); }
