@@ -255,27 +255,27 @@ TEST_CASE("what is hit from its own side is not free because another side sees t
     for (int i = 0; i < 4; ++i) scan.see({{4, 0}, {4, 0}}, beside(angle));
     CHECK(scan.is_free(0) == scan.is_free(1));
     CHECK(is_dynamic(last_cause(scan)) == scan.is_free());
-    CHECK(scan.belief().hits == (scan.is_free() ? std::min(hits, 8) : 1));
+    CHECK(scan.belief().hits == (scan.is_free() ? std::min(hits, 7) : 1));
     return scan.is_free();
   };
-  CHECK(is_free(5, 90.0));
-  CHECK_FALSE(is_free(6, 90.0));
-  CHECK(is_free(6, 19.9));
-  CHECK_FALSE(is_free(6, 20.1));
-  CHECK_FALSE(is_free(6, 180.0));
-  CHECK(is_free(6, 90.0, true));  // five of eight samples were free from its own side, too
+  CHECK(is_free(6, 90.0));
+  CHECK_FALSE(is_free(7, 90.0));
+  CHECK(is_free(7, 19.9));
+  CHECK_FALSE(is_free(7, 20.1));
+  CHECK_FALSE(is_free(7, 180.0));
+  CHECK(is_free(7, 90.0, true));  // five of eight samples were free from its own side, too
 }
 
 TEST_CASE("references that see little of an instance do not tell that it stands") {
   for (const std::size_t seen : {2U, 1U}) {  // of eight; a quarter is enough
     Scan scan(Instances{{8}});
-    for (int i = 0; i < 6; ++i) scan.see({{0, seen}}, beside(0.0));
+    for (int i = 0; i < 7; ++i) scan.see({{0, seen}}, beside(0.0));
     for (int i = 0; i < 4; ++i) scan.see({{8, 0}}, beside(90.0));
     CHECK(scan.is_free() == (seen < 2U));
   }
 }
 
-TEST_CASE("a part that eight references hit and none saw free stays when its instance moves") {
+TEST_CASE("a part that seven references hit and none saw free stays when its instance moves") {
   const auto cause = [&](int hits, bool was_free, float moved_in_others) {
     Scan scan(Instances{{8, 4}});
     const bool with_instance = moved_in_others <= 0.0F;
@@ -283,11 +283,11 @@ TEST_CASE("a part that eight references hit and none saw free stays when its ins
     for (int i = 0; i < hits; ++i) scan.see({{0, 0}, {0, 4}});
     return last_cause(scan, {moved_in_others, 0.0F});
   };
-  CHECK(cause(7, false, 0.0F) == Cause::kWithInstance);
-  CHECK(cause(8, false, 0.0F) == Cause::kOccupied);
-  CHECK(cause(8, true, 0.0F) == Cause::kWithInstance);
-  CHECK(cause(7, false, 9.0F) == Cause::kAlongTrack);
-  CHECK(cause(8, false, 9.0F) == Cause::kOccupied);
+  CHECK(cause(6, false, 0.0F) == Cause::kWithInstance);
+  CHECK(cause(7, false, 0.0F) == Cause::kOccupied);
+  CHECK(cause(7, true, 0.0F) == Cause::kWithInstance);
+  CHECK(cause(6, false, 9.0F) == Cause::kAlongTrack);
+  CHECK(cause(7, false, 9.0F) == Cause::kOccupied);
   CHECK(cause(40, false, 9.0F) == Cause::kOccupied);
 }
 
@@ -329,7 +329,7 @@ void add_slowly(const InstanceSamples& samples, const std::vector<BeamResult>& v
         all_seen < 0.25F * static_cast<float>(last - first) || all_free / all_seen <= 0.3F;
     add(supervoxels[s], share, stands, share >= 0.6F, share <= 0.3F);
     if (share <= 0.3F && hit >= std::min(2.0F, size)) {
-      supervoxels[s].hits = std::min<std::uint8_t>(supervoxels[s].hits + 1, 8);
+      supervoxels[s].hits = std::min<std::uint8_t>(supervoxels[s].hits + 1, 7);
     }
   }
 }

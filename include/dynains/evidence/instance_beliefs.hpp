@@ -17,6 +17,9 @@
 
 namespace dynains::detail {
 
+/// References that hit a place, or an instance, and show that it stands. Chosen on random worlds.
+inline constexpr std::uint8_t kFirmHits = 7;
+
 /// An object that stands hides from other sides the surfaces that a scan measured, and beams that
 /// graze its edges pass them. So free samples of a reference on another side are no evidence where
 /// references on the side of the scan hit the instance and none of them saw it free.
@@ -50,7 +53,7 @@ class InstanceViews {
   /// Whether free samples of the reference are no evidence on an instance.
   bool is_contradicted(std::size_t instance) const {
     const View& view = views_[instance];
-    return view.is_other_side && view.hits >= kFewestHits && !view.was_free;
+    return view.is_other_side && view.hits >= kFirmHits && !view.was_free;
   }
 
   /// Takes into account that the reference sees enough of an instance. `free_ratio`: ratio of free
@@ -58,14 +61,12 @@ class InstanceViews {
   void add(std::size_t instance, float free_ratio) {
     View& view = views_[instance];
     if (view.is_other_side) return;
-    if (free_ratio <= kHit && view.hits < kFewestHits) ++view.hits;
-    if (free_ratio >= kFree) view.was_free = true;
+    if (free_ratio <= FreeSpaceSum::kHitRatio && view.hits < kFirmHits) ++view.hits;
+    if (free_ratio >= FreeSpaceSum::kFreeRatio) view.was_free = true;
   }
 
  private:
-  static constexpr float kCosine = 0.9396926F;    // of 20 deg, the largest angle on the own side
-  static constexpr std::uint8_t kFewestHits = 6;  // references
-  static constexpr float kHit = 0.15F, kFree = 0.5F;  // ratios of free to visible samples
+  static constexpr float kCosine = 0.9396926F;  // of 20 deg, the largest angle on the own side
 
   struct View {
     Position sum = {};  // of the positions of the samples
@@ -122,7 +123,6 @@ struct InstanceBeliefs {
       return moved == 0 && static_cast<float>(decided) >= kLeastKnown * static_cast<float>(total);
     }
   };
-  static constexpr std::uint8_t kFirmHits = 8;  ///< references, chosen on random worlds
 
   std::vector<Belief> supervoxels;
   std::vector<Counts> counts;  ///< by instance
@@ -259,7 +259,7 @@ class InstanceBeliefUpdater {
     belief.contested = 1;
     sum_.lower(belief.level);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
-    if (visible.hit >= std::min(2U, samples) && belief.hits < InstanceBeliefs::kFirmHits) {
+    if (visible.hit >= std::min(2U, samples) && belief.hits < kFirmHits) {
       ++belief.hits;
     }
   }
