@@ -193,7 +193,8 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   ByteStore store(outputs.folder);
   Returns returns(store, plan.settings.config.evidence);
   std::optional<SecondPass> second_pass;
-  if (plan.settings.passes > 1) {
+  // The first pass has compared all scans of a shorter recording.
+  if (plan.settings.passes > 1 && plan.range.size() > returns.compared()) {
     SecondPassConfig config;
     config.static_policy = plan.settings.static_policy;
     config.evidence = plan.settings.config.evidence;
