@@ -155,10 +155,11 @@ void City::revise(TileHistory& history, const TileIndex& tile, const SessionInfo
   for (const SessionReference& which : session.references) {
     if ((which.sensor - middle).head<2>().norm() > reach) continue;
     read_reference(session, which, reference);
-    const Pose T_world_points(Eigen::Translation3d(which.sensor));
     history.revise(
-        which.sensor - corner, [&](const PointBuffer& points, std::size_t count) -> const auto& {
-          return test_visibility(reference, session.evidence, points, count, T_world_points,
+        which.sensor - corner,
+        [&](const PointBuffer& points, std::size_t count,
+            const Eigen::Vector3d& origin) -> const auto& {
+          return test_visibility(reference, session.evidence, points, count, corner + origin,
                                  visibility);
         });
   }

@@ -20,7 +20,6 @@ Visit::Visit(ByteStore& store, const SecondPassConfig& config)
     : config_(config),
       store_(store),
       places_(store, config.memory),
-      ground_(store, config.memory),
       references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
 
 // Axes of the places: which way is up is told by the ground of the first scan, not by the world.
@@ -37,22 +36,18 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPos
   }
   const Pose T = orthonormalized(T_level_world_ * compared.T_world_sensor);
   is_suspicious_ = is_suspicious_ || compared.is_suspicious;
-  T_level_sensor_.push_back(T);
+  scans_.push_back({T, epochs_.next(T.translation(), verdict.time)});
   last_ = static_cast<std::uint32_t>(verdict.scan);
   if (is_suspicious_) return;  // first verdicts stay
-  places_.add(points, verdict.labels, verdict.causes, T, verdict.time, number);
-  ground_.add(points, verdict.labels, T);
+  places_.add(points, verdict.labels, verdict.causes, T, scans_.back().epoch);
   const RecordingReference* const reference = references_.add(points, verdict.labels, T, number);
   if (reference == nullptr) return;
   packed_.clear();
   pack_image(reference->image, packed_);
-  kept_.push_back({number, verdict.time, store_.append(packed_), packed_.size()});
+  kept_.push_back({number, store_.append(packed_), packed_.size()});
 }
 
-void Visit::rest() {
-  places_.rest();
-  ground_.rest();
-}
+void Visit::rest() { places_.rest(); }
 
 bool Visit::test(const std::function<bool()>& keep_going) {
   std::array<detail::Visibility, 2> visibility;
@@ -63,12 +58,13 @@ bool Visit::test(const std::function<bool()>& keep_going) {
   for (std::size_t i = 0; i < kept_.size(); ++i) {
     if (!keep_going()) return false;
     std::swap(reference, next);
-    const Pose T_level_points(Eigen::Translation3d(reference.T_world_beams.translation()));
-    places_.begin_test(kept_[i].scan, kept_[i].time, T_level_points.translation());
+    places_.begin_test(scans_[kept_[i].scan].epoch, reference.T_world_beams.translation());
     const auto test_part = [&](std::size_t part) {
       places_.test(
-          part, [&](const PointBuffer& points, std::size_t count) -> const auto& {
-            return test_visibility(reference, config_.evidence, points, count, T_level_points,
+          part,
+          [&](const PointBuffer& points, std::size_t count,
+              const Eigen::Vector3d& origin) -> const auto& {
+            return test_visibility(reference, config_.evidence, points, count, origin,
                                    visibility[part]);
           });
     };
@@ -86,34 +82,39 @@ bool Visit::test(const std::function<bool()>& keep_going) {
 void Visit::read(const Reference& kept, RecordingReference& reference) {
   store_.read(kept.offset, kept.size, packed_);
   reference.scan = kept.scan;
-  reference.T_world_beams = T_level_sensor_[kept.scan];
+  reference.T_world_beams = scans_[kept.scan].T_level_sensor;
   if (!unpack_image(references_.grid(), packed_, reference.image)) {
     throw IoError("a reference of the second pass was damaged in its store");
   }
 }
 
 RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {
-  const Pose& T_level_sensor = T_level_sensor_[number];
-  ground_.free_far(T_level_sensor.translation());
+  const auto& [T_level_sensor, epoch] = scans_[number];
+  places_.free_far(T_level_sensor.translation());
   RevisedPoints revised;
-  CellOfPoint at;
   const ChangedPlace* place = nullptr;
-  for (std::size_t i = 0; i < points.size(); ++i) {
+  VoxelKey cell_of_place = 0;
+  const auto revise_point = [&, &T = T_level_sensor, epoch = epoch](std::size_t i, auto&& cell_of,
+                                                                    unsigned) {
     const PointLabel label = verdict.labels[i];
     const bool is_removed = label == PointLabel::kDynamic;
     // Ground that left with the instance above it stays removed: it holds wheels and undersides.
-    if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) continue;
-    const Eigen::Vector3d point = world_point(points, i, T_level_sensor);
-    if (at.go_to(point)) place = places_.changed(at.cell());
+    if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) return;
+    const VoxelKey cell = cell_of();
+    if (cell != cell_of_place) place = places_.changed(cell);
+    cell_of_place = cell;
+    if (!is_removed && place == nullptr) return;
+    const Eigen::Vector3d point = world_point(points, i, T);
     const bool stands = place != nullptr && config_.static_policy == StaticPolicy::kLast &&
-                        place->stands_since(number);
+                        place->stands_since(epoch);
     if (is_removed) {
       revised.restored += restore(i, stands && !place->is_beside, point, verdict) ? 1 : 0;
-    } else if (place != nullptr && !stands && belongs_to(*place, label, point)) {
+    } else if (!stands && belongs_to(*place, label, point)) {
       remove(i, verdict);
       ++revised.removed;
     }
-  }
+  };
+  for_each_in_cells(points, T_level_sensor, revise_point);
   if (revised.removed > 0) revised.removed += remove_instances(verdict);
   return revised;
 }
@@ -122,7 +123,7 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
 bool Visit::belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point) {
   constexpr double kRise = 0.10;  // m, more than 0.1 deg moves ground 50 m away
   if (label != PointLabel::kGround) return !place.is_beside;
-  return ground_.rise(point).value_or(0.0) >= kRise;
+  return places_.rise(point).value_or(0.0) >= kRise;
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and
@@ -131,8 +132,8 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m
   const auto is_ground = [&] {
-    const std::optional<double> rise = ground_.rise(point);
-    return rise && *rise <= kMostRise && ground_.is_level(point);
+    const std::optional<double> rise = places_.rise(point);
+    return rise && *rise <= kMostRise && places_.is_level(point);
   };
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;

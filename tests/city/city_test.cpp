@@ -267,11 +267,13 @@ TEST_CASE("a city: clusters that are small, parts of others or seen too briefly 
       detail::Visibility visibility;
       for (int i = 0; i < count; ++i) {
         history.revise(
-            sensor, [&](const PointBuffer& points, std::size_t size) -> const auto& {
+            sensor,
+            [&](const PointBuffer& points, std::size_t size,
+                const Eigen::Vector3d& origin) -> const auto& {
               const auto beam = [&](const Eigen::Vector3d& p) {
                 return p.y() < 5.2 ? result : test::BeamResult::kUnknown;
               };
-              return visibility = test::visibility_by(beam, points, size, sensor);
+              return visibility = test::visibility_by(beam, points, size, origin);
             });
       }
     };

@@ -17,27 +17,30 @@ constexpr std::size_t kBudget = 128'000'000;
 
 using Beam = std::function<BeamResult(const Eigen::Vector3d& position)>;
 
-/// A sensor at rest at the origin, 10 m beside a row of places; one reference each second.
+/// A sensor at rest at the origin, 10 m beside a row of places. Epoch 1 measures them; one
+/// reference each second follows, from epoch 2 on.
 class Recorder {
  public:
+  Recorder() { looks_.next(sensor, -1.0); }
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
-    measure(0, count, first, x, label);
+    measure(1, count, first, x, label);
   }
-  /// The first pass judges the points of six places in each of these scans, 1 s apart.
-  void judge(std::uint32_t scan, const std::vector<PointLabel>& verdicts) {
-    for (const PointLabel verdict : verdicts) measure(scan++, 6, 0, 10.1F, verdict);
+  /// The first pass judges the points of six places in each epoch, from one on.
+  void judge(int epoch, const std::vector<PointLabel>& verdicts) {
+    for (const PointLabel verdict : verdicts) measure(epoch++, 6, 0, 10.1F, verdict);
   }
   void look(BeamResult seen, int times = 1) {
     look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
   }
   void look_by(const Beam& beam, int times = 1) {
     for (int i = 0; i < times; ++i, time_ += step) {
-      ++scan_;
-      places.begin_test(scan_, time_, sensor);
+      places.begin_test(looks_.next(sensor, time_), sensor);
       places.test(
-          0, [&](const PointBuffer& points, std::size_t size) -> const auto& {
-            visibility_ = test::visibility_by(beam, points, size, sensor);
+          0,
+          [&](const PointBuffer& points, std::size_t size,
+              const Eigen::Vector3d& origin) -> const auto& {
+            visibility_ = test::visibility_by(beam, points, size, origin);
             return visibility_;
           });
     }
@@ -65,7 +68,7 @@ class Recorder {
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
 
  private:
-  void measure(std::uint32_t scan, int count, int first, float x, PointLabel label) {
+  void measure(int epoch, int count, int first, float x, PointLabel label) {
     PointBuffer points;
     for (int i = 0; i < count; ++i) {
       points.push_back(x, 0.4F * static_cast<float>(first + i) + 0.1F, 0.1F);
@@ -73,10 +76,10 @@ class Recorder {
     }
     const std::vector<PointLabel> labels(points.size(), label);
     const std::vector<Cause> causes(points.size(), Cause::kUnknown);
-    places.add(points, labels, causes, Pose::Identity(), scan, scan);
+    places.add(points, labels, causes, Pose::Identity(), static_cast<std::uint16_t>(epoch));
   }
 
-  std::uint32_t scan_ = 0;
+  Epochs looks_;
   double time_ = 0.0;  // s
   detail::Visibility visibility_;
 };
@@ -135,7 +138,7 @@ TEST_CASE("references near each other in time and place are one look") {
   moving.sensor.y() = -4.5;
   for (int i = 0; i < 4; ++i) {
     moving.look(BeamResult::kFree);
-    moving.sensor.y() += RecordingPlaces::kLookWay;
+    moving.sensor.y() += Epochs::kWay;
   }
   CHECK(moving.changed() == 6);
 }
@@ -187,7 +190,7 @@ TEST_CASE("what the first pass saw coming has changed, if looks passed its place
   for (const bool was_empty : {false, true}) {
     for (const PointLabel first : {kKept, kRemoved}) {
       Recorder recorder;
-      recorder.judge(2, {first, kKept, kKept});
+      recorder.judge(3, {first, kKept, kKept});
       recorder.look(was_empty ? BeamResult::kFree : BeamResult::kUnknown);
       recorder.look(BeamResult::kUnknown);
       recorder.look(BeamResult::kHit, 20);
@@ -199,7 +202,7 @@ TEST_CASE("what the first pass saw coming has changed, if looks passed its place
 TEST_CASE("what beams pass while others hit it is porous, and stays") {
   for (const bool is_kept_in_between : {false, true}) {
     Recorder recorder;
-    recorder.judge(is_kept_in_between ? 3 : 20, {kKept, kKept, kKept});
+    recorder.judge(is_kept_in_between ? 4 : 21, {kKept, kKept, kKept});
     recorder.look(BeamResult::kFree, 8);
     CHECK(recorder.changed() == (is_kept_in_between ? 0U : 6U));
   }
@@ -207,26 +210,26 @@ TEST_CASE("what beams pass while others hit it is porous, and stays") {
 
 TEST_CASE("what came stands since the last look that passed its place") {
   Recorder recorder;
-  recorder.judge(6, {kKept, kKept, kKept});
+  recorder.judge(7, {kKept, kKept, kKept});
   recorder.look(BeamResult::kFree, 5);
   recorder.look(BeamResult::kHit, 3);
   CHECK(recorder.changed() == 6);
   recorder.for_each_changed([](const ChangedPlace& place) {
-    CHECK_FALSE(place.stands_since(5));
-    CHECK(place.stands_since(6));
+    CHECK_FALSE(place.stands_since(6));
+    CHECK(place.stands_since(7));
   });
   Recorder left;
-  left.judge(0, {kKept, kKept, kKept});
+  left.judge(1, {kKept, kKept, kKept});
   left.look(BeamResult::kHit, 3);
   left.look(BeamResult::kFree, 5);
   CHECK(left.changed() == 6);
-  left.for_each_changed([](const ChangedPlace& place) { CHECK_FALSE(place.stands_since(8)); });
+  left.for_each_changed([](const ChangedPlace& place) { CHECK_FALSE(place.stands_since(9)); });
 }
 
 TEST_CASE("what the first pass saw leaving has changed, if looks passed its place afterwards") {
   for (const BeamResult after : {BeamResult::kFree, BeamResult::kUnknown, BeamResult::kHit}) {
     Recorder recorder;
-    recorder.judge(0, {kKept, kKept, kRemoved});
+    recorder.judge(1, {kKept, kKept, kRemoved});
     recorder.look(BeamResult::kHit, 3);
     recorder.look(after);
     CHECK(recorder.changed() == (after == BeamResult::kFree ? 6U : 0U));
@@ -246,6 +249,31 @@ TEST_CASE("a point touches what changed, if fewer places beside it stay") {
     REQUIRE((beside != nullptr) == (staying == 2));
     if (beside != nullptr) CHECK(beside->is_beside);
     CHECK(recorder.places.changed(cell_at({9.4, 1.0, 0.2})) == nullptr);
+  }
+}
+
+TEST_CASE("ground is level if none within two cells is lower, across tiles and their storage") {
+  for (const int cells : {1, 2, 3}) {
+    for (const bool is_tested_first : {false, true}) {
+      CAPTURE(cells, is_tested_first);
+      ByteStore store;
+      RecordingPlaces places(store, 0);
+      const float border = static_cast<float>(kTileEdge);
+      const float tested = border + (is_tested_first ? -0.2F : 0.2F);
+      const float low = tested + (is_tested_first ? 0.4F : -0.4F) * static_cast<float>(cells);
+      PointBuffer points;
+      for (int i = 0; i < 20; ++i) {
+        points.push_back(low, 0.1F, -2.0F);
+        points.push_back(tested, 0.1F, -1.0F);
+      }
+      const std::vector<PointLabel> labels(points.size(), PointLabel::kGround);
+      const std::vector<Cause> causes(points.size(), Cause::kGround);
+      places.add(points, labels, causes, Pose::Identity(), 1);
+      places.free_far(Eigen::Vector3d(1000.0, 0.0, 0.0));
+      const Eigen::Vector3d above(static_cast<double>(tested), 0.1, -0.9);
+      CHECK(places.rise(above).value() == Approx(0.1).margin(1e-4));
+      CHECK(places.is_level(above) == (cells > 2));
+    }
   }
 }
 

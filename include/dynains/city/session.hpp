@@ -69,12 +69,6 @@ inline VoxelKey session_voxel(const SessionGrid& grid, const SessionPoint& point
   return voxel_key(index(point.x), index(point.y), index(point.z));
 }
 
-/// The block of 2 x 2 x 2 voxels around a voxel.
-inline VoxelKey block_of(VoxelKey voxel) {
-  const auto half = [&](int axis) { return voxel_index(voxel, axis) >> 1; };
-  return voxel_key(half(0), half(1), half(2));
-}
-
 /// Where a session lies in the frame of a map: result of SessionAligner.
 struct SessionAlignment {
   /// The poses of the session are multiplied by it, from the left.

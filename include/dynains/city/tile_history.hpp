@@ -72,46 +72,46 @@ class TileHistory {
     session.points = std::move(points);
     session.part_of.reserve(session.points.size());
     for (const SessionPoint& point : session.points) {
-      const std::uint32_t block = blocks_.add(block_of(session_voxel(grid_, point)));
+      const VoxelKey voxel = session_voxel(grid_, point);
+      const unsigned octant = octant_of(voxel);
+      const std::uint32_t block = blocks_.add(block_of(voxel));
       std::uint32_t& newest = blocks_.values[block].newest_part;
       if (newest == kNoIndex || parts_[newest].session != number) {
         parts_.push_back({number, block, newest});
         newest = static_cast<std::uint32_t>(parts_.size() - 1);
       }
-      const Eigen::Vector3d at = Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
-      const Eigen::Array3d within = (at - corner_of(blocks_.keys[block], edge())) / edge();
-      parts_[newest].samples |= 1U << blocks_.values[block].samples.add(within);
+      parts_[newest].octants |= 1U << octant;
+      if (!blocks_.values[block].samples.has(octant)) {
+        const Eigen::Vector3d at = Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
+        const Eigen::Array3d within = (at - corner_of(blocks_.keys[block], edge())) / edge();
+        blocks_.values[block].samples.add(octant, within);
+      }
       session.part_of.push_back(newest);
     }
     session.parts_end = static_cast<std::uint32_t>(parts_.size());
   }
 
   /// Tests all points by a reference of the first session that end_session() has not ended.
-  /// `sensor`: its position, m, in the frame of SessionPoint. `test_visibility(points, count)`: see
-  /// detail::test_visibility(); points in the frame of SessionPoint, relative to `sensor`.
+  /// `sensor`: its position, m, in the frame of SessionPoint. `test_visibility`: see
+  /// TestedCells::test().
   template <class TestVisibility>
   void revise(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    tested_.clear();
-    for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
-      const Block& block = blocks_.values[i];
-      if (!block.is_tested) continue;
-      tested_.add(i, block.samples, corner_of(blocks_.keys[i], edge()) - sensor, edge());
+    if (tested_.size() != blocks_.size()) {
+      const auto samples_of = [&](std::size_t i) -> const CellSamples& { return blocks_.values[i].samples; };
+      tested_.take(blocks_.keys, edge(), samples_of);
     }
-    if (tested_.cells.empty()) return;
-    const auto& visibility = test_visibility(tested_.samples, std::size_t{tested_.begin.back()});
-    for (std::size_t i = 0; i < tested_.cells.size(); ++i) {
-      const auto [free, hit] = visibility.bits(tested_.begin[i], tested_.begin[i + 1]);
-      if ((free | hit) == 0) continue;
-      for (std::uint32_t p = blocks_.values[tested_.cells[i]].newest_part; p != kNoIndex;
-           p = parts_[p].next) {
+    tested_.test(sensor, test_visibility, [&](std::size_t i, const detail::Visibility::Bits& seen) {
+      const Block& block = blocks_.values[i];
+      const std::uint32_t free = block.samples.octants_of(seen.free);
+      const std::uint32_t hit = block.samples.octants_of(seen.hit);
+      for (std::uint32_t p = block.newest_part; p != kNoIndex; p = parts_[p].next) {
         Part& part = parts_[p];
-        const std::uint64_t samples = part.samples;
-        const int verdict = detail::FreeSpaceSum::judge(detail::count_ones(free & samples),
-                                                        detail::count_ones(hit & samples),
-                                                        detail::count_ones(samples));
+        const int verdict = detail::FreeSpaceSum::judge(detail::count_ones(free & part.octants),
+                                                        detail::count_ones(hit & part.octants),
+                                                        detail::count_ones(part.octants));
         if (verdict != 0 && part.removed_by == kNever) add(verdict > 0, part);
       }
-    }
+    });
   }
 
   /// Ends the references of a session.
@@ -126,10 +126,6 @@ class TileHistory {
       part.was_free = part.was_free || part.level >= level_;
       // A few references of the session itself outweigh whatever earlier sessions have seen.
       part.level = std::min(part.level, level_);
-    }
-    for (Block& block : blocks_.values) block.is_tested = false;
-    for (const Part& part : parts_) {
-      if (part.removed_by == kNever) blocks_.values[part.block].is_tested = true;
     }
   }
 
@@ -167,14 +163,13 @@ class TileHistory {
 
   struct Block {
     CellSamples samples;
-    bool is_tested = true;  // whether any part is not removed
     std::uint32_t newest_part = kNoIndex;
   };
   /// The voxels that one session fills in a block, and the evidence about them.
   struct Part {
     std::uint32_t session, block;
     std::uint32_t next;         // part of the session before that has one in the block
-    std::uint32_t samples = 0;  // bits
+    std::uint32_t octants = 0;  // bits of those with points
     float level = 0.0F;         // log-odds of being free
     float own_level = 0.0F;     // sum of its own session, never below zero
     float most_own_level = 0.0F;

@@ -45,28 +45,35 @@ struct VoxelTile {
            values.capacity() * sizeof(Value);
   }
 
+  /// Adds all to `bytes`.
   void pack(std::vector<std::uint8_t>& bytes) const {
     static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
-    const std::size_t key_bytes = keys.size() * sizeof(VoxelKey);
-    bytes.resize(key_bytes + values.size() * sizeof(Value));
-    if (keys.empty()) return;
-    std::memcpy(bytes.data(), keys.data(), key_bytes);
-    std::memcpy(bytes.data() + key_bytes, values.data(), bytes.size() - key_bytes);
+    const std::uint64_t count = keys.size();
+    const auto add = [&](const void* data, std::size_t size) {
+      const auto* const begin = static_cast<const std::uint8_t*>(data);
+      bytes.insert(bytes.end(), begin, begin + size);
+    };
+    add(&count, sizeof(count));
+    add(keys.data(), count * sizeof(VoxelKey));
+    add(values.data(), count * sizeof(Value));
   }
-  void unpack(const std::vector<std::uint8_t>& bytes) {
-    const std::size_t count = bytes.size() / (sizeof(VoxelKey) + sizeof(Value));
-    const std::size_t key_bytes = count * sizeof(VoxelKey);
+  /// Takes what pack() added. Returns its end.
+  const std::uint8_t* unpack(const std::uint8_t* bytes) {
+    std::uint64_t count;
+    std::memcpy(&count, bytes, sizeof(count));
     keys.resize(count);
     values.resize(count);
-    if (count == 0) return;
-    std::memcpy(keys.data(), bytes.data(), key_bytes);
-    std::memcpy(values.data(), bytes.data() + key_bytes, bytes.size() - key_bytes);
+    const std::uint8_t* const begin_values = bytes + sizeof(count) + count * sizeof(VoxelKey);
+    std::copy(bytes + sizeof(count), begin_values, reinterpret_cast<std::uint8_t*>(keys.data()));
+    std::copy_n(begin_values, count * sizeof(Value),
+                reinterpret_cast<std::uint8_t*>(values.data()));
     numbers.reserve(count);
     for (const VoxelKey key : keys) numbers.insert(key);
+    return begin_values + count * sizeof(Value);
   }
 };
 
-/// Tiles by index, each a VoxelTile. References to a tile are valid until free_far() frees it.
+/// Tiles by index, each as a VoxelTile. References to a tile are valid until free_far() frees it.
 template <class Tile>
 class PagedTiles {
  public:
@@ -166,7 +173,7 @@ class PagedTiles {
     Tile tile;
     if (entry.size > 0) {
       store_->read(entry.offset, entry.size, bytes_);
-      tile.unpack(bytes_);
+      tile.unpack(bytes_.data());
     }
     entry.tile = std::move(tile);
     entry.is_changed = false;
@@ -174,6 +181,7 @@ class PagedTiles {
 
   void store(Entry& entry) {
     if (entry.is_changed || entry.size == 0) {
+      bytes_.clear();
       entry.tile->pack(bytes_);
       entry.offset = store_->append(bytes_);
       entry.size = bytes_.size();

@@ -7,6 +7,8 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <optional>
 #include <vector>
 
 #include "dynains/belief/log_odds.hpp"
@@ -15,39 +17,52 @@
 #include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/world_cells.hpp"
+#include "dynains/simd/bits.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
 
-/// Scans from `first` to `last`.
-struct ScanSpan {
-  std::uint32_t first = 0, last = UINT32_MAX;
+/// Numbers the epochs of a visit: scans that are near each other in time and in the place of the
+/// sensor, which repeat the same error, and count once.
+class Epochs {
+ public:
+  static constexpr double kWay = 3.0;   ///< m, of the sensor
+  static constexpr double kTime = 1.0;  ///< s
+
+  /// The epoch of the next scan, counted from 1. `sensor`: m.
+  std::uint16_t next(const Eigen::Vector3d& sensor, double time) {
+    if (number_ > 0 && (sensor - begin_at_).norm() < kWay && time - begin_ < kTime) return number_;
+    begin_at_ = sensor;
+    begin_ = time;
+    if (number_ < UINT16_MAX) ++number_;
+    return number_;
+  }
+
+ private:
+  std::uint16_t number_ = 0;
+  double begin_ = 0.0;                                  // s
+  Eigen::Vector3d begin_at_ = Eigen::Vector3d::Zero();  // m
 };
 
-/// Scans in which something was seen in a place: 64 slices of time, which double when the recording
-/// gets longer.
+/// Epochs in which something was seen in a place: 64 slices of time, which double when the
+/// recording gets longer.
 class Presence {
  public:
-  void add(std::uint32_t scan) {
-    for (; scan >> shift_ >= kSlices; ++shift_) fold();
-    bits_ |= std::uint64_t{1} << (scan >> shift_);
+  void add(std::uint32_t epoch) {
+    for (; epoch >> shift_ >= kSlices; ++shift_) fold();
+    bits_ |= std::uint64_t{1} << (epoch >> shift_);
   }
-  /// Whether something was there in a slice that lies in the span as a whole.
-  bool any_within(const ScanSpan& scans) const { return (bits_ & within(scans)) != 0; }
+  /// Whether something was there in a slice that lies in the epochs `first` to `last` as a whole.
+  bool any_within(std::uint32_t first, std::uint32_t last) const {
+    const std::uint32_t begin = (first + (1U << shift_) - 1) >> shift_;
+    const std::uint32_t end = std::min(kSlices, (last + 1) >> shift_);
+    return begin < end && bits_ >> begin << (kSlices - (end - begin)) != 0;
+  }
 
  private:
   static constexpr std::uint32_t kSlices = 64;
 
-  // Bits of the slices that lie in the span.
-  std::uint64_t within(const ScanSpan& scans) const {
-    const std::uint64_t width = std::uint64_t{1} << shift_;
-    const std::uint64_t first = (scans.first + width - 1) >> shift_;
-    const std::uint64_t end =
-        std::min<std::uint64_t>(kSlices, (scans.last + std::uint64_t{1}) >> shift_);
-    if (first >= end) return 0;
-    return (~std::uint64_t{0} >> (kSlices - (end - first))) << first;
-  }
   // Two slices become one.
   void fold() {
     std::uint64_t half = 0;
@@ -61,30 +76,24 @@ class Presence {
   std::uint8_t shift_ = 0;
 };
 
-/// Verdicts of the first pass on the points of a place, by epochs: scans that are near each other
-/// in time and in the place of the sensor.
+/// Verdicts of the first pass on the points of a place, by epochs.
 struct FirstVerdicts {
   std::uint16_t first_epoch = 0, last_epoch = 0;  ///< that measured the place; 0: none
   bool removed_first = true;                      ///< the first epoch removed all points
   bool removed_last = false;                      ///< the last one did
   bool any_kept = false;
-  std::uint32_t first_scan = 0, last_scan = 0;  ///< that measured the place
 
-  /// Adds a point. Epochs, counted from 1, and scans ascend.
-  void add(bool is_removed, std::uint16_t epoch, std::uint32_t scan) {
-    if (first_epoch == 0) {
-      first_epoch = epoch;
-      first_scan = scan;
-    }
+  /// Adds a point. Epochs ascend.
+  void add(bool is_removed, std::uint16_t epoch) {
+    if (first_epoch == 0) first_epoch = epoch;
     removed_last = is_removed && (removed_last || epoch != last_epoch);
     removed_first = removed_first && (is_removed || epoch != first_epoch);
     any_kept = any_kept || !is_removed;
     last_epoch = epoch;
-    last_scan = scan;
   }
 };
 
-/// A cube of 0.4 m.
+/// A cube of 0.4 m. It fills a cache line.
 struct alignas(64) RecordingPlace {
   static constexpr int kFreeLooks = 4;  ///< in a row, after which it has changed
 
@@ -92,13 +101,13 @@ struct alignas(64) RecordingPlace {
   Presence kept;  ///< points by the first pass
   CellSamples samples;
 
-  bool look_free = false, look_hit = false;      ///< of the open look
-  bool was_hit = false;                          ///< by any look
-  bool free_before = false, free_after = false;  ///< before, after any scan measured it
-  std::uint8_t run = 0, longest = 0;             ///< free looks in a row
-  std::uint32_t run_begin = 0;                   ///< first scan of the row
-  ScanSpan passed;                               ///< of the longest row
-  std::uint32_t last_free = 0;                   ///< last scan of the last look that passed it
+  enum class Look : std::uint8_t { kNone, kFree, kHit } look = Look::kNone;  ///< the open one
+  std::uint16_t run_begin = 0;                      ///< first epoch of the row of free looks
+  std::uint16_t passed_first = 0, passed_last = 0;  ///< epochs of the longest row
+  std::uint16_t last_free = 0;                      ///< last epoch whose look passed it
+  std::uint8_t run = 0, longest = 0;                ///< free looks in a row
+  bool was_hit = false;                             ///< by any look
+  bool free_before = false, free_after = false;     ///< before, after any epoch measured it
 
   bool was_passed() const { return longest > 0; }
   /// Whether looks tell that what was measured in it came or went. Beams that pass what others hit
@@ -107,7 +116,27 @@ struct alignas(64) RecordingPlace {
     const bool came = first.removed_first && free_before;
     const bool left = first.removed_last && free_after;
     return (first.any_kept && (came || left)) ||
-           (longest >= kFreeLooks && !kept.any_within(passed));
+           (longest >= kFreeLooks && !kept.any_within(passed_first, passed_last));
+  }
+  /// Adds the open look, which is of an epoch, to the state.
+  void end_look(std::uint16_t epoch) {
+    if (look == Look::kHit) {
+      was_hit = true;
+      free_after = false;
+      run = 0;
+    } else {
+      last_free = epoch;
+      if (!was_hit && epoch < first.first_epoch) free_before = true;
+      if (epoch > first.last_epoch) free_after = true;
+      if (run == 0) run_begin = epoch;
+      if (run < UINT8_MAX) ++run;
+      if (run >= longest) {
+        longest = run;
+        passed_first = run_begin;
+        passed_last = epoch;
+      }
+    }
+    look = Look::kNone;
   }
 };
 
@@ -115,68 +144,148 @@ struct alignas(64) RecordingPlace {
 struct ChangedPlace {
   bool is_beside = false;       ///< no place has changed there, but most of those that touch it
   bool removed_last = false;    ///< the last epoch of first verdicts removed its points
-  std::uint32_t last_free = 0;  ///< last scan of the last look that passed it
+  std::uint16_t last_free = 0;  ///< last epoch whose look passed it
 
-  /// Whether what a scan measured in it is there in the end of the recording: no later look passed
-  /// it.
-  bool stands_since(std::uint32_t scan) const { return !removed_last && scan > last_free; }
+  /// Whether what an epoch measured in it is there in the end of the recording: no later look
+  /// passed it.
+  bool stands_since(std::uint16_t epoch) const { return !removed_last && epoch > last_free; }
+};
+
+/// The ground in a column of cells.
+struct GroundColumn {
+  double height_sum = 0.0;  ///< m
+  std::uint32_t count = 0;  ///< of points
+
+  double mean() const { return height_sum / static_cast<double>(count); }
+};
+
+/// The places and the ground of a tile.
+struct RecordingTile {
+  VoxelTile<RecordingPlace> places;
+  std::vector<GroundColumn> ground = std::vector<GroundColumn>(1U << 2 * kTileShift);
+
+  /// The ground in the column of a cell.
+  static std::size_t column(VoxelKey cell) {
+    const VoxelKey last = (1U << kTileShift) - 1;
+    const auto index = [&](int axis) { return static_cast<VoxelKey>(voxel_index(cell, axis)); };
+    return (index(0) & last) << kTileShift | (index(1) & last);
+  }
+  /// The samples of all places; none is added then.
+  const TestedCells& tested() {
+    if (tested_.size() != places.size()) {
+      const auto samples_of = [&](std::size_t i) -> const CellSamples& { return places.values[i].samples; };
+      tested_.take(places.keys, kWorldCell, samples_of);
+    }
+    return tested_;
+  }
+  std::size_t size() const { return places.size(); }
+  std::size_t memory_bytes() const {
+    return places.memory_bytes() + ground_bytes() + tested_.memory_bytes();
+  }
+  void pack(std::vector<std::uint8_t>& bytes) const {
+    places.pack(bytes);
+    const auto* const begin = reinterpret_cast<const std::uint8_t*>(ground.data());
+    bytes.insert(bytes.end(), begin, begin + ground_bytes());
+  }
+  void unpack(const std::uint8_t* bytes) {
+    std::memcpy(ground.data(), places.unpack(bytes), ground_bytes());
+  }
+
+ private:
+  std::size_t ground_bytes() const { return ground.size() * sizeof(GroundColumn); }
+
+  TestedCells tested_;
 };
 
 /// Places are cells of 0.4 m with points above the ground. The verdicts of the first pass on them
 /// are kept by epochs. Then reference scans test the points of each place, in the order of their
-/// times. References near each other in time and in the place of the sensor repeat the same error,
-/// and are one look; an epoch is the same for scans. A look is free if beams passed the place and
-/// none hit it. A place has changed by its state over time, not by the sum of its looks, in one of
+/// times. Those of an epoch are one look. A look is free if beams passed the place and none hit it.
+/// A place has changed by its state over time, not by the sum of its looks, in one of
 /// these ways:
 /// - kFreeLooks looks in a row are free, no hit lies between, and the first pass kept no points of
 ///   that time: beams that pass what others hit tell of something porous.
 /// - An object came: looks passed the place before any scan measured it, and the first epoch
 ///   removed its points.
 /// - An object left: the last epoch removed its points, and looks passed the place after it.
+/// The height of the ground is the mean of all scans: single scans have noise and hidden ground.
 class RecordingPlaces {
  public:
-  static constexpr double kLookWay = 3.0;   ///< m, of the sensor between independent looks
-  static constexpr double kLookTime = 1.0;  ///< s, between independent looks
-
   /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
   /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
   /// result.
   RecordingPlaces(ByteStore& store, std::size_t budget) : tiles_(store, budget) {}
 
-  /// Adds the places of the points above the ground of a scan (m, sensor frame). `time`: s. `scan`:
-  /// its number; ascending.
+  /// Adds the points of a scan (m, sensor frame): places of those above the ground, and the ground.
+  /// Epochs ascend.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const Cause> causes,
-           const Pose& T_world_sensor, double time, std::uint32_t scan) {
-    if (epoch_begin_.goes_by(T_world_sensor.translation(), time) && epoch_ < UINT16_MAX) ++epoch_;
+           const Pose& T_world_sensor, std::uint16_t epoch) {
     Place* place = nullptr;
-    CellOfPoint at;
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    VoxelKey cell_of_place = 0;
+    const auto add_point = [&](std::size_t i, auto&& cell_of, unsigned octant) {
       const bool is_removed = verdicts[i] == PointLabel::kDynamic;
+      if (verdicts[i] == PointLabel::kGround) {
+        const VoxelKey cell = cell_of();
+        GroundColumn& ground = tiles_.at(tile_of(cell)).ground[Tile::column(cell)];
+        ground.height_sum += world_point(points, i, T_world_sensor).z();
+        ++ground.count;
+      }
       const bool is_above_ground =
           verdicts[i] == PointLabel::kStatic || (is_removed && causes[i] != Cause::kUnderInstance);
-      if (!is_above_ground) continue;
-      if (at.go_to(world_point(points, i, T_world_sensor))) {
-        Tile& tile = tiles_.at(tile_of(at.cell()));
-        place = &tile.values[tile.add(at.cell())];
+      if (!is_above_ground) return;
+      const VoxelKey cell = cell_of();
+      if (place == nullptr || cell != cell_of_place) {
+        VoxelTile<Place>& places = tiles_.at(tile_of(cell)).places;
+        place = &places.values[places.add(cell)];
+        cell_of_place = cell;
       }
-      if (!is_removed) place->kept.add(scan);
+      if (!is_removed) place->kept.add(epoch);
       // The first verdicts on points that are too far for looks say little of their place.
       const float squared = points.x[i] * points.x[i] + points.y[i] * points.y[i];
       const bool is_near = squared <= static_cast<float>(kLookRange * kLookRange);
-      if (is_near) place->first.add(is_removed, epoch_, scan);
-      place->samples.add(at.within());
-    }
+      if (is_near) place->first.add(is_removed, epoch);
+      if (place->samples.has(octant)) return;
+      const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
+      place->samples.add(octant, (point - corner_of(cell)).array() / kWorldCell);
+    };
+    for_each_in_cells(points, T_world_sensor, add_point);
     free_far(T_world_sensor.translation());
   }
 
-  /// Begins the test of the places around the sensor by a reference scan. `sensor`: m, world frame.
-  /// `scan`: its number; ascending.
-  void begin_test(std::uint32_t scan, double time, const Eigen::Vector3d& sensor) {
-    if (look_begin_.goes_by(sensor, time)) {
-      end_look();
-      look_.first = scan;
+  /// Keeps to the budget, while points around a sensor (m, world frame) are asked for. Places of
+  /// the open look stay in memory.
+  void free_far(const Eigen::Vector3d& sensor) {
+    tiles_.free_far(sensor, kLookRange + Epochs::kWay);
+  }
+
+  /// Height of a point (m, world frame) above the ground, m, if there is ground in its column.
+  std::optional<double> rise(const Eigen::Vector3d& point) {
+    const GroundColumn* const ground = find_ground(cell_at(point));
+    if (ground == nullptr) return std::nullopt;
+    return point.z() - ground->mean();
+  }
+
+  /// Whether no ground within 0.8 m of the column of a point is 0.2 m lower than its own.
+  bool is_level(const Eigen::Vector3d& point) {
+    constexpr int kReach = 2;      // columns
+    constexpr double kStep = 0.2;  // m
+    const VoxelKey column = cell_at(point);
+    const GroundColumn* const own = find_ground(column);
+    if (own == nullptr) return false;
+    const double lowest = own->mean() - kStep;
+    for (int x = -kReach; x <= kReach; ++x) {
+      for (int y = -kReach; y <= kReach; ++y) {
+        const GroundColumn* const beside = find_ground(column + voxel_key_step(x, y, 0));
+        if (beside != nullptr && beside->mean() < lowest) return false;
+      }
     }
-    look_.last = scan;
+    return true;
+  }
+
+  /// Begins the test of the places around the sensor by a reference scan. `sensor`: m, world frame.
+  /// Epochs ascend.
+  void begin_test(std::uint16_t epoch, const Eigen::Vector3d& sensor) {
+    if (epoch != look_) end_look();
+    look_ = epoch;
     free_far(sensor);
     sensor_ = sensor;
     around_.clear();
@@ -187,28 +296,21 @@ class RecordingPlaces {
   }
 
   /// Tests places that no other call has taken, until none is left. Calls with different `part`, 0
-  /// or 1, may run at the same time. `test_visibility(points, count)`: see
-  /// detail::test_visibility(); points relative to the sensor, with the axes of the world frame.
+  /// or 1, may run at the same time. `test_visibility`: see TestedCells::test().
   template <class TestVisibility>
   void test(std::size_t part, TestVisibility&& test_visibility) {
-    TestedCells& tested = tested_[part];
     for (std::size_t next; (next = next_around_++) < around_.size();) {
-      Tile& tile = *around_[next];
-      tested.clear();
-      for (std::uint32_t i = 0; i < tile.size(); ++i) {
-        tested.add(i, tile.values[i].samples, corner_of(tile.keys[i]) - sensor_, kWorldCell);
-      }
-      if (tested.cells.empty()) continue;
-      const auto& visibility = test_visibility(tested.samples, std::size_t{tested.begin.back()});
-      for (std::size_t i = 0; i < tested.cells.size(); ++i) {
-        const std::uint32_t begin = tested.begin[i], end = tested.begin[i + 1];
-        const auto count = visibility.count(begin, end);
-        const int verdict = detail::FreeSpaceSum::judge(count.free, count.hit, end - begin);
-        if (verdict == 0) continue;
-        Place& place = tile.values[tested.cells[i]];
-        if (!place.look_free && !place.look_hit) touched_[part].push_back(&place);
-        (verdict > 0 ? place.look_free : place.look_hit) = true;
-      }
+      std::vector<Place>& places = around_[next]->places.values;
+      around_[next]->tested().test(
+          sensor_, test_visibility, [&](std::size_t i, const detail::Visibility::Bits& seen) {
+            const int verdict = detail::FreeSpaceSum::judge(
+                detail::count_ones(seen.free), detail::count_ones(seen.hit),
+                detail::count_ones(std::uint64_t{places[i].samples.octants}));
+            if (verdict == 0) return;
+            using Look = Place::Look;
+            if (places[i].look == Look::kNone) touched_[part].push_back(&places[i]);
+            places[i].look = std::max(places[i].look, verdict > 0 ? Look::kFree : Look::kHit);
+          });
     }
   }
 
@@ -220,7 +322,7 @@ class RecordingPlaces {
     end_look();
     VoxelTile<Place> found;
     tiles_.for_each_index([&](const TileIndex& index) {
-      const Tile& tile = *tiles_.find(index);
+      const VoxelTile<Place>& tile = tiles_.find(index)->places;
       for (std::size_t i = 0; i < tile.size(); ++i) {
         if (tile.values[i].has_changed()) found.values[found.add(tile.keys[i])] = tile.values[i];
       }
@@ -258,49 +360,14 @@ class RecordingPlaces {
 
  private:
   using Place = RecordingPlace;
-  using Tile = VoxelTile<Place>;
-
-  /// Begin of a look or an epoch.
-  struct Begin {
-    bool is_set = false;
-    double time = 0.0;                             // s
-    Eigen::Vector3d at = Eigen::Vector3d::Zero();  // m, the sensor
-
-    // Goes to a sensor that is too far, or too late, to belong to it. Returns whether it is.
-    bool goes_by(const Eigen::Vector3d& sensor, double now) {
-      if (is_set && (sensor - at).norm() < kLookWay && now - time < kLookTime) return false;
-      *this = {true, now, sensor};
-      return true;
-    }
-  };
-
-  // Places of the open look stay in memory.
-  void free_far(const Eigen::Vector3d& sensor) { tiles_.free_far(sensor, kLookRange + kLookWay); }
+  using Tile = RecordingTile;
 
   // Adds the open look to the states of the places that it saw.
   void end_look() {
     for (std::vector<Place*>& touched : touched_) {
-      for (Place* const place : touched) end_look(*place);
+      for (Place* const place : touched) place->end_look(look_);
       touched.clear();
     }
-  }
-  void end_look(Place& place) const {
-    if (place.look_hit) {
-      place.was_hit = true;
-      place.free_after = false;
-      place.run = 0;
-    } else {
-      place.last_free = look_.last;
-      if (!place.was_hit && look_.last < place.first.first_scan) place.free_before = true;
-      if (look_.first > place.first.last_scan) place.free_after = true;
-      if (place.run == 0) place.run_begin = look_.first;
-      if (place.run < UINT8_MAX) ++place.run;
-      if (place.run >= place.longest) {
-        place.longest = place.run;
-        place.passed = {place.run_begin, look_.last};
-      }
-    }
-    place.look_free = place.look_hit = false;
   }
 
   // Finds the cells that touch more places of objects than ones that stay.
@@ -329,20 +396,23 @@ class RecordingPlaces {
   // Null: no scan brought a place there.
   const Place* find(VoxelKey cell) {
     const Tile* const tile = tiles_.find(tile_of(cell));
-    return tile == nullptr ? nullptr : tile->find(cell);
+    return tile == nullptr ? nullptr : tile->places.find(cell);
+  }
+  // Null: there are too few ground points in the column of a cell.
+  const GroundColumn* find_ground(VoxelKey cell) {
+    constexpr std::uint32_t kFewest = 20;
+    const Tile* const tile = tiles_.find(tile_of(cell));
+    const GroundColumn* const found = tile == nullptr ? nullptr : &tile->ground[Tile::column(cell)];
+    return found == nullptr || found->count < kFewest ? nullptr : found;
   }
 
   PagedTiles<Tile> tiles_;
   VoxelTile<ChangedPlace> changed_;
 
-  Begin epoch_begin_, look_begin_;
-  std::uint16_t epoch_ = 0;
-  ScanSpan look_;  // the open one
-
+  std::uint16_t look_ = 0;                            // epoch of the open one
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, of the reference
   std::vector<Tile*> around_;                         // to be tested
   std::atomic<std::size_t> next_around_{0};           // the next one
-  std::array<TestedCells, 2> tested_;                 // by part
   std::array<std::vector<Place*>, 2> touched_;        // by the open look
 };
 

@@ -179,14 +179,15 @@ class RecordingReferences {
   RecordingReference reference_;
 };
 
-/// Tests the first `count` points (m; padded for packs) by a reference, with the margins of
-/// `config`. Returns `out`.
+/// Tests the first `count` points (m, relative to `origin`, axes of the world; padded for packs) by
+/// a reference, with the margins of `config`. Returns `out`.
 inline const detail::Visibility& test_visibility(const RecordingReference& reference,
                                                  const FreeSpaceConfig& config,
                                                  const PointBuffer& points, std::size_t count,
-                                                 const Pose& T_world_points,
+                                                 const Eigen::Vector3d& origin,
                                                  detail::Visibility& out) {
-  const Pose T = detail::composed(detail::inverted(reference.T_world_beams), T_world_points);
+  const Pose T = detail::composed(detail::inverted(reference.T_world_beams),
+                                  Pose(Eigen::Translation3d(origin)));
   detail::test_visibility(reference.image, T, points, count, static_cast<float>(config.margin),
                           static_cast<float>(config.margin_slope), out);
   return out;

@@ -12,7 +12,6 @@
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
 #include "dynains/recording/compared_poses.hpp"
-#include "dynains/recording/ground.hpp"
 #include "dynains/recording/places.hpp"
 #include "dynains/recording/references.hpp"
 #include "dynains/recording/static_policy.hpp"
@@ -23,8 +22,8 @@ namespace dynains {
 
 struct SecondPassConfig {
   StaticPolicy static_policy = StaticPolicy::kAlways;
-  /// Bytes of places, and of ground, in memory, if those around the sensor take less.
-  std::size_t memory = std::size_t{80} << 20U;
+  /// Bytes of places and ground in memory, if those around the sensor take less.
+  std::size_t memory = std::size_t{160} << 20U;
   bool has_second_thread = false;  ///< which tests places, too
   /// Of the first pass: the margins hold for the second one, too, and so does what the first one
   /// has compared.
@@ -55,7 +54,7 @@ class Visit {
   /// Revises the first verdict on a scan, after test().
   RevisedPoints revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
 
-  std::uint32_t scans() const { return static_cast<std::uint32_t>(T_level_sensor_.size()); }
+  std::uint32_t scans() const { return static_cast<std::uint32_t>(scans_.size()); }
   /// Scans of the recording from the first one of the visit to the last one.
   std::uint32_t length() const { return last_ - first_ + 1; }
   /// Whether the first pass has doubted a scan: its poses, rays or units.
@@ -63,9 +62,12 @@ class Visit {
   std::size_t place_count() const { return places_.size(); }
 
  private:
+  struct Scan {
+    Pose T_level_sensor;  // as it was compared
+    std::uint16_t epoch;
+  };
   struct Reference {
     std::uint32_t scan;
-    double time;           // s
     std::uint64_t offset;  // in the store
     std::size_t size;      // bytes
   };
@@ -79,11 +81,11 @@ class Visit {
   SecondPassConfig config_;
   ByteStore& store_;
   RecordingPlaces places_;
-  RecordingGround ground_;
   RecordingReferences references_;
   Pose T_level_world_ = Pose::Identity();  // z up, origin and heading of the first sensor
-  std::vector<Pose> T_level_sensor_;       // by scan, as it was compared
-  std::uint32_t first_ = 0, last_ = 0;     // scans of the recording
+  Epochs epochs_;
+  std::vector<Scan> scans_;
+  std::uint32_t first_ = 0, last_ = 0;  // scans of the recording
   bool is_suspicious_ = false;
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;

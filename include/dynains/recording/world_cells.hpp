@@ -2,13 +2,15 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/simd/pack_geometry.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -30,39 +32,52 @@ inline TileIndex tile_of(VoxelKey cell) {
 /// The cell of a point, m, world frame.
 inline VoxelKey cell_at(const Eigen::Vector3d& point) { return voxel_at(point, kWorldCell); }
 
+/// The cube of 2 x 2 x 2 voxels around a voxel.
+inline VoxelKey block_of(VoxelKey voxel) {
+  const auto half = [&](int axis) { return voxel_index(voxel, axis) >> 1; };
+  return voxel_key(half(0), half(1), half(2));
+}
+
+/// Which one of the voxels of its block a voxel is: bit 0 for the upper one along x, 1 y, 2 z.
+inline unsigned octant_of(VoxelKey voxel) {
+  const auto bit = [&](int axis) { return static_cast<unsigned>(voxel_index(voxel, axis) & 1); };
+  return bit(0) | bit(1) << 1U | bit(2) << 2U;
+}
+
 /// The corner of a cell with the lowest coordinates, m. `edge`: m, of the cells.
 inline Eigen::Vector3d corner_of(VoxelKey cell, double edge = kWorldCell) {
   const auto at = [&](int axis) { return edge * static_cast<double>(voxel_index(cell, axis)); };
   return {at(0), at(1), at(2)};
 }
 
-/// The cell of one point after another: most lie in the cell of the point before.
-class CellOfPoint {
- public:
-  /// Goes to the cell of a point (m, world frame). Returns whether it is another one.
-  bool go_to(const Eigen::Vector3d& point) {
-    if (locate(point)) return false;
-    cell_ = cell_at(point);
-    corner_ = corner_of(cell_);
-    locate(point);
-    return true;
+/// Calls `visit(i, cell_of, octant)` for the points of a scan (m, sensor frame), one after another.
+/// `cell_of()`: the cell of the point; `octant`: its voxel there, see octant_of(). The rounding of
+/// a float moves borders of cells by less than 0.1 mm.
+template <class Visitor>
+void for_each_in_cells(PointsView points, const Pose& T_world_sensor, Visitor&& visit) {
+  constexpr std::size_t kBatch = 256;
+  alignas(64) std::int32_t voxels[3][kBatch];
+  const VoxelKey origin = cell_at(T_world_sensor.translation());
+  Pose T_origin_sensor = T_world_sensor;
+  T_origin_sensor.translation() -= corner_of(origin);
+  const detail::PackTransform to_voxels(T_origin_sensor, 2.0 / kWorldCell);
+  for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
+    const PointsView batch = points.subview(begin, std::min(kBatch, points.size() - begin));
+    detail::for_packs(batch.size(), [&](auto at) {
+      const auto x = at.load(batch.x.data());
+      const auto y = at.load(batch.y.data());
+      const auto z = at.load(batch.z.data());
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        floor(to_voxels(axis, x, y, z)).store(&voxels[axis][at.begin]);
+      }
+    });
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const std::int32_t x = voxels[0][i], y = voxels[1][i], z = voxels[2][i];
+      const auto cell_of = [&] { return origin + voxel_key_step(x >> 1, y >> 1, z >> 1); };
+      visit(begin + i, cell_of, static_cast<unsigned>((x & 1) | (y & 1) << 1 | (z & 1) << 2));
+    }
   }
-  VoxelKey cell() const { return cell_; }
-  /// Place of the point in the cell, about [0, 1] along each axis.
-  const Eigen::Array3d& within() const { return within_; }
-
- private:
-  // Sets the place of a point. Returns whether it lies in the cell.
-  bool locate(const Eigen::Vector3d& point) {
-    within_ = (point - corner_).array() / kWorldCell;
-    return within_.minCoeff() >= 0.0 && within_.maxCoeff() < 1.0;
-  }
-
-  VoxelKey cell_ = 0;
-  // m; no point lies in the first cell.
-  Eigen::Vector3d corner_ = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Array3d within_ = Eigen::Array3d::Zero();
-};
+}
 
 /// Point i (m, sensor frame) of a scan, m, world frame.
 inline Eigen::Vector3d world_point(PointsView points, std::size_t i, const Pose& T_world_sensor) {
