@@ -108,8 +108,8 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
     const bool stands = place != nullptr && config_.static_policy == StaticPolicy::kLast &&
                         place->stands_since(epoch);
     if (is_removed) {
-      revised.restored += restore(i, stands && !place->is_beside, point, verdict) ? 1 : 0;
-    } else if (!stands && belongs_to(*place, label, point)) {
+      revised.restored += restore(i, stands, point, verdict) ? 1 : 0;
+    } else if (!stands && belongs_to_object(label, point)) {
       remove(i, verdict);
       ++revised.removed;
     }
@@ -119,11 +119,11 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
   return revised;
 }
 
-// Whether a point that was kept is of the object of a place. Ground is, if it rises above the mean.
-bool Visit::belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point) {
+// Whether a point that was kept, in a place that has changed, is of the object there. Ground is, if
+// it rises above the mean.
+bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
   constexpr double kRise = 0.10;  // m, more than 0.1 deg moves ground 50 m away
-  if (label != PointLabel::kGround) return !place.is_beside;
-  return places_.rise(point).value_or(0.0) >= kRise;
+  return label != PointLabel::kGround || places_.rise(point).value_or(0.0) >= kRise;
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and

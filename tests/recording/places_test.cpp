@@ -57,7 +57,7 @@ class Recorder {
     for (int x = 0; x < kFarthest; ++x) {
       for (int y = -kFarthest; y < kFarthest; ++y) {
         const ChangedPlace* const place = places.changed(voxel_key(x, y, 0));
-        if (place != nullptr && !place->is_beside) visit(*place);
+        if (place != nullptr) visit(*place);
       }
     }
   }
@@ -153,11 +153,6 @@ TEST_CASE("an object needs enough places") {
   }
 }
 
-// Looks pass the places before x = 10.4 m and hit the others.
-BeamResult pass_near_ones(const Eigen::Vector3d& at) {
-  return at.x() < 10.4 ? BeamResult::kFree : BeamResult::kHit;
-}
-
 TEST_CASE("a part of something that stays stays") {
   for (const int more : {1, 2}) {  // than places that leave
     Recorder recorder;
@@ -233,22 +228,6 @@ TEST_CASE("what the first pass saw leaving has changed, if looks passed its plac
     recorder.look(BeamResult::kHit, 3);
     recorder.look(after);
     CHECK(recorder.changed() == (after == BeamResult::kFree ? 6U : 0U));
-  }
-}
-
-TEST_CASE("a point touches what changed, if fewer places beside it stay") {
-  for (const int staying : {2, 3}) {  // of 3 x 3 x 3 places around the point, 3 have changed
-    Recorder recorder;
-    recorder.measure(6);
-    recorder.measure(staying, 1, 10.9F);
-    recorder.look(BeamResult::kHit, 5);
-    recorder.look_by(pass_near_ones, 10);
-    REQUIRE(recorder.changed() == 6);
-    const Eigen::Vector3d between(10.6, 1.0, 0.2);
-    const ChangedPlace* const beside = recorder.places.changed(cell_at(between));
-    REQUIRE((beside != nullptr) == (staying == 2));
-    if (beside != nullptr) CHECK(beside->is_beside);
-    CHECK(recorder.places.changed(cell_at({9.4, 1.0, 0.2})) == nullptr);
   }
 }
 

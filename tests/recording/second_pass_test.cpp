@@ -153,24 +153,18 @@ Recorded there_and_back(bool is_parked_first, bool is_parked_then, double y = 4.
 
 Recorded with_parked_car(double y = 4.0) { return there_and_back(true, false, y); }
 
-/// Some scans take parts of a car for ground: kFlat up to 9 cm, kHigh from 45 to 70 cm. If
-/// `is_alone`, no other scan judges the high ones.
-Recorded with_ground_on_car(Recorded recording, bool is_alone) {
-  for (std::size_t number = 0; number < recording.scans.size(); ++number) {
+/// Some scans take parts of a car for ground: kFlat up to 9 cm, kHigh from 45 to 70 cm.
+Recorded with_ground_on_car(Recorded recording) {
+  for (std::size_t number = 0; number < recording.scans.size(); number += 8) {
     BoxScan& scan = recording.scans[number];
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
       const double height =
           static_cast<double>(scan.points.z[i]) + scan.T_world_sensor.translation().z();
       const bool is_flat = height <= 0.09;
       const bool is_high = height >= 0.45 && height <= 0.7;
-      const bool is_beside = is_alone && height >= 0.4 && height <= 0.8;
-      if (scan.labels[i] != kCar || !(is_flat || is_high || is_beside)) continue;
-      if (number % 8 == 0 && (is_flat || is_high)) {
-        scan.labels[i] = is_flat ? kFlat : kHigh;
-        scan.verdicts[i] = PointLabel::kGround;
-      } else if (is_beside) {
-        scan.verdicts[i] = PointLabel::kOutOfRange;
-      }
+      if (scan.labels[i] != kCar || !(is_flat || is_high)) continue;
+      scan.labels[i] = is_flat ? kFlat : kHigh;
+      scan.verdicts[i] = PointLabel::kGround;
     }
   }
   return recording;
@@ -296,20 +290,17 @@ TEST_CASE("removed ground comes back, but not if it was seen free or under what 
 TEST_CASE(
     "what a scan took for ground on a car that leaves is moving if it rises above the ground") {
   constexpr std::uint32_t kRoad = 40;
-  for (const bool is_alone : {false, true}) {
-    const Recorded left = with_ground_on_car(with_parked_car(), is_alone);
-    const Counts high = sum(count(left, kHigh));
-    CHECK(high.removed > (is_alone ? 4 : 9) * high.kept);
-    const Counts flat = sum(count(left, kFlat));
-    CHECK(flat.kept > 0);
-    CHECK(flat.removed == 0);
-    CHECK(sum(count(left, kRoad)).removed == 0);
-    // The second pass keeps every point of a car that is parked during the whole recording.
-    const Recorded parked = with_ground_on_car(there_and_back(true, true), is_alone);
-    const Counts stays = sum(count(parked, kHigh));
-    CHECK(stays.kept > 0);
-    CHECK(stays.removed == 0);
-  }
+  const Recorded left = with_ground_on_car(with_parked_car());
+  const Counts high = sum(count(left, kHigh));
+  CHECK(high.removed > 9 * high.kept);
+  const Counts flat = sum(count(left, kFlat));
+  CHECK(flat.kept > 0);
+  CHECK(flat.removed == 0);
+  CHECK(sum(count(left, kRoad)).removed == 0);
+  // The second pass keeps every point of a car that is parked during the whole recording.
+  const Counts stays = sum(count(with_ground_on_car(there_and_back(true, true)), kHigh));
+  CHECK(stays.kept > 0);
+  CHECK(stays.removed == 0);
 }
 
 TEST_CASE("neither memory nor threads change the second pass") {

@@ -109,7 +109,6 @@ struct alignas(64) RecordingPlace {
   bool was_hit = false;                             ///< by any look
   bool free_before = false, free_after = false;     ///< before, after any epoch measured it
 
-  bool was_passed() const { return longest > 0; }
   /// Whether looks tell that what was measured in it came or went. Beams that pass what others hit
   /// tell of something porous.
   bool has_changed() const {
@@ -142,7 +141,6 @@ struct alignas(64) RecordingPlace {
 
 /// A place of an object that came or went.
 struct ChangedPlace {
-  bool is_beside = false;       ///< no place has changed there, but most of those that touch it
   bool removed_last = false;    ///< the last epoch of first verdicts removed its points
   std::uint16_t last_free = 0;  ///< last epoch whose look passed it
 
@@ -173,7 +171,9 @@ struct RecordingTile {
   /// The samples of all places; none is added then.
   const TestedCells& tested() {
     if (tested_.size() != places.size()) {
-      const auto samples_of = [&](std::size_t i) -> const CellSamples& { return places.values[i].samples; };
+      const auto samples_of = [&](std::size_t i) -> const CellSamples& {
+        return places.values[i].samples;
+      };
       tested_.take(places.keys, kWorldCell, samples_of);
     }
     return tested_;
@@ -344,14 +344,13 @@ class RecordingPlaces {
             return;
           for (const std::uint32_t member : members) {
             const Place& place = found.values[member];
-            changed_.values[changed_.add(found.keys[member])] = {false, place.first.removed_last,
+            changed_.values[changed_.add(found.keys[member])] = {place.first.removed_last,
                                                                  place.last_free};
           }
         });
-    find_beside();
   }
 
-  /// The changed place in a cell, or a cell beside, after decide(); null: nothing has changed.
+  /// The changed place in a cell, after decide(); null: nothing has changed.
   const ChangedPlace* changed(VoxelKey cell) const { return changed_.find(cell); }
 
   std::size_t size() const { return tiles_.size(); }
@@ -367,29 +366,6 @@ class RecordingPlaces {
     for (std::vector<Place*>& touched : touched_) {
       for (Place* const place : touched) place->end_look(look_);
       touched.clear();
-    }
-  }
-
-  // Finds the cells that touch more places of objects than ones that stay.
-  void find_beside() {
-    const std::size_t count = changed_.size();
-    for (std::size_t i = 0; i < count; ++i) {
-      tiles_.free_far(corner_of(changed_.keys[i]), 0.0);
-      for_each_touching(changed_.keys[i], [&](VoxelKey cell) {
-        if (changed_.find(cell) != nullptr) return;
-        int majority = 0;
-        for_each_touching(cell, [&](VoxelKey beside) {
-          if (const std::uint32_t number = changed_.numbers.find(beside); number < count) {
-            ++majority;
-          } else if (const Place* const place = find(beside); place != nullptr) {
-            majority -= place->was_hit || place->was_passed() ? 1 : 0;
-          }
-        });
-        if (majority <= 0) return;
-        ChangedPlace as_beside = changed_.values[i];
-        as_beside.is_beside = true;
-        changed_.values[changed_.add(cell)] = as_beside;
-      });
     }
   }
 

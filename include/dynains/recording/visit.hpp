@@ -73,7 +73,7 @@ class Visit {
   };
   void find_up(PointsView points, const Pose& T_world_sensor);
   void read(const Reference& kept, RecordingReference& reference);
-  bool belongs_to(const ChangedPlace& place, PointLabel label, const Eigen::Vector3d& point);
+  bool belongs_to_object(PointLabel label, const Eigen::Vector3d& point);
   bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
   std::uint64_t remove_instances(VerdictArrays& verdict);
   void remove(std::size_t point, VerdictArrays& verdict);
