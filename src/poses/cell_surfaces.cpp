@@ -6,6 +6,26 @@
 #include <cmath>
 
 namespace dynains {
+namespace {
+
+/// Whether a plane is the trace of one beam: on persons, in foliage or on a rough wall its points
+/// lie in a plane that contains the beam, and in a map they are no longer along it than its noise.
+/// Such a plane moves with the sensor. One scan needs distant ground, a map has seen it nearer.
+bool is_trace_of_beam(const Eigen::Vector3d& beam, const Eigen::Vector3d& normal,
+                      const Eigen::Matrix3d& covariance, bool in_map) {
+  constexpr double kDistance = 0.5;                // m, of the plane from the sensor, in one scan
+  constexpr double kEdgeOn = 0.04, kNearly = 0.1;  // sines of the angle between beam and plane
+  constexpr double kGrazing = 0.3;                 // the same; less steep planes are long
+  constexpr double kLeastLength = 0.2;             // m, standard deviation along the beam
+  const double across = normal.dot(beam);
+  const double sine = std::abs(across) / beam.norm();
+  if (!in_map) return std::abs(across) < kDistance && sine < kEdgeOn;
+  if (sine < kNearly || sine >= kGrazing) return sine < kNearly;
+  const Eigen::Vector3d along = (beam - across * normal).normalized();
+  return along.dot(covariance * along) < kLeastLength * kLeastLength;
+}
+
+}  // namespace
 
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
@@ -54,16 +74,6 @@ const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& p
   return nullptr;
 }
 
-/// Whether a plane contains the beams that hit it: those of one beam on persons, in foliage or on a
-/// rough wall lie in such a plane, which moves with the sensor.
-bool SurfaceGrid::is_trace_of_beam(const CellSurface& surface) const {
-  constexpr double kEdgeOn = 0.04;   // sine of the angle between beam and plane
-  constexpr double kDistance = 0.5;  // m, of the plane from the sensor; distant ground is farther
-  const Eigen::Vector3d beam = surface.mean - sensor_;
-  const double distance = std::abs(surface.directions[0].dot(beam));
-  return distance < kDistance && distance < kEdgeOn * beam.norm();
-}
-
 CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kFewest = 6.0;   // points
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
@@ -73,8 +83,8 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   if (cell.count < kFewest) return surface;
   const Eigen::Vector3d mean = cell.sum / cell.count;
   surface.mean = cell.origin + mean;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(cell.squares / cell.count -
-                                                              mean * mean.transpose());
+  const Eigen::Matrix3d covariance = cell.squares / cell.count - mean * mean.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   const Eigen::Vector3d extent = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const Eigen::Matrix3d& axes = solver.eigenvectors();
   surface.directions = {axes.col(0), axes.col(1)};
@@ -84,7 +94,8 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
-    if (is_trace_of_beam(surface)) return surface;
+    if (is_trace_of_beam(surface.mean - sensor_, axes.col(0), covariance, with_clutter_))
+      return surface;
     surface.direction_count = 1;
     surface.is_upright = std::abs(axes(2, 0)) < kUpright;
   } else if (with_clutter_) {

@@ -88,7 +88,6 @@ class SurfaceGrid {
   };
 
   CellSurface surface_of(const Cell& cell) const;
-  bool is_trace_of_beam(const CellSurface& surface) const;
 
   bool with_clutter_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, at the newest scan
