@@ -8,6 +8,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "poses/scan_registration.hpp"
+#include "poses/way_search.hpp"
 #include "scan_preparation.hpp"
 
 namespace dynains {
@@ -23,18 +24,10 @@ void OdometryConfig::validate() const {
 
 namespace {
 
-/// Motions near a pose: none, up to 3 m along the ground of the sensor, and turns up to 30 deg.
-std::vector<Pose> motions_near(const Pose& T_map_near) {
-  constexpr int kDirections = 8, kRings = 3;
-  std::vector<Pose> poses = {T_map_near};
-  for (int ring = 1; ring <= kRings; ++ring) {  // its radius in m
-    for (int i = 0; i < kDirections; ++i) {
-      const double angle = 2.0 * M_PI * i / kDirections;
-      poses.push_back(T_map_near *
-                      Eigen::Translation3d(ring * std::cos(angle), ring * std::sin(angle), 0.0));
-    }
-  }
-  for (const double degrees : {-30.0, -20.0, -10.0, 10.0, 20.0, 30.0}) {
+/// A pose, and the same turned by up to 30 deg.
+std::vector<Pose> turned(const Pose& T_map_near) {
+  std::vector<Pose> poses;
+  for (const double degrees : {0.0, -30.0, -20.0, -10.0, 10.0, 20.0, 30.0}) {
     poses.push_back(T_map_near *
                     Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()));
   }
@@ -114,11 +107,8 @@ class Odometry::Loop {
     return period_ > 0.0 && period > kMissing * period_;
   }
 
-  /// The first motions are not predicted, and neither is what happens while scans are missing.
-  bool is_predictable(double period) const {
-    constexpr std::size_t kSearched = 3;  // motions
-    return scan_count_ > kSearched && !are_scans_missing(period);
-  }
+  /// The first motion is not predicted, and neither is what happens while scans are missing.
+  bool is_predictable(double period) const { return !first_ && !are_scans_missing(period); }
 
   bool is_after_gap(double period) const {
     return period > kLongestPoseGap && are_scans_missing(period);
@@ -139,8 +129,9 @@ class Odometry::Loop {
       std::optional<Registration> best;
       if (turn > 0 || is_predictable(period)) best = register_near(map_, points, T_predicted);
       if (turn == 0 && (!best || best->score < kLeastScore)) {
-        best = register_scans(map_, points, motions_near(T_predicted));
+        best = register_scans(map_, points, turned(T_predicted));
       }
+      if (first_ && turn == 0 && best) search_first_motion(*best);
       result.fit = best ? best->score : 0.0;
       if (result.fit < kLeastScore) return OdometryLoss::kNoOverlap;
       result.free_directions = best->free_directions;
@@ -151,6 +142,17 @@ class Odometry::Loop {
       }
     }
     return OdometryLoss::kNone;
+  }
+
+  /// Traffic that moves with the sensor fits to it without a motion. Then landmarks tell the way
+  /// along the direction that surfaces determine worst.
+  void search_first_motion(Registration& best) {
+    const Landmarks first = first_->landmarks(), second = scan_.landmarks();
+    const auto found = register_along(map_, scan_.keypoints(), first, second, best.T_a_b,
+                                      best.uncertain[0], kFarthestStep);
+    if (found && mean_gap(first, second, found->T_a_b) < mean_gap(first, second, best.T_a_b)) {
+      best = *found;
+    }
   }
 
   /// The map of the first scan, whose motion is that until the second one.

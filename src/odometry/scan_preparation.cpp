@@ -5,6 +5,7 @@
 
 #include "dynains/io/trajectory.hpp"
 #include "poses/cell_surfaces.hpp"
+#include "poses/way_search.hpp"
 
 namespace dynains::odometry {
 namespace {
@@ -75,6 +76,15 @@ void ScanPreparation::thin_out() {
   for (const Point& point : map_points_) {
     if (adds(taken_, voxel_at(point.position, edge_))) keypoints_.push_back(point.position);
   }
+}
+
+Landmarks ScanPreparation::landmarks() const {
+  PointBuffer points;
+  for (const Point& point : map_points_) {
+    const float* const p = &cloud_[3 * point.index];
+    points.push_back(p[0], p[1], p[2]);
+  }
+  return Landmarks(points, estimate_mounting(points), kWayRange);
 }
 
 void ScanPreparation::adapt() {

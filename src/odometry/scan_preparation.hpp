@@ -9,6 +9,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "poses/landmarks.hpp"
 
 namespace dynains::odometry {
 
@@ -41,6 +42,7 @@ class ScanPreparation {
   const std::vector<Point>& map_points() const { return map_points_; }
   /// One point for each large voxel, about as many in every scan.
   const std::vector<Eigen::Vector3d>& keypoints() const { return keypoints_; }
+  Landmarks landmarks() const;
 
  private:
   bool is_timed(std::size_t i) const;

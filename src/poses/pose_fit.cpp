@@ -30,7 +30,6 @@ class ChainScan {
   Landmarks landmarks_;
 };
 
-constexpr double kFarthestStep = 6.0;       // m, from one scan to the next
 constexpr double kFarthestFromGuess = 1.5;  // m
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
@@ -82,27 +81,6 @@ std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
   return CheckedMotion{forth->T_a_b, difference, deviation};
 }
 
-/// A registration by planes and landmarks, and the direction along which landmarks decide.
-struct GuidedRegistration {
-  Registration registration;
-  KnownTranslation way;
-};
-
-/// Moves `T_a_b` along `direction` to where landmarks meet, less than `farthest` (m), and registers
-/// again.
-std::optional<GuidedRegistration> register_along(const ChainScan& a, const ChainScan& b,
-                                                 const Pose& T_a_b,
-                                                 const Eigen::Vector3d& direction,
-                                                 double farthest) {
-  constexpr double kDeviation = 0.04;  // m, of search_way()
-  const auto guess = search_way(a.landmarks(), b.landmarks(), T_a_b, direction, farthest);
-  if (!guess) return std::nullopt;
-  const KnownTranslation way{direction, direction.dot(guess->translation()), kDeviation};
-  const auto found = register_near(a.surfaces(), b.points(), *guess, way);
-  if (!found) return std::nullopt;
-  return GuidedRegistration{*found, way};
-}
-
 /// Completes a registration by planes that leaves a direction open: landmarks tell the way along
 /// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
 /// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
@@ -110,17 +88,19 @@ std::optional<GuidedRegistration> register_along(const ChainScan& a, const Chain
 std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
                                       const Registration& by_planes, const Pose& given,
                                       double farthest) {
-  std::optional<GuidedRegistration> best;
+  std::optional<Registration> best;
   double least_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
-    auto found = register_along(a, b, by_planes.T_a_b, direction, farthest);
+    const auto along = [&](const Pose& T, const Eigen::Vector3d& open, double most) {
+      return register_along(a.surfaces(), b.points(), a.landmarks(), b.landmarks(), T, open, most);
+    };
+    auto found = along(by_planes.T_a_b, direction, farthest);
     if (!found) continue;
     // The planes that meet at the found pose determine the open direction better.
-    if (const auto again = register_along(a, b, found->registration.T_a_b,
-                                          found->registration.uncertain[0], kFarthestFromGuess)) {
+    if (const auto again = along(found->T_a_b, found->uncertain[0], kFarthestFromGuess)) {
       found = again;
     }
-    const double gap = mean_gap(a.landmarks(), b.landmarks(), found->registration.T_a_b);
+    const double gap = mean_gap(a.landmarks(), b.landmarks(), found->T_a_b);
     Pose standing = by_planes.T_a_b;
     standing.translation() -= direction.dot(standing.translation()) * direction;
     if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
@@ -129,14 +109,13 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
     }
   }
   if (!best) return std::nullopt;
-  const Pose& found = best->registration.T_a_b;
+  const Pose& found = best->T_a_b;
   const bool is_distant = (found.translation() - given.translation()).norm() > kDistinct;
   if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < least_gap) return std::nullopt;
-  const Pose T_b_a = best->registration.T_a_b.inverse();
-  const Eigen::Vector3d direction = T_b_a.linear() * best->way.direction;
-  const KnownTranslation way{direction, direction.dot(T_b_a.translation()), best->way.deviation};
-  return checked(best->registration, register_near(b.surfaces(), a.points(), T_b_a, way),
-                 best->way.deviation);
+  const Pose T_b_a = best->T_a_b.inverse();
+  const Eigen::Vector3d direction = T_b_a.linear() * best->way->direction;
+  const KnownTranslation way{direction, direction.dot(T_b_a.translation()), best->way->deviation};
+  return checked(best, register_near(b.surfaces(), a.points(), T_b_a, way), best->way->deviation);
 }
 
 /// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the

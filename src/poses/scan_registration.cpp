@@ -70,6 +70,7 @@ std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b,
   if (last.firm_count < kFewestMatches) return std::nullopt;
   Registration result;
   result.T_a_b = T;
+  result.way = way;
   result.score = last.firm_weight / static_cast<double>(last.firm_count);
   const auto solution = last.equations.solve();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> by_planes(solution.covariance);

@@ -42,6 +42,15 @@ inline constexpr double kLeastScore = 0.45;
 /// Deviation (m) of the translation of a registration that tells where a scan or a session is.
 inline constexpr double kMostUncertain = 0.05;
 
+/// A component of the translation that is known otherwise.
+struct KnownTranslation {
+  Eigen::Vector3d direction;  ///< unit vector, frame of a
+  double place;               ///< m, along direction
+  double deviation;           ///< m
+
+  void add_to(NormalEquations& equations, const Pose& T_a_b) const;
+};
+
 struct Registration {
   Pose T_a_b = Pose::Identity();
   double score = 0.0;        ///< mean weight of the points at planes and poles, [0, 1]
@@ -51,6 +60,7 @@ struct Registration {
   int free_directions = 0;  ///< of six, that the surfaces do not determine; they keep the guess
   /// Whether another result is nearly as good, as in traffic that moves with the sensor.
   bool is_ambiguous = false;
+  std::optional<KnownTranslation> way = {};  ///< as given
 };
 
 /// Registers the points `b` (m) to the surfaces `a` from several guesses of T_a_b; the best result
@@ -58,15 +68,6 @@ struct Registration {
 std::optional<Registration> register_scans(const SurfaceGrid& a,
                                            const std::vector<Eigen::Vector3d>& b,
                                            const std::vector<Pose>& guesses);
-
-/// A component of the translation that is known otherwise.
-struct KnownTranslation {
-  Eigen::Vector3d direction;  ///< unit vector, frame of a
-  double place;               ///< m, along direction
-  double deviation;           ///< m
-
-  void add_to(NormalEquations& equations, const Pose& T_a_b) const;
-};
 
 /// As register_scans(), by small steps from `guess`.
 std::optional<Registration> register_near(const SurfaceGrid& a,

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <vector>
 
-#include "scan_registration.hpp"
-
 namespace dynains {
 namespace {
 
@@ -107,6 +105,17 @@ std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pos
     best += std::clamp(kFineShift * (before - behind) / curvature, -kFineShift, kFineShift);
   }
   return moved(T_a_b, best * direction);
+}
+
+std::optional<Registration> register_along(const SurfaceGrid& a, const Points& b,
+                                           const Landmarks& landmarks_a,
+                                           const Landmarks& landmarks_b, const Pose& T_a_b,
+                                           const Eigen::Vector3d& direction, double farthest) {
+  constexpr double kDeviation = 0.04;  // m, of search_way()
+  const auto guess = search_way(landmarks_a, landmarks_b, T_a_b, direction, farthest);
+  if (!guess) return std::nullopt;
+  return register_near(
+      a, b, *guess, KnownTranslation{direction, direction.dot(guess->translation()), kDeviation});
 }
 
 }  // namespace dynains

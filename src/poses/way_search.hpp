@@ -3,14 +3,19 @@
 
 #include <Eigen/Geometry>
 #include <optional>
+#include <vector>
 
 #include "dynains/pose.hpp"
 #include "landmarks.hpp"
+#include "scan_registration.hpp"
 
 namespace dynains {
 
 /// Range (m) of landmarks for the search: beside a motorway, near ones may be traffic and rails.
 inline constexpr double kWayRange = 80.0;
+
+/// Longest way (m) from one scan to the next.
+inline constexpr double kFarthestStep = 6.0;
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.
 double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b);
@@ -21,5 +26,13 @@ double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b);
 /// is clearly best.
 std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
                                const Eigen::Vector3d& direction, double farthest);
+
+/// Registers the points `b` (m) to the surfaces `a` from where search_way() moves `T_a_b`, and
+/// keeps this way. Empty as search_way() and register_near().
+std::optional<Registration> register_along(const SurfaceGrid& a,
+                                           const std::vector<Eigen::Vector3d>& b,
+                                           const Landmarks& landmarks_a,
+                                           const Landmarks& landmarks_b, const Pose& T_a_b,
+                                           const Eigen::Vector3d& direction, double farthest);
 
 }  // namespace dynains

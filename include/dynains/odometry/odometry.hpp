@@ -66,7 +66,8 @@ struct OdometryResult {
 /// its points if they have times, and registered point to plane (poles: point to line) to a map of
 /// cells (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
 /// and Singh 2016). Then the remover judges the scan, and only points that do not move enter the
-/// map. The first motions are searched for up to 3 m. Same scans, same bits.
+/// map. The first motion is searched for up to 6 m along the direction that surfaces determine
+/// worst, by plants, posts and signs. Same scans, same bits.
 class Odometry {
  public:
   using Config = OdometryConfig;
