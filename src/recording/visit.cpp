@@ -1,13 +1,10 @@
 #include "dynains/recording/visit.hpp"
 
 #include <algorithm>
-#include <array>
 #include <optional>
-#include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/sensor/mounting.hpp"
-#include "dynains/threads/background.hpp"
 
 namespace dynains {
 namespace {
@@ -50,29 +47,16 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPos
 void Visit::rest() { places_.rest(); }
 
 bool Visit::test(const std::function<bool()>& keep_going) {
-  std::array<detail::Visibility, 2> visibility;
-  RecordingReference reference, next;
-  Background reader;
-  Background* const other = config_.has_second_thread ? &reader : nullptr;
-  if (!kept_.empty()) read(kept_.front(), next);
-  for (std::size_t i = 0; i < kept_.size(); ++i) {
+  detail::Visibility visibility;
+  RecordingReference reference;
+  for (const Reference& kept : kept_) {
     if (!keep_going()) return false;
-    std::swap(reference, next);
-    places_.begin_test(scans_[kept_[i].scan].epoch, reference.T_world_beams.translation());
-    const auto test_part = [&](std::size_t part) {
-      places_.test(
-          part,
-          [&](const PointBuffer& points, std::size_t count,
-              const Eigen::Vector3d& origin) -> const auto& {
-            return test_visibility(reference, config_.evidence, points, count, origin,
-                                   visibility[part]);
-          });
-    };
-    run_both(
-        other, [&] { test_part(0); },
-        [&] {
-          if (i + 1 < kept_.size()) read(kept_[i + 1], next);
-          test_part(1);
+    read(kept, reference);
+    places_.test(
+        scans_[kept.scan].epoch, reference.T_world_beams.translation(),
+        [&](const PointBuffer& points, std::size_t count,
+            const Eigen::Vector3d& origin) -> const auto& {
+          return test_visibility(reference, config_.evidence, points, count, origin, visibility);
         });
   }
   places_.decide();

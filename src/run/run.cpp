@@ -198,7 +198,6 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
     SecondPassConfig config;
     config.static_policy = plan.settings.static_policy;
     config.evidence = plan.settings.config.evidence;
-    config.has_second_thread = !outputs.one_thread;
     results.wait_for(second_pass.emplace(store, config));
   } else {
     results.watch(returns);

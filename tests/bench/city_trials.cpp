@@ -233,9 +233,7 @@ int main(int argc, char** argv) {
       const fs::path folder =
           fs::temp_directory_path() / ("city_trials_" + std::to_string(::getpid()));
       const Result r = try_days(folder, days, config);
-      City city(folder);
-      for (const SessionInfo& session : city.sessions()) city.drop(session.name);
-      fs::remove(folder);
+      fs::remove_all(folder);
       std::cout << "| " << sensor << " | " << seed;
       for (const Count& count : {r.fixed, r.fixed_far, r.gone, r.gone_last}) {
         std::cout << " | " << count.percent() << " % of " << count.of;

@@ -35,9 +35,8 @@ class Recorder {
   }
   void look_by(const Beam& beam, int times = 1) {
     for (int i = 0; i < times; ++i, time_ += step) {
-      places.begin_test(looks_.next(sensor, time_), sensor);
       places.test(
-          0,
+          looks_.next(sensor, time_), sensor,
           [&](const PointBuffer& points, std::size_t size,
               const Eigen::Vector3d& origin) -> const auto& {
             visibility_ = test::visibility_by(beam, points, size, origin);

@@ -3,8 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -281,37 +279,28 @@ class RecordingPlaces {
     return true;
   }
 
-  /// Begins the test of the places around the sensor by a reference scan. `sensor`: m, world frame.
-  /// Epochs ascend.
-  void begin_test(std::uint16_t epoch, const Eigen::Vector3d& sensor) {
+  /// Tests the places around the sensor by a reference scan. `sensor`: m, world frame. Epochs
+  /// ascend. `test_visibility`: see TestedCells::test().
+  template <class TestVisibility>
+  void test(std::uint16_t epoch, const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
     if (epoch != look_) end_look();
     look_ = epoch;
     free_far(sensor);
-    sensor_ = sensor;
-    around_.clear();
-    next_around_ = 0;
     tiles_.for_each_index([&](const TileIndex& index) {
-      if (tiles_.distance(index, sensor) <= kLookRange) around_.push_back(&tiles_.at(index));
+      if (tiles_.distance(index, sensor) > kLookRange) return;
+      Tile& tile = tiles_.at(index);
+      const auto tell = [&](std::size_t i, const detail::Visibility::Bits& seen) {
+        Place& place = tile.places.values[i];
+        const int verdict =
+            detail::FreeSpaceSum::judge(detail::count_ones(seen.free), detail::count_ones(seen.hit),
+                                        detail::count_ones(std::uint64_t{place.samples.octants}));
+        if (verdict == 0) return;
+        using Look = Place::Look;
+        if (place.look == Look::kNone) touched_.push_back(&place);
+        place.look = std::max(place.look, verdict > 0 ? Look::kFree : Look::kHit);
+      };
+      tile.tested().test(sensor, test_visibility, tell);
     });
-  }
-
-  /// Tests places that no other call has taken, until none is left. Calls with different `part`, 0
-  /// or 1, may run at the same time. `test_visibility`: see TestedCells::test().
-  template <class TestVisibility>
-  void test(std::size_t part, TestVisibility&& test_visibility) {
-    for (std::size_t next; (next = next_around_++) < around_.size();) {
-      std::vector<Place>& places = around_[next]->places.values;
-      around_[next]->tested().test(
-          sensor_, test_visibility, [&](std::size_t i, const detail::Visibility::Bits& seen) {
-            const int verdict = detail::FreeSpaceSum::judge(
-                detail::count_ones(seen.free), detail::count_ones(seen.hit),
-                detail::count_ones(std::uint64_t{places[i].samples.octants}));
-            if (verdict == 0) return;
-            using Look = Place::Look;
-            if (places[i].look == Look::kNone) touched_[part].push_back(&places[i]);
-            places[i].look = std::max(places[i].look, verdict > 0 ? Look::kFree : Look::kHit);
-          });
-    }
   }
 
   /// Ends the last look, and decides on all places and objects: components of touching changed
@@ -363,10 +352,8 @@ class RecordingPlaces {
 
   // Adds the open look to the states of the places that it saw.
   void end_look() {
-    for (std::vector<Place*>& touched : touched_) {
-      for (Place* const place : touched) place->end_look(look_);
-      touched.clear();
-    }
+    for (Place* const place : touched_) place->end_look(look_);
+    touched_.clear();
   }
 
   // Null: no scan brought a place there.
@@ -385,11 +372,8 @@ class RecordingPlaces {
   PagedTiles<Tile> tiles_;
   VoxelTile<ChangedPlace> changed_;
 
-  std::uint16_t look_ = 0;                            // epoch of the open one
-  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, of the reference
-  std::vector<Tile*> around_;                         // to be tested
-  std::atomic<std::size_t> next_around_{0};           // the next one
-  std::array<std::vector<Place*>, 2> touched_;        // by the open look
+  std::uint16_t look_ = 0;       // epoch of the open one
+  std::vector<Place*> touched_;  // by it
 };
 
 }  // namespace dynains

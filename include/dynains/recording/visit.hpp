@@ -24,7 +24,6 @@ struct SecondPassConfig {
   StaticPolicy static_policy = StaticPolicy::kAlways;
   /// Bytes of places and ground in memory, if those around the sensor take less.
   std::size_t memory = std::size_t{160} << 20U;
-  bool has_second_thread = false;  ///< which tests places, too
   /// Of the first pass: the margins hold for the second one, too, and so does what the first one
   /// has compared.
   FreeSpaceConfig evidence;
