@@ -13,7 +13,7 @@ from conan.tools.files import copy, get, rmdir
 
 required_conan_version = ">=2.0.9"
 
-LIBRARIES = ("LZ4", "ZSTD", "BZ2", "PROJ", "Z", "SQLITE3")
+LIBRARIES = ("LZ4", "ZSTD", "BZ2", "Z", "SQLITE3")
 PARTS = ("PROGRAM", "PYTHON", "EXAMPLES", "TESTS")
 # Each compiled component and those that it links.
 COMPONENTS = {

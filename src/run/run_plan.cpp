@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
@@ -78,7 +77,11 @@ void complete_map(const DynaInsRemover::Config& config, RunOutputs& outputs) {
   outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
-  wkt_of(outputs.crs);
+  if (outputs.crs.find('[') == std::string::npos) {
+    throw ConfigError(
+        "--crs: expected WKT, which `projinfo -q -o WKT1:GDAL EPSG:N` prints, found " +
+        outputs.crs);
+  }
 }
 
 /// Throws ConfigError.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "dynains/io/coordinate_system.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/second_pass.hpp"
 #include "output_folder.hpp"
@@ -42,7 +41,7 @@ float most_intensity(const RecordedScan& scan) {
 
 LasOptions las_options(const Recording& recording, const ScanRange& range, const std::string& crs) {
   LasOptions options = las_options_near(recording.T_world_sensor(range.first).translation());
-  if (!crs.empty()) options.wkt = wkt_of(crs);
+  options.wkt = crs;
   return options;
 }
 

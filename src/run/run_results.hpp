@@ -56,7 +56,7 @@ struct RunOutputs {
   bool write_beliefs = false;
   bool one_thread = false;      ///< the caller reads and writes
   bool map_attributes = false;  ///< the map holds attributes of its points
-  std::string crs;              ///< of a LAS map, for example "EPSG:25832"; empty: none
+  std::string crs;              ///< of a LAS map, as WKT; empty: none
   double map_voxel = 0.0;       ///< m, of attributes
 
   std::launch thread() const { return one_thread ? std::launch::deferred : std::launch::async; }

@@ -82,7 +82,7 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
   visitor(Parameter{"map_attributes", self.outputs.map_attributes, Bounds(), "",
                     "the map holds intensity, time and label of its points, as far as scans have "
                     "them; a map of LAS holds its attributes always"});
-  visitor(plain_text("crs", self.outputs.crs, "EPSG:N",
+  visitor(plain_text("crs", self.outputs.crs, "WKT",
                      "coordinate reference system of the poses, for a map of LAS [none]"));
   visitor(plain_text("update", self.update, "CITY",
                      "also adds the session to this map of many sessions, a folder, when the run "

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/coordinate_system.hpp"
 #include "dynains/io/point_file.hpp"
 #include "files.hpp"
 #include "support/catch.hpp"
@@ -68,15 +67,6 @@ TEST_CASE("LAS: points that the file cannot hold are refused, and no file appear
   CHECK_THROWS_AS(LasWriter(folder / "map.las", options), IoError);
   LasWriter(folder / "empty.las").commit();
   CHECK(read_points(folder / "empty.las").positions.empty());
-}
-
-TEST_CASE("Names of coordinate reference systems give their WKT") {
-  const std::string unknown = message_of<ConfigError>([] { wkt_of("EPSG:1"); });
-  if (unknown.find("this build has no PROJ") != std::string::npos) return;
-  CHECK_THAT(wkt_of("EPSG:25832"), StartsWith("PROJCS[\"ETRS89 / UTM zone 32N\""));
-  CHECK_THAT(unknown, ContainsSubstring("found EPSG:1"));
-  CHECK_THROWS_AS(wkt_of(""), ConfigError);
-  CHECK_THROWS_AS(wkt_of("+proj=longlat"), ConfigError);  // an operation, not a reference system
 }
 
 }  // namespace dynains

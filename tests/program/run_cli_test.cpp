@@ -319,7 +319,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--map", fixture.folder / "map.laz"}, "ends in .ply, .pcd or .las"},
       {{"--map-attributes", "--build-map", "false"}, "--map-attributes needs --build-map true"},
       {{"--crs", "EPSG:25832"}, "--crs needs --map FILE.las"},
-      {{"--map", fixture.folder / "map.las", "--crs", "nowhere"}, "coordinate reference system"},
+      {{"--map", fixture.folder / "map.las", "--crs", "EPSG:25832"}, "projinfo"},
   };
   for (const Case& wrong : cases) {
     const Outcome outcome = fixture.run(wrong.flags);

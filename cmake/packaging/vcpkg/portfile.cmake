@@ -13,7 +13,7 @@ set(options -DDYNAINS_BUILD_COMPONENTS=ON)
 foreach(part PROGRAM PYTHON EXAMPLES TESTS)
   list(APPEND options -DDYNAINS_BUILD_${part}=OFF)
 endforeach()
-foreach(library LZ4 ZSTD BZ2 PROJ Z SQLITE3)
+foreach(library LZ4 ZSTD BZ2 Z SQLITE3)
   list(APPEND options -DDYNAINS_WITH_${library}=OFF)
 endforeach()
 
