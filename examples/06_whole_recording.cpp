@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <iostream>
 #include <vector>
 
@@ -82,7 +83,7 @@ double moving_share(const std::vector<Scan>& scans,
 int main() {
   const std::vector<Scan> scans = drive();
   std::vector<dynains::VerdictArrays> verdicts;  // by scan
-  dynains::ByteStore store;
+  dynains::ByteStore store(std::filesystem::temp_directory_path());
   dynains::SecondPass pass(store);
   dynains::ComparedPoses compared;
 

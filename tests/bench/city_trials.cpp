@@ -202,7 +202,7 @@ Result try_days(const fs::path& folder, int days, simulation::Config config) {
   std::vector<Day> measured;
   for (config.day = 1; config.day <= days; ++config.day) {
     constexpr double kAnyDistance = 300.0;  // m
-    auto store = std::make_unique<ByteStore>();
+    auto store = std::make_unique<ByteStore>(fs::temp_directory_path());
     SessionPoints near(city.grid(), kLookRange, *store);
     SessionPoints all(city.grid(), kAnyDistance, *store);
     measured.push_back({std::move(store), std::move(near), std::move(all)});

@@ -2,6 +2,7 @@
 #include "dynains/city/city.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <string>
@@ -320,7 +321,7 @@ TEST_CASE("a city: the file of a session has the points of the session, tile by 
   SessionInfo info;
   info.name = "monday";
   SessionWriter writer(city, info);
-  ByteStore store;
+  ByteStore store(std::filesystem::temp_directory_path());
   SessionPoints all(grid, kLookRange, store);
   // Away, back, and over the same places again, at other heights within their voxels.
   for (std::uint32_t number = 0; number < 60; ++number) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <utility>
 #include <vector>
@@ -104,7 +105,7 @@ TEST_CASE("points of a session: the first of each voxel, whatever floats round t
   SessionGrid grid;
   grid.map_voxel = voxel;
   grid.tile = tile;
-  ByteStore store;
+  ByteStore store(std::filesystem::temp_directory_path());
   SessionPoints session(grid, range, store);
   Oracle oracle(grid, range);
   Random random(7);

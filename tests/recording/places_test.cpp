@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -61,7 +62,7 @@ class Recorder {
     }
   }
 
-  ByteStore store;
+  ByteStore store{std::filesystem::temp_directory_path()};
   RecordingPlaces places{store, kBudget};
   double step = 1.0;  // s
   Eigen::Vector3d sensor = Eigen::Vector3d::Zero();
@@ -234,7 +235,7 @@ TEST_CASE("ground is level if none within two cells is lower, across tiles and t
   for (const int cells : {1, 2, 3}) {
     for (const bool is_tested_first : {false, true}) {
       CAPTURE(cells, is_tested_first);
-      ByteStore store;
+      ByteStore store(std::filesystem::temp_directory_path());
       RecordingPlaces places(store, 0);
       const float border = static_cast<float>(kTileEdge);
       const float tested = border + (is_tested_first ? -0.2F : 0.2F);

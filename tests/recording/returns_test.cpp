@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 #include "support/box_street.hpp"
@@ -35,7 +36,7 @@ struct Drives {
     found = returns.found();
   }
 
-  ByteStore store;
+  ByteStore store{std::filesystem::temp_directory_path()};
   std::vector<Pose> T_given, T_true;
   std::vector<std::uint32_t> visits;
   std::vector<ReturnToPlace> found;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <vector>
 
@@ -88,7 +89,7 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
                           const Removes& removes = removes_nothing,
                           const SecondPassConfig& config = short_first_pass(),
                           const Changes& changes = changes_nothing) {
-  ByteStore store;
+  ByteStore store(std::filesystem::temp_directory_path());
   SecondPass pass(store, config);
   for (std::size_t i = 0; i < recording.scans.size(); ++i) {
     const VerdictArrays arrays = first_verdict(recording.scans[i], i, removes);
@@ -321,7 +322,7 @@ TEST_CASE("the second pass refuses scans out of order and verdicts of another si
   verdict.labels = arrays.labels;
   verdict.causes = arrays.causes;
   verdict.instances = arrays.instances;
-  ByteStore store;
+  ByteStore store(std::filesystem::temp_directory_path());
   SecondPass pass(store);
   verdict.scan = 1;
   CHECK_THROWS_AS(pass.add(scan.points, verdict, {}), UsageError);

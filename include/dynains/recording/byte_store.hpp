@@ -16,7 +16,7 @@ namespace dynains {
 class ByteStore {
  public:
   /// Makes the file on the file system of `folder`.
-  explicit ByteStore(std::filesystem::path folder = std::filesystem::temp_directory_path());
+  explicit ByteStore(std::filesystem::path folder);
   ByteStore(const ByteStore&) = delete;
   ByteStore& operator=(const ByteStore&) = delete;
   ~ByteStore();
