@@ -527,7 +527,9 @@ TEST_CASE("Progress is a redrawn line on a terminal, lines in a file, nothing wi
   CHECK(shown.find("scans/s)", end) < line_end);
   CHECK(shown.rfind('\r', line_end - 2) == end);
 
-  const Outcome redirected = fixture.run({"--force", "--passes", "2"});
+  // Twelve scans are more than one pass compares with this lookback and lookahead.
+  const Outcome redirected =
+      fixture.run({"--force", "--passes", "2", "--lookback-scans", "4", "--lookahead-scans", "4"});
   CHECK_THAT(redirected.err, ContainsSubstring("\n12 of 12 scans (") &&
                                  Catch::Matchers::EndsWith(" revised scans/s)\n"));
   CHECK(redirected.err.find('\r') == std::string::npos);
