@@ -96,20 +96,19 @@ class TileHistory {
   /// TestedCells::test().
   template <class TestVisibility>
   void revise(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    if (tested_.size() != blocks_.size()) {
-      const auto samples_of = [&](std::size_t i) -> const CellSamples& { return blocks_.values[i].samples; };
-      tested_.take(blocks_.keys, edge(), samples_of);
-    }
+    tested_.take(blocks_.keys, edge(),
+                 [&](std::size_t i) -> const CellSamples& { return blocks_.values[i].samples; });
     tested_.test(sensor, test_visibility, [&](std::size_t i, const detail::Visibility::Bits& seen) {
       const Block& block = blocks_.values[i];
       const std::uint32_t free = block.samples.octants_of(seen.free);
       const std::uint32_t hit = block.samples.octants_of(seen.hit);
       for (std::uint32_t p = block.newest_part; p != kNoIndex; p = parts_[p].next) {
         Part& part = parts_[p];
+        if (part.removed_by != kNever) continue;
         const int verdict = detail::FreeSpaceSum::judge(detail::count_ones(free & part.octants),
                                                         detail::count_ones(hit & part.octants),
                                                         detail::count_ones(part.octants));
-        if (verdict != 0 && part.removed_by == kNever) add(verdict > 0, part);
+        if (verdict != 0) add(verdict > 0, part);
       }
     });
   }

@@ -45,10 +45,12 @@ struct CellSamples {
 /// The samples of cells, for tests by references.
 class TestedCells {
  public:
-  /// Takes cells. `edge`: theirs, m. `samples_of(i)`: CellSamples of cell number i.
+  /// Takes cells with all of their samples, unless it has. Once it has, none may be added. `edge`:
+  /// theirs, m. `samples_of(i)`: CellSamples of cell number i.
   template <class SamplesOf>
   void take(const std::vector<VoxelKey>& cells, double edge, SamplesOf&& samples_of) {
-    if (!cells.empty()) origin_ = corner_of(cells.front(), edge);
+    if (size() == cells.size()) return;
+    origin_ = corner_of(cells.front(), edge);
     points_.resize(8 * cells.size() + detail::kPackWidth);
     begin_.assign(1, 0);
     for (std::size_t i = 0; i < cells.size(); ++i) {

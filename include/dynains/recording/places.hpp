@@ -168,12 +168,8 @@ struct RecordingTile {
   }
   /// The samples of all places; none is added then.
   const TestedCells& tested() {
-    if (tested_.size() != places.size()) {
-      const auto samples_of = [&](std::size_t i) -> const CellSamples& {
-        return places.values[i].samples;
-      };
-      tested_.take(places.keys, kWorldCell, samples_of);
-    }
+    tested_.take(places.keys, kWorldCell,
+                 [&](std::size_t i) -> const CellSamples& { return places.values[i].samples; });
     return tested_;
   }
   std::size_t size() const { return places.size(); }
