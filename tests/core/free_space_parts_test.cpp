@@ -181,51 +181,59 @@ TEST_CASE("a footprint gives the points that a search over all removed points gi
   }
 }
 
-// Instances that occupy the given cells of a row.
-TrackedInstances tracked_in(const std::vector<std::vector<int>>& cells_of) {
-  TrackedInstances tracked;
-  tracked.instances.resize(cells_of.size());
-  tracked.shapes.resize(cells_of.size());
-  for (std::uint32_t i = 0; i < cells_of.size(); ++i) {
-    for (const int x : cells_of[i]) tracked.cells.push_back({voxel_key(x, 0, 0), i});
-    tracked.shapes[i].cells = static_cast<std::uint32_t>(cells_of[i].size());
+using CellsOf = std::vector<std::vector<int>>;
+
+// The next scan of a linker: instances that occupy the given cells of a row.
+TrackedInstances next_scan(InstanceLinker& linker, const CellsOf& cells_of) {
+  InstanceSamples samples;
+  samples.sample_begin = {0};
+  samples.supervoxel_begin = {0};
+  for (const std::vector<int>& cells : cells_of) {
+    for (const int x : cells) {
+      samples.points.push_back(static_cast<float>(x) + 0.5F, 0.5F, 0.5F);
+      samples.sample_begin.push_back(static_cast<std::uint32_t>(samples.points.size()));
+    }
+    samples.supervoxel_begin.push_back(static_cast<std::uint32_t>(samples.points.size()));
   }
+  samples.points.grow(samples.points.size() + kPackWidth);
+  TrackedInstances tracked;
+  linker.measure(samples, Eigen::Isometry3d::Identity(), tracked);
   return tracked;
 }
 
 TEST_CASE("an instance is linked to the earlier instance with which it shares most cells") {
-  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
-  const TrackedInstances whole = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}});
-  const TrackedInstances parts = tracked_in({{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40}});
-  TrackedInstances before = whole, now = parts;
+  InstanceLinker linker(1.0, 18.0, 4.5, 0.25);
+  const CellsOf whole = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
+  const CellsOf parts = {{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40, 41}};
+  TrackedInstances before = next_scan(linker, whole), now = next_scan(linker, parts);
   linker.link(before, now);
   CHECK(before.instances[0].future.instance == 1);
   for (const std::size_t i : {0U, 1U, 2U}) CHECK(now.instances[i].past.instance == 0);
   CHECK(now.instances[3].past.instance == kNoCluster);
 
-  before = parts;
-  now = whole;
+  before = next_scan(linker, parts);
+  now = next_scan(linker, whole);
   linker.link(before, now);
   CHECK(now.instances[0].past.instance == 1);
   for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].future.instance == 0);
 
   // Two of eleven cells are less than a quarter. Earlier scans have no influence.
-  before = tracked_in({{0, 1}});
-  now = tracked_in({{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
+  before = next_scan(linker, {{0, 1}});
+  now = next_scan(linker, {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
   linker.link(before, now);
   CHECK(now.instances[0].past.instance == kNoCluster);
-  before = tracked_in({});
-  now = whole;
+  before = next_scan(linker, {});
+  now = next_scan(linker, whole);
   linker.link(before, now);
   CHECK(now.instances[0].past.instance == kNoCluster);
 }
 
 TEST_CASE("instances without a common cell are not linked, however many cells they have") {
-  InstanceLinker linker(0.8, 18.0, 4.5, 0.25);
+  InstanceLinker linker(1.0, 1e6, 4.5, 0.25);
   Random random(17);
   std::vector<int> some, others;
   for (int i = 0; i < 100000; ++i) (random.index(2) == 0 ? some : others).push_back(i);
-  TrackedInstances before = tracked_in({some}), now = tracked_in({others});
+  TrackedInstances before = next_scan(linker, {some}), now = next_scan(linker, {others});
   linker.link(before, now);
   CHECK(now.instances[0].past.instance == kNoCluster);
   CHECK(before.instances[0].future.instance == kNoCluster);
@@ -258,7 +266,7 @@ TEST_CASE("instances that are too long, too high or a single sample are not carr
     linker.measure(samples, Eigen::Isometry3d::Identity(), tracked);
     CAPTURE(c.length, c.height, c.samples);
     CHECK(tracked.shapes[0].carried == c.carried);
-    CHECK(tracked.cells.empty() == !c.carried);
+    CHECK((tracked.shapes[0].cells == 0) == !c.carried);
   }
 }
 

@@ -53,12 +53,6 @@ struct TrackedInstances {
     bool carried = false;           ///< whether it is tracked: small enough to be one object
   };
   std::vector<Shape> shapes;  ///< by instance
-
-  struct Cell {
-    VoxelKey place;  ///< origin frame
-    std::uint32_t instance;
-  };
-  std::vector<Cell> cells;  ///< of the carried instances, ordered by instance
 };
 
 /// Links instances of consecutive scans that overlap in the origin frame.
@@ -72,12 +66,13 @@ class InstanceLinker {
         max_height_(static_cast<float>(max_height)),
         overlap_(static_cast<float>(overlap)) {}
 
-  /// Computes the shapes and the cells of the instances of one scan, and resets their links. All
-  /// linked scans must have one origin frame, which should be near them.
+  /// Computes the shapes and the cells of the instances of the next scan, and resets their links.
+  /// All linked scans must have one origin frame, which should be near them.
   void measure(const InstanceSamples& samples, const Pose& T_origin_sensor, TrackedInstances& out) {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
-    out.cells.clear();
+    cells_.swap(cells_before_);
+    cells_.clear();
     find_cells(samples, cell_, T_origin_sensor, place_);
     table_.assign(kTable, kNoIndex);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
@@ -88,34 +83,33 @@ class InstanceLinker {
       if (!shape.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
         if (p > begin && place_[p] == place_[p - 1]) continue;
-        const TrackedInstances::Cell cell = {place_[p], i};
+        const Cell cell = {place_[p], i};
         std::uint32_t& slot = slot_of(cell);
         // A collision in the table may count a cell twice. Collisions are rare, and the count needs
         // no more accuracy.
-        if (slot != kNoIndex && out.cells[slot].place == cell.place &&
-            out.cells[slot].instance == i) {
+        if (slot != kNoIndex && cells_[slot].place == cell.place && cells_[slot].instance == i) {
           continue;
         }
-        slot = static_cast<std::uint32_t>(out.cells.size());
-        out.cells.push_back(cell);
+        slot = static_cast<std::uint32_t>(cells_.size());
+        cells_.push_back(cell);
         ++shape.cells;
       }
     }
   }
 
-  /// Links each instance of two consecutive scans to the instance of the other scan with the
-  /// largest overlap.
+  /// Links each instance of the last two scans to the instance of the other scan with the largest
+  /// overlap.
   void link(TrackedInstances& before, TrackedInstances& now) {
     table_.assign(kTable, kNoIndex);
-    for (std::uint32_t i = 0; i < before.cells.size(); ++i) slot_of(before.cells[i]) = i;
+    for (std::uint32_t i = 0; i < cells_before_.size(); ++i) slot_of(cells_before_[i]) = i;
     shared_.assign(before.instances.size(), 0);
     std::size_t at = 0;
     for (std::uint32_t i = 0; i < now.instances.size(); ++i) {
       touched_.clear();
-      for (; at < now.cells.size() && now.cells[at].instance == i; ++at) {
-        const std::uint32_t slot = slot_of(now.cells[at]);
-        if (slot == kNoIndex || before.cells[slot].place != now.cells[at].place) continue;
-        const std::uint32_t other = before.cells[slot].instance;
+      for (; at < cells_.size() && cells_[at].instance == i; ++at) {
+        const std::uint32_t slot = slot_of(cells_[at]);
+        if (slot == kNoIndex || cells_before_[slot].place != cells_[at].place) continue;
+        const std::uint32_t other = cells_before_[slot].instance;
         if (shared_[other]++ == 0) touched_.push_back(other);
       }
       for (const std::uint32_t other : touched_) {
@@ -126,11 +120,16 @@ class InstanceLinker {
   }
 
  private:
+  struct Cell {
+    VoxelKey place;  // origin frame
+    std::uint32_t instance;
+  };
+
   static constexpr std::size_t kTable = 1U << 14;
   static constexpr std::uint32_t kLeastSamples = 2;  // a single sample may overlap by chance
 
   // The hash does not include the instance, so that equal cells of two scans share a slot.
-  std::uint32_t& slot_of(const TrackedInstances::Cell& cell) {
+  std::uint32_t& slot_of(const Cell& cell) {
     return table_[voxel_hash(cell.place) >> 8 & (kTable - 1)];
   }
 
@@ -169,8 +168,9 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::vector<std::uint32_t> table_;    // direct-mapped: index in TrackedInstances::cells
-  std::vector<VoxelKey> place_;         // by sample
+  std::vector<Cell> cells_, cells_before_;  // of the last two scans, ordered by instance
+  std::vector<std::uint32_t> table_;        // direct-mapped: index in cells
+  std::vector<VoxelKey> place_;             // by sample
   std::vector<std::uint32_t> shared_;   // by instance of the scan before: number of common cells
   std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
 };
