@@ -53,9 +53,10 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
   kept_.count = kept_.points.size();
 }
 
-// Finds the planes of the scans in near_.
-void Returns::find_planes(detail::VoxelPlanes& planes) {
-  planes.clear();
+// The planes of the scans in near_, in the frame of the nearest one. An alignment starts within
+// half an edge (m) of the truth.
+detail::VoxelPlanes Returns::find_planes(double edge) {
+  detail::VoxelPlanes planes(edge);
   const Pose T_origin_world = near_.front()->T_world_sensor.inverse();
   for (const KeyScan* const key : near_) {
     store_.read(key->offset, key->size, bytes_);
@@ -73,26 +74,28 @@ void Returns::find_planes(detail::VoxelPlanes& planes) {
     }
     planes.add(block);
   }
+  return planes;
 }
 
 // Aligns the newest key scan with those in near_. Poses may be off by more than an alignment with
 // small planes finds.
 ReturnToPlace Returns::aligned(const Pose& T_world_sensor) {
   const Pose T_given = near_.front()->T_world_sensor.inverse() * T_world_sensor;
-  find_planes(planes_);
+  detail::VoxelPlanes planes = find_planes(1.0);
   selected_.select(kept_, {});
-  const ReturnToPlace result = aligned_from(T_given, T_given);
+  const ReturnToPlace result = aligned_from(T_given, T_given, planes);
   if (!result.is_wrong()) return result;
-  find_planes(coarse_planes_);
+  detail::VoxelPlanes coarse_planes = find_planes(4.0);
   const detail::Alignment coarse =
-      detail::PlaneAligner().align(selected_, coarse_planes_, T_given, false);
-  const ReturnToPlace other = aligned_from(detail::moved(T_given, coarse.found), T_given);
+      detail::PlaneAligner().align(selected_, coarse_planes, T_given, false);
+  const ReturnToPlace other = aligned_from(detail::moved(T_given, coarse.found), T_given, planes);
   return other.inliers > result.inliers ? other : result;
 }
 
-ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given) {
+ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given,
+                                    detail::VoxelPlanes& planes) const {
   const detail::Alignment alignment =
-      detail::PlaneAligner().align(selected_, planes_, T_guess, false);
+      detail::PlaneAligner().align(selected_, planes, T_guess, false);
   ReturnToPlace result = {near_.front()->scan, scans_ - 1};
   result.T_earlier_later = detail::moved(T_guess, alignment.found);
   result.distance = T_given.translation().norm();

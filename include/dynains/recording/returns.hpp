@@ -72,9 +72,10 @@ class Returns {
   void keep(PointsView points, Span<const PointLabel> verdicts);
   void choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor);
   void choose_visit(const Pose& T_world_sensor);
-  void find_planes(detail::VoxelPlanes& planes);
+  detail::VoxelPlanes find_planes(double edge);
   ReturnToPlace aligned(const Pose& T_world_sensor);
-  ReturnToPlace aligned_from(const Pose& T_guess, const Pose& T_given);
+  ReturnToPlace aligned_from(const Pose& T_guess, const Pose& T_given,
+                             detail::VoxelPlanes& planes) const;
 
   ByteStore& store_;
   std::uint32_t compared_;
@@ -88,8 +89,6 @@ class Returns {
   GroundSplit kept_;  // points of the newest key scan that stand
   std::vector<std::uint8_t> bytes_;
   detail::AlignmentPoints selected_{0.0, 0.0};  // of these
-  // In the frame of the nearest scan. An alignment starts within half an edge of the truth.
-  detail::VoxelPlanes planes_, coarse_planes_{4.0};
 };
 
 }  // namespace dynains
