@@ -253,9 +253,10 @@ struct EvidenceVerdict {
     Group verdict;
   };
 
-  Span<const Group> groups;
-  Span<const std::uint32_t> group_of;  ///< by non-ground point, in the order of the split
-  Span<const GroundPoint> ground;      ///< dynamic ground points, each at most once
+  Span<const Group> groups;              ///< the first one: points in no cluster
+  Span<const std::uint32_t> cluster_of;  ///< by group but the first one
+  Span<const std::uint32_t> group_of;    ///< by non-ground point, in the order of the split
+  Span<const GroundPoint> ground;        ///< dynamic ground points, each at most once
 };
 
 }  // namespace dynains

@@ -93,11 +93,11 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
 // Supervoxel per point.
 std::vector<std::uint32_t> supervoxel_of(const InstanceSamples& samples, std::size_t points) {
-  REQUIRE(samples.number_of_point.size() == points);
+  REQUIRE(samples.group_of_point.size() == points);
   std::vector<std::uint32_t> result;
-  for (const std::uint32_t number : samples.number_of_point) {
-    REQUIRE(number < samples.supervoxel_of_number.size());
-    result.push_back(number == 0 ? kNone : samples.supervoxel_of_number[number]);
+  for (const std::uint32_t group : samples.group_of_point) {
+    REQUIRE(group <= samples.instance_of.size());
+    result.push_back(group <= samples.supervoxel_count() ? group - 1 : kNone);
   }
   return result;
 }
@@ -122,10 +122,11 @@ TEST_CASE("a supervoxel has as many samples as permitted, and every point has a 
       const bool is_near = p[0] * p[0] + p[1] * p[1] <= kRange * kRange;
       const std::uint32_t instance = scan.instance_of[i];
       REQUIRE((supervoxels[i] != kNone) == (is_near && instance != kNoCluster));
+      const std::uint32_t group = samples.group_of_point[i];
+      REQUIRE((group == 0 ? kNoCluster : samples.instance_of[group - 1]) == instance);
       if (supervoxels[i] == kNone) continue;
       const Place place = place_of(instance, p, kSize);
       REQUIRE(samples.place[supervoxels[i]] == packed(place));
-      REQUIRE(samples.instance_of[supervoxels[i]] == instance);
       points[place].insert(p);
     }
     const auto found = by_supervoxel(samples, kSize);

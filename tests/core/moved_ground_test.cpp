@@ -209,7 +209,7 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   for (const Reference& reference : references) {
     std::vector<BeamResult> seen;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      seen.push_back(reference(samples.samples.points.x[i]));
+      seen.push_back(reference(samples.points.x[i]));
     }
     samples.add(visibility_of(seen));
   }

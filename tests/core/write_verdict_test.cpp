@@ -80,12 +80,6 @@ Cause static_cause(DecisionStage stage) {
                                                 : Cause::kReverted;
 }
 
-// Keeps what the verdicts need, as after the push of a scan.
-void keep(detail::ScanSlot& scan, const std::vector<std::uint32_t>& cluster_of) {
-  scan.cluster_of.assign(cluster_of);
-  scan.input.assign(Span<const std::uint32_t>(scan.split.input.data(), scan.split.count));
-}
-
 TEST_CASE("verdicts by point run equal those by point, at once and after more windows") {
   // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
@@ -98,14 +92,10 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     const std::uint32_t bad = 3;
     scan.split.resize(ground + points);
     scan.split.ground_count = ground;
-    const std::vector<std::size_t> order = random.permutation(ground + points + bad);
-    for (std::size_t i = 0; i < ground + points; ++i) {
-      scan.split.input[i] = static_cast<std::uint32_t>(order[i]);
-    }
-    scan.unjudged.assign(order.size(), PointLabel::kGround);
-    for (std::size_t i = ground + points; i < order.size(); ++i) {
-      scan.unjudged[order[i]] = PointLabel::kInvalid;
-    }
+    const std::vector<std::size_t> numbers = random.permutation(ground + points + bad);
+    const std::vector<std::uint32_t> order(numbers.begin(), numbers.end());
+    scan.input.assign(order);
+    scan.valid = ground + points;
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
@@ -118,16 +108,17 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       for (std::size_t i = 0; i < points; ++i) expected[i].add(cluster_of[i], verdicts);
     };
     const auto check = [&](int votes) {
-      std::vector<EvidenceVerdict::Group> groups(points);
+      std::vector<EvidenceVerdict::Group> groups(points + 1);
       std::vector<std::uint32_t> group_of(points);
-      std::iota(group_of.begin(), group_of.end(), 0U);
+      std::iota(group_of.begin(), group_of.end(), 1U);
       for (std::size_t i = 0; i < points; ++i) {
-        groups[i] = detail::point_verdict(scan.windows.points[i], votes);
+        groups[i + 1] = detail::point_verdict(scan.windows.points[i], votes);
       }
-      const ScanVerdict verdict = writer.write(scan, {groups, group_of, {}});
-      writer.write_flags(scan, {groups, group_of, {}});
+      const EvidenceVerdict evidence = {groups, first_cluster, group_of, {}};
+      const ScanVerdict verdict = writer.write(scan, evidence);
+      writer.write_flags(scan, evidence);
       for (std::size_t i = 0; i < points; ++i) {
-        const std::uint32_t to = scan.split.input[ground + i];
+        const std::uint32_t to = order[ground + i];
         const bool dynamic = expected[i].votes >= votes;
         REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
         REQUIRE(verdict.causes[to] ==
@@ -138,7 +129,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
                 (first_cluster[i] == kNoCluster ? kNoInstance : 100 + first_cluster[i]));
       }
       for (std::size_t i = 0; i < ground; ++i) {
-        const std::uint32_t to = scan.split.input[i];
+        const std::uint32_t to = order[i];
         REQUIRE(verdict.labels[to] == PointLabel::kGround);
         REQUIRE(verdict.causes[to] == Cause::kGround);
         REQUIRE(verdict.beliefs[to] == 0.0F);
@@ -156,7 +147,6 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     add(scan.windows.point_runs, first);
     scan.windows.points.assign(points, WindowVerdict());
     scan.windows.record(scan.windows.point_runs, first);
-    keep(scan, first_cluster);
     check(1);
 
     const std::size_t windows = random.index(4);
@@ -172,29 +162,28 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
 
 constexpr std::uint32_t kGroups = 9;
 
-// Scans in which some points are in no cluster and some, like far ones, in no group.
+// Scans in which some groups, and the points without a group, are in no cluster.
 struct JudgedScan {
   detail::ScanSlot slot;
   std::size_t ground;
-  std::vector<std::uint32_t> cluster_of, group_of;
+  std::vector<std::uint32_t> order, cluster_of, group_of;
 
   explicit JudgedScan(Random& random) : ground(random.index(40)) {
     const std::size_t above = random.index(200);
     const std::size_t all = ground + above + random.index(20);
-    std::vector<std::uint32_t> order(all);
+    order.resize(all);
     std::iota(order.begin(), order.end(), 0U);
     for (std::size_t i = all; i > 1; --i) std::swap(order[i - 1], order[random.index(i)]);
     slot.split.resize(ground + above);
     slot.split.ground_count = ground;
-    std::copy_n(order.begin(), ground + above, slot.split.input.begin());
-    slot.unjudged.assign(all, PointLabel::kGround);
-    for (std::size_t i = ground + above; i < all; ++i) {
-      slot.unjudged[order[i]] = PointLabel::kOutOfRange;
-    }
+    slot.input.assign(order);
+    slot.valid = all;
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
-    for (std::size_t i = 0; i < above; ++i) {
+    for (std::size_t g = 1; g < kGroups; ++g) {
       const std::size_t cluster = random.index(kClusters + 1);
       cluster_of.push_back(cluster == kClusters ? kNoCluster : static_cast<std::uint32_t>(cluster));
+    }
+    for (std::size_t i = 0; i < above; ++i) {
       group_of.push_back(static_cast<std::uint32_t>(random.index(kGroups)));
     }
   }
@@ -227,21 +216,23 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       }
     };
     const auto check = [&](bool is_final) {
-      const ScanVerdict verdict = writer.write(slot, {groups, scan.group_of, moved});
-      if (is_final) writer.write_flags(slot, {groups, scan.group_of, moved});
+      const EvidenceVerdict evidence = {groups, scan.cluster_of, scan.group_of, moved};
+      const ScanVerdict verdict = writer.write(slot, evidence);
+      if (is_final) writer.write_flags(slot, evidence);
       for (std::size_t i = 0; i < above; ++i) {
-        const std::uint32_t to = slot.split.input[scan.ground + i];
-        const EvidenceVerdict::Group& expected = groups[scan.group_of[i]];
+        const std::uint32_t to = scan.order[scan.ground + i];
+        const std::uint32_t group = scan.group_of[i];
+        const std::uint32_t cluster = group == 0 ? kNoCluster : scan.cluster_of[group - 1];
+        const EvidenceVerdict::Group& expected = groups[group];
         const bool dynamic = is_dynamic(expected.cause);
         REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
         REQUIRE(verdict.causes[to] == expected.cause);
         REQUIRE(verdict.beliefs[to] == expected.belief);
-        REQUIRE(verdict.instances[to] ==
-                (scan.cluster_of[i] == kNoCluster ? kNoInstance : 100 + scan.cluster_of[i]));
+        REQUIRE(verdict.instances[to] == (cluster == kNoCluster ? kNoInstance : 100 + cluster));
         if (is_final) REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
       }
       for (std::uint32_t i = 0; i < scan.ground; ++i) {
-        const std::uint32_t to = slot.split.input[i];
+        const std::uint32_t to = scan.order[i];
         const bool dynamic = std::any_of(moved.begin(), moved.end(),
                                          [i](const auto& point) { return point.point == i; });
         REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kGround));
@@ -262,7 +253,6 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     };
 
     change();
-    keep(slot, scan.cluster_of);
     check(false);
     for (int again = 0; again < 2; ++again) {
       change();

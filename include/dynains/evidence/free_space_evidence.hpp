@@ -123,14 +123,13 @@ class FreeSpaceEvidence {
     const Judged& judged = is_final ? final_ : provisional_;
     const Record& record = record_of(judged.scan);
     const detail::InstanceSamples& samples = record.evidence.samples;
-    groups_.assign(1, {Cause::kNotJudged, 0.0F});
-    groups_.resize(samples.supervoxel_of_number.size());
-    for (std::size_t i = 1; i < groups_.size(); ++i) {
-      groups_[i] = judged.supervoxels[samples.supervoxel_of_number[i]];
-    }
-    record.number_of_point.copy_to(group_of_);
+    groups_.assign(1, Verdict());
+    groups_.insert(groups_.end(), judged.supervoxels.begin(), judged.supervoxels.end());
+    groups_.resize(samples.instance_of.size() + 1);
+    record.group_of_point.copy_to(group_of_);
     moved_ground_.add(split.non_ground(), group_of_, groups_);
-    return {groups_, group_of_, moved_ground_.find(split.ground(), record.ground)};
+    return {groups_, samples.instance_of, group_of_,
+            moved_ground_.find(split.ground(), record.ground)};
   }
 
   /// Makes the range image of the newest scan, if it is a reference, without what surely moves.
@@ -189,7 +188,7 @@ class FreeSpaceEvidence {
     Pose T_world_sensor = Pose::Identity();
     std::uint64_t since_begin = 0;  // scans since the first scan of the epoch
     detail::InstanceEvidence evidence;
-    detail::ShortNumbers number_of_point;  // by non-ground point: number of its supervoxel
+    detail::ShortNumbers group_of_point;  // by non-ground point, as in InstanceSamples
     std::vector<detail::DynamicOccupancyGrid::Count> counted;  // by supervoxel
     detail::GroundSamples ground;
   };
@@ -225,11 +224,10 @@ class FreeSpaceEvidence {
   void begin_evidence(PointsView points, Span<const std::uint32_t> instance_of,
                       std::size_t instance_count, Record& record) {
     detail::InstanceEvidence& evidence = record.evidence;
-    std::vector<std::uint32_t>& number_of_point = evidence.samples.number_of_point;
-    number_of_point = std::move(newest_number_of_point_);
+    evidence.samples.group_of_point.swap(newest_group_of_point_);
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
-    newest_number_of_point_ = std::move(number_of_point);
-    record.number_of_point.assign(newest_number_of_point_);
+    newest_group_of_point_.swap(evidence.samples.group_of_point);
+    record.group_of_point.assign(newest_group_of_point_);
     updater_.begin(evidence.samples, evidence.beliefs);
     record.counted.assign(evidence.samples.supervoxel_count(),
                           detail::DynamicOccupancyGrid::Count::kNone);
@@ -265,7 +263,7 @@ class FreeSpaceEvidence {
   // Tests all samples of a scan against one reference. `memory`: of the thread.
   void test(Record& record, const detail::ReferenceScan& reference,
             detail::Visibility& memory) const {
-    record.ground.add(references_.test(record.ground.samples.points, record.ground.size(),
+    record.ground.add(references_.test(record.ground.points, record.ground.size(),
                                        record.T_world_sensor, reference, memory));
     detail::InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility = references_.test(
@@ -350,13 +348,13 @@ class FreeSpaceEvidence {
   template <class Test>
   void mark_points(const detail::InstanceSamples& samples, Test&& test,
                    std::vector<std::uint8_t>& marks) {
-    is_marked_group_.assign(samples.supervoxel_of_number.size(), 0);
-    for (std::size_t i = 1; i < samples.supervoxel_of_number.size(); ++i) {
-      is_marked_group_[i] = test(samples.supervoxel_of_number[i]) ? 1 : 0;
+    is_marked_group_.assign(samples.instance_of.size() + 1, 0);
+    for (std::uint32_t s = 0; s < samples.supervoxel_count(); ++s) {
+      is_marked_group_[s + 1] = test(s) ? 1 : 0;
     }
-    detail::resize_with_margin(marks, newest_number_of_point_.size());
+    detail::resize_with_margin(marks, newest_group_of_point_.size());
     for (std::size_t i = 0; i < marks.size(); ++i) {
-      marks[i] = is_marked_group_[newest_number_of_point_[i]];
+      marks[i] = is_marked_group_[newest_group_of_point_[i]];
     }
   }
 
@@ -382,9 +380,9 @@ class FreeSpaceEvidence {
   std::uint64_t newest_ = 0;
   std::vector<Record> records_;  // ring buffer, by scan number
   Judged provisional_, final_;
-  std::vector<std::uint32_t> newest_number_of_point_, group_of_;
-  std::vector<Verdict> groups_;                     // by number of the supervoxel
-  std::vector<std::uint8_t> is_marked_group_;       // by number of the supervoxel
+  std::vector<std::uint32_t> newest_group_of_point_, group_of_;
+  std::vector<Verdict> groups_;
+  std::vector<std::uint8_t> is_marked_group_;
   std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };

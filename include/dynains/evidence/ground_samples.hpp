@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
@@ -129,11 +130,13 @@ class GroundFootprint {
 /// a run represents it. Each voxel has one sample among the first points of its runs.
 struct GroundSamples {
   std::vector<std::uint64_t> run_begins;  ///< by block of 64 ground points: bits of first points
-  InstanceSamples samples;                ///< of one instance, by run in the place of points
+  PointBuffer points;                     ///< samples, m, sensor frame; padded for packs
+  std::size_t count = 0;                  ///< number of samples
+  std::vector<std::uint32_t> group_of;    ///< by run: its sample, plus 1; 0 or more than all: none
   std::vector<std::uint8_t> free;         ///< by sample: number of references with "free"
   std::vector<std::uint8_t> hit;          ///< by sample: number of references with "hit"
 
-  std::size_t size() const { return samples.size(); }
+  std::size_t size() const { return count; }
 
   /// Adds the visibility of the samples from one reference. At most 255 references.
   void add(const Visibility& visibility) { visibility.add_to(size(), free.data(), hit.data()); }
@@ -164,7 +167,10 @@ class GroundSampler {
     }
     grow(instance_of_, runs);
     sampler_.sample(PointsView(firsts_).subview(0, runs),
-                    Span<const std::uint32_t>(instance_of_).subspan(0, runs), 1, out.samples);
+                    Span<const std::uint32_t>(instance_of_).subspan(0, runs), 1, samples_);
+    std::swap(out.points, samples_.points);
+    out.group_of.swap(samples_.group_of_point);
+    out.count = samples_.size();
     const std::size_t counts = (out.size() + 7) / 8 * 8;
     ensure_capacity(out.free, counts);
     ensure_capacity(out.hit, counts);
@@ -176,6 +182,7 @@ class GroundSampler {
   InstanceSampler sampler_;
   PointBuffer firsts_;                      // by run: its first point
   std::vector<std::uint32_t> instance_of_;  // by run: instance 0
+  InstanceSamples samples_;                 // of this instance
 };
 
 }  // namespace dynains::detail

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <numeric>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -22,12 +24,11 @@ namespace dynains::detail {
 struct InstanceSamples {
   PointBuffer points;                           ///< samples, m, sensor frame; padded for packs
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel: first sample, and the end
-  std::vector<VoxelKey> place;                  ///< by supervoxel: its voxel in the sensor frame
+  std::vector<VoxelKey> place;                  ///< by part: its voxel in the sensor frame
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
-  std::vector<std::uint32_t> instance_of;       ///< by supervoxel
-  std::vector<std::uint32_t> number_of_point;   ///< by point: number of its supervoxel; 0: none
-  /// By number, which follows the points: index of the supervoxel; [0]: kNoCluster.
-  std::vector<std::uint32_t> supervoxel_of_number;
+  /// By part of an instance: the supervoxels, then the parts beyond the range, without samples.
+  std::vector<std::uint32_t> instance_of;
+  std::vector<std::uint32_t> group_of_point;  ///< by point: index of its part, plus 1; 0: none
 
   std::size_t size() const { return sample_begin.empty() ? 0 : sample_begin.back(); }
   std::size_t supervoxel_count() const {
@@ -101,24 +102,25 @@ class InstanceSampler {
   void sample(PointsView points, Span<const std::uint32_t> instance_of, std::size_t instance_count,
               InstanceSamples& out) {
     begin_scan();
-    resize_with_margin(out.number_of_point, points.size());
+    resize_with_margin(out.group_of_point, points.size());
     for (std::size_t begin = 0; begin < points.size(); begin += kWordBits) {
       const PointsView block = points.subview(begin, std::min(kWordBits, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);
-      meet_supervoxels(block.size(), out.number_of_point.data() + begin);
-      rank_points(begin, block.size(), out.number_of_point.data() + begin);
+      meet_supervoxels(block.size(), out.group_of_point.data() + begin);
+      rank_points(begin, block.size(), out.group_of_point.data() + begin);
     }
     order(points, instance_count, out);
   }
 
  private:
-  // Part of an instance in one voxel. `xy` contains the voxel indices along x and y, 16 bits each.
+  // Part of an instance in one voxel, or beyond the range. `xy` contains the voxel indices along x
+  // and y, 16 bits each.
   struct Supervoxel {
     std::int32_t xy = 0;
-    std::int32_t z = 0;
-    std::int32_t instance = -2;  // -1: points without sample; -2: empty slot of the table
+    std::int32_t z = std::numeric_limits<std::int32_t>::min();  // beyond the range
+    std::int32_t instance = -2;  // -1: points without an instance; -2: empty slot of the table
 
-    static Supervoxel none() { return {0, 0, -1}; }
+    bool is_far() const { return z == Supervoxel().z; }
     friend bool operator==(const Supervoxel& a, const Supervoxel& b) {
       return ((a.xy ^ b.xy) | (a.z ^ b.z) | (a.instance ^ b.instance)) == 0;
     }
@@ -135,7 +137,7 @@ class InstanceSampler {
 
   void begin_scan() {
     table_.clear();
-    table_.insert(Supervoxel::none());  // number 0
+    table_.insert({0, Supervoxel().z, -1});  // number 0
     std::fill(keys_.begin(), keys_.end(), kNoKey);
   }
 
@@ -158,12 +160,11 @@ class InstanceSampler {
       rank.store(&rank_[at.begin]);
       const Int xy = is_sampled & ((floor(px * per_metre) << kHalfBits) +
                                    (floor(py * per_metre) & Int((1 << kHalfBits) - 1)));
-      const Int z = is_sampled & floor(pz * per_metre);
-      const Int kept_instance = select(is_sampled, instance, Int(-1));
+      const Int z = select(is_sampled, floor(pz * per_metre), Int(Supervoxel().z));
       xy.store(&xy_[at.begin]);
       z.store(&z_[at.begin]);
-      kept_instance.store(&instance_[at.begin]);
-      mixed_hash(xy, z, kept_instance).store(&hash_[at.begin]);
+      instance.store(&instance_[at.begin]);
+      mixed_hash(xy, z, instance).store(&hash_[at.begin]);
     });
   }
 
@@ -207,47 +208,51 @@ class InstanceSampler {
 
   // Counting sort of the supervoxels by instance; the samples follow their supervoxels.
   void order(PointsView points, std::size_t instance_count, InstanceSamples& out) {
-    const std::size_t supervoxel_count = table_.size() - 1;
-    out.supervoxel_begin.assign(instance_count + 1, 0);
-    for (std::size_t number = 1; number <= supervoxel_count; ++number) {
-      ++out.supervoxel_begin[static_cast<std::uint32_t>(supervoxels_[number].instance) + 1];
+    const auto bucket_of = [&](const Supervoxel& supervoxel) {
+      return supervoxel.is_far() ? instance_count : static_cast<std::size_t>(supervoxel.instance);
+    };
+    out.supervoxel_begin.assign(instance_count + 2, 0);
+    for (std::size_t number = 1; number < table_.size(); ++number) {
+      ++out.supervoxel_begin[bucket_of(supervoxels_[number]) + 1];
     }
-    for (std::size_t i = 1; i <= instance_count; ++i) {
-      out.supervoxel_begin[i] += out.supervoxel_begin[i - 1];
-    }
+    std::partial_sum(out.supervoxel_begin.begin(), out.supervoxel_begin.end(),
+                     out.supervoxel_begin.begin());
     next_.assign(out.supervoxel_begin.begin(), out.supervoxel_begin.end());
-    out.supervoxel_of_number.resize(supervoxel_count + 1);
-    out.supervoxel_of_number[0] = kNoCluster;
-    out.place.resize(supervoxel_count);
-    out.instance_of.resize(supervoxel_count);
-    grow(ordered_, supervoxel_count);
-    for (std::size_t number = 1; number <= supervoxel_count; ++number) {
+    out.supervoxel_begin.pop_back();
+    out.place.resize(table_.size() - 1);
+    out.instance_of.resize(table_.size() - 1);
+    grow(ordered_, table_.size());
+    grow(group_of_number_, table_.size());
+    for (std::size_t number = 1; number < table_.size(); ++number) {
       const Supervoxel& supervoxel = supervoxels_[number];
-      const auto instance = static_cast<std::uint32_t>(supervoxel.instance);
-      const std::uint32_t to = next_[instance]++;
-      out.supervoxel_of_number[number] = to;
+      const std::uint32_t to = next_[bucket_of(supervoxel)]++;
+      group_of_number_[number] = to + 1;
       out.place[to] = place_of(supervoxel);
-      out.instance_of[to] = instance;
+      out.instance_of[to] = static_cast<std::uint32_t>(supervoxel.instance);
       ordered_[to] = static_cast<std::uint32_t>(number);
     }
-    copy_samples(points, supervoxel_count, out);
+    for (std::uint32_t& number : out.group_of_point) number = group_of_number_[number];
+    copy_samples(points, out.supervoxel_begin.back(), out);
   }
 
   void copy_samples(PointsView points, std::size_t supervoxel_count, InstanceSamples& out) {
-    out.points.grow(supervoxel_count * most_ + kPackWidth);
-    out.sample_begin.resize(supervoxel_count + 1);
-    std::uint32_t to = 0;
+    const std::uint64_t* const keys = keys_.data();
+    out.sample_begin.assign(1, 0);
     for (std::size_t s = 0; s < supervoxel_count; ++s) {
-      out.sample_begin[s] = to;
-      const std::uint64_t* const row = &keys_[ordered_[s] * most_];
-      for (std::size_t k = 0; k < most_ && row[k] != kNoKey; ++k, ++to) {
-        const auto i = static_cast<std::uint32_t>(row[k]);
+      const std::uint64_t* const row = keys + ordered_[s] * most_;
+      const auto count = std::find(row, row + most_, kNoKey) - row;
+      out.sample_begin.push_back(out.sample_begin.back() + static_cast<std::uint32_t>(count));
+    }
+    out.points.grow(out.size() + kPackWidth);
+    for (std::size_t s = 0; s < supervoxel_count; ++s) {
+      const std::uint64_t* row = keys + ordered_[s] * most_;
+      for (std::uint32_t to = out.sample_begin[s]; to < out.sample_begin[s + 1]; ++to, ++row) {
+        const auto i = static_cast<std::uint32_t>(*row);
         out.points.x[to] = points.x[i];
         out.points.y[to] = points.y[i];
         out.points.z[to] = points.z[i];
       }
     }
-    out.sample_begin[supervoxel_count] = to;
   }
 
   float supervoxels_per_metre_;
@@ -259,7 +264,8 @@ class InstanceSampler {
   std::vector<std::uint64_t> keys_;  // by number in the table: most_ ranks and indices of points
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end
   std::vector<std::uint32_t> next_;      // by instance: position of its next supervoxel
-  std::vector<std::uint32_t> ordered_;   // by supervoxel: number in the table
+  std::vector<std::uint32_t> ordered_;   // by part of an instance: number in the table
+  std::vector<std::uint32_t> group_of_number_ = {0};
 };
 
 }  // namespace dynains::detail

@@ -248,19 +248,16 @@ class MovedGround {
     });
   }
 
-  // Sets `moved_` by number of the voxel; returns whether any voxel has moved.
+  // Sets `moved_` by GroundSamples::group_of; returns whether any voxel has moved.
   bool find_free_voxels(const GroundSamples& ground) {
-    const InstanceSamples& samples = ground.samples;
     bool any = false;
-    grow(moved_, samples.supervoxel_of_number.size() + 1);
-    moved_[0] = 0;
-    for (std::size_t number = 1; number < samples.supervoxel_of_number.size(); ++number) {
-      const std::uint32_t sample = samples.sample_begin[samples.supervoxel_of_number[number]];
+    moved_.assign(ground.size() + 2, 0);
+    for (std::size_t sample = 0; sample < ground.size(); ++sample) {
       const std::uint8_t free = ground.free[sample];
       const bool moved =
           free >= kLeastFree &&
           static_cast<float>(free) >= kLeastRatio * static_cast<float>(ground.hit[sample]);
-      moved_[number] = moved ? 1 : 0;
+      moved_[sample + 1] = moved ? 1 : 0;
       any |= moved;
     }
     return any;
@@ -269,11 +266,11 @@ class MovedGround {
   // Removes the runs in moved voxels, except points under removed points.
   void remove_free_runs(PointsView ground, const GroundSamples& samples) {
     const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
-    const std::uint32_t* number = samples.samples.number_of_point.data();
+    const std::uint32_t* group = samples.group_of.data();
     for (std::size_t i = 0; i < samples.run_begins.size(); ++i) {
       const std::uint64_t all = all_of(block_of(ground, i));
       for (std::uint64_t left = samples.run_begins[i]; left != 0; left &= left - 1) {
-        if (moved_[*number++] == 0) continue;
+        if (moved_[*group++] == 0) continue;
         const std::uint64_t first = lowest(left);
         const std::uint64_t next = lowest(left ^ first);  // 0 behind the last run
         remove(i, (next - 1) & ~(first - 1) & all & ~under_[i], Cause::kFreeSpace);
@@ -290,7 +287,7 @@ class MovedGround {
   std::vector<std::uint64_t> under_;    // by block of the ground: points under removed points
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t> moved_;  // by group, then by number of the voxel
+  std::vector<std::uint8_t> moved_;  // by group of points, then by group of runs
 };
 
 }  // namespace dynains::detail

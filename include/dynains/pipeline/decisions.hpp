@@ -225,13 +225,16 @@ class WindowDecision final : public ScanDecision {
   void judge(const ScanSlot&, bool) override {}
   EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) override {
     const std::vector<WindowVerdict>& points = scan.windows.points;
-    resize_with_margin(groups_, points.size());
+    resize_with_margin(groups_, points.size() + 1);
     resize_with_margin(group_of_, points.size());  // each point is a group
-    std::iota(group_of_.begin(), group_of_.end(), 0U);
+    std::iota(group_of_.begin(), group_of_.end(), 1U);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      groups_[i] = point_verdict(points[i], is_final ? std::max(1, votes_) : 1);
+      groups_[i + 1] = point_verdict(points[i], is_final ? std::max(1, votes_) : 1);
     }
-    return {groups_, group_of_, {}};
+    ensure_capacity(cluster_of_, points.size());
+    cluster_of_.clear();
+    for (const auto& run : scan.windows.point_runs) cluster_of_.resize(run.end, run.cluster);
+    return {groups_, cluster_of_, group_of_, {}};
   }
 
  private:
@@ -352,8 +355,8 @@ class WindowDecision final : public ScanDecision {
   typename Stages::Belief belief_;
   ClusterSet clusters_;
   std::vector<WindowVerdict> verdicts_;         // by cluster of the current window
-  std::vector<EvidenceVerdict::Group> groups_;  // by non-ground point
-  std::vector<std::uint32_t> group_of_;
+  std::vector<EvidenceVerdict::Group> groups_;  // none, then by non-ground point
+  std::vector<std::uint32_t> cluster_of_, group_of_;
   InstanceIds instance_ids_;
 };
 

@@ -1,4 +1,4 @@
-// Input filter: copies the valid points of a cloud and marks the others.
+// Input filter: copies the valid points of a cloud and lists the others.
 #pragma once
 
 #include <Eigen/Core>
@@ -30,14 +30,14 @@ class Ingest {
  public:
   /// `cloud`: m. Points at the origin of the cloud or at the sensor are beams without a return and
   /// get kInvalid, as do NaN and infinity. `R`: rotation of the valid points after the range test,
-  /// or null for none. `unjudged`: receives the labels of the points that are not valid, and
-  /// kGround for the others.
-  void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R,
-            std::vector<PointLabel>& unjudged) {
+  /// or null for none.
+  void read(const CloudView& cloud, const JudgedRegion& region, const Eigen::Matrix3d* R) {
     const auto rotation = PackTransform::rotation(R != nullptr ? *R : Eigen::Matrix3d::Identity());
     const std::size_t count = cloud.size();
-    ensure_capacity(unjudged, count);
-    unjudged.assign(count, PointLabel::kGround);
+    for (auto* list : {&out_of_range_, &invalid_}) {
+      list->clear();
+      ensure_capacity(*list, count);
+    }
     points_.grow(count + kPackWidth);
     grow(input_, count + kPackWidth);
     count_ = 0;
@@ -47,7 +47,7 @@ class Ingest {
                  points_.z.data() + count_);
       if (!region.origin.isZero(0.0F)) subtract(region.origin, length);
       const std::size_t valid_count = filter(begin, length, region.min_range * region.min_range,
-                                             region.max_range * region.max_range, unjudged);
+                                             region.max_range * region.max_range);
       if (R != nullptr) {
         transform_points(PointsView(points_).subview(count_, valid_count), rotation, points_,
                          count_);
@@ -63,6 +63,9 @@ class Ingest {
   PointsView points() const { return PointsView(points_).subview(0, count_); }
   /// Input index of each valid point; longer than points().
   const std::vector<std::uint32_t>& input() const { return input_; }
+  /// Input indices of the other points: kOutOfRange and kInvalid.
+  const std::vector<std::uint32_t>& out_of_range() const { return out_of_range_; }
+  const std::vector<std::uint32_t>& invalid() const { return invalid_; }
 
  private:
   // Moves the appended points, except beams without a return, which stay at the origin.
@@ -78,10 +81,9 @@ class Ingest {
     }
   }
 
-  // Compacts the valid points among the appended ones and marks the others. Returns the number of
+  // Compacts the valid points among the appended ones and lists the others. Returns the number of
   // valid points. The branch for a whole valid pack is the common case.
-  std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared,
-                     std::vector<PointLabel>& unjudged) {
+  std::size_t filter(std::size_t begin, std::size_t length, float min_squared, float max_squared) {
     std::size_t result = 0;
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
@@ -121,7 +123,7 @@ class Ingest {
         const unsigned bad = ~good & ((1U << at.size()) - 1U);
         for_each_bit(bad, [&](std::size_t k) {
           const bool is_return = (returns >> k & 1U) != 0;
-          unjudged[first + k] = is_return ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+          (is_return ? out_of_range_ : invalid_).push_back(static_cast<std::uint32_t>(first + k));
         });
         for (std::size_t k = 0; k < at.size(); ++k) {
           xs[valid_count] = xs[at.begin + k];
@@ -138,7 +140,7 @@ class Ingest {
 
   std::size_t count_ = 0;
   PointBuffer points_;
-  std::vector<std::uint32_t> input_;
+  std::vector<std::uint32_t> input_, out_of_range_, invalid_;
 };
 
 }  // namespace dynains::detail

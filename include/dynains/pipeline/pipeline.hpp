@@ -106,10 +106,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     }
     const auto cluster = [&] {
       newest.split.input = std::move(split_input_);
-      timed(times.ground, [&] {
-        ground_.segment(ingest_.points(), ingest_.input(), newest.split);
-        newest.mark_unjudged(ingest_.points().size());
-      });
+      timed(times.ground,
+            [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
       timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
       timed(times.cluster, [&] { window_.cluster(clusterer_); });                        // Eq. 4
     };
@@ -121,9 +119,13 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
     timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
     timed(times.verdict, [&] {
-      newest.cluster_of.assign(window_.newest_cluster_of());
-      newest.input.assign(Span<const std::uint32_t>(newest.split.input.data(), newest.split.count));
       split_input_ = std::move(newest.split.input);
+      split_input_.resize(ingest_.points().size());
+      for (const auto* list : {&ingest_.out_of_range(), &ingest_.invalid()}) {
+        newest.valid = split_input_.size();
+        split_input_.insert(split_input_.end(), list->begin(), list->end());
+      }
+      newest.input.assign(split_input_);
     });
     transaction.commit();
     if (!finishes_later_) finish_due(times);
@@ -192,9 +194,9 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
                                  config_.sensor_origin().template cast<float>()};
     if (frame_.rotates_scans()) {
       const Eigen::Matrix3d R_level_sensor = level(next);
-      ingest_.read(cloud, region, &R_level_sensor, next.unjudged);
+      ingest_.read(cloud, region, &R_level_sensor);
     } else {
-      ingest_.read(cloud, region, nullptr, next.unjudged);
+      ingest_.read(cloud, region, nullptr);
     }
   }
 
@@ -303,7 +305,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   Plausibility plausibility(const ScanSlot& newest, const FrameResult& result) {
     PlausibilityCheck::Scan scan;
     scan.scan = newest.scan;
-    scan.points = newest.unjudged.size();
+    scan.points = newest.input.size();
     scan.judged = newest.split.count;
     scan.surfaces = decision_->surfaces();
     if (result.pose_residual) scan.residual = result.pose_residual->translation;

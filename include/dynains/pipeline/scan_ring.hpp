@@ -31,18 +31,12 @@ struct ScanSlot {
   Pose T_world_level = Pose::Identity();  ///< frame of split.points
 
   GroundSplit split;
-  /// By input point: kInvalid or kOutOfRange for points that are not judged, else kGround.
-  std::vector<PointLabel> unjudged;
-  ShortNumbers input;              ///< by point of the split: its index in the input
-  ShortNumbers cluster_of;         ///< by non-ground point: index in `ids`, or kNoCluster
+  /// Indices in the input: of the points of the split, then of those with the label kOutOfRange,
+  /// then of those with kInvalid.
+  ShortNumbers input;
+  std::size_t valid = 0;           ///< number of points without the label kInvalid
   std::vector<std::uint32_t> ids;  ///< by cluster of the window that ends with this scan
   WindowVotes windows;
-
-  /// Marks the points of the split behind the last one, of `valid` points, as out of range.
-  void mark_unjudged(std::size_t valid) {
-    for (std::size_t i = split.count; i < valid; ++i)
-      unjudged[split.input[i]] = PointLabel::kOutOfRange;
-  }
 
   std::size_t non_ground_count() const { return split.count - split.ground_count; }
 };

@@ -26,29 +26,31 @@ class VerdictWriter {
 
   /// Writes the verdict on a scan, which is valid until the next call.
   ScanVerdict write(const ScanSlot& scan, const EvidenceVerdict& evidence) {
-    const std::size_t count = scan.unjudged.size();
+    const std::size_t count = scan.input.size();
     resize_with_margin(labels_, count);
     resize_with_margin(beliefs_, count);
     resize_with_margin(causes_, count);
-    resize_with_margin(group_of_input_, count);
-    ensure_capacity(instances_, count);
-    instances_.assign(count, kNoInstance);
+    ensure_capacity(group_of_input_, count);
+    group_of_input_.assign(count, fixed_group(PointLabel::kGround));
+    resize_with_margin(instances_, count);
     scan.input.copy_to(input_);
-    scan.cluster_of.copy_to(cluster_of_);
     const std::uint32_t* const input = input_.data() + scan.split.ground_count;
-    std::uint32_t* const instances = instances_.data();
-    for (std::size_t i = 0; i < cluster_of_.size(); ++i) {
-      if (cluster_of_[i] != kNoCluster) instances[input[i]] = scan.ids[cluster_of_[i]];
-    }
     groups_.resize(kFirstGroup);
     for (const PointLabel label : {PointLabel::kInvalid, PointLabel::kOutOfRange}) {
       groups_[fixed_group(label)].label = label;
     }
     groups_[fixed_group(PointLabel::kGround)] = Group({Cause::kGround, 0.0F});
     groups_.insert(groups_.end(), evidence.groups.begin(), evidence.groups.end());
+    for (std::size_t i = 0; i < evidence.cluster_of.size(); ++i) {
+      const std::uint32_t cluster = evidence.cluster_of[i];
+      if (cluster != kNoCluster) groups_[kFirstGroup + 1 + i].instance = scan.ids[cluster];
+    }
     // The group of each input point comes first, so that the arrays are written sequentially.
     std::uint32_t* const group_of = group_of_input_.data();
-    std::transform(scan.unjudged.begin(), scan.unjudged.end(), group_of, fixed_group);
+    for (std::size_t i = scan.split.count; i < count; ++i) {
+      group_of[input_[i]] =
+          fixed_group(i < scan.valid ? PointLabel::kOutOfRange : PointLabel::kInvalid);
+    }
     for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
       group_of[input[i]] = kFirstGroup + evidence.group_of[i];
     }
@@ -72,7 +74,7 @@ class VerdictWriter {
   }
 
  private:
-  // Verdict on the points of a group, packed in eight bytes.
+  // Verdict on the points of a group.
   struct Group {
     Group() = default;
     Group(const EvidenceVerdict::Group& verdict)
@@ -82,6 +84,7 @@ class VerdictWriter {
                                                   : PointLabel::kStatic),
           cause(verdict.cause) {}
     float belief = 0.0F;
+    std::uint32_t instance = kNoInstance;
     PointLabel label = PointLabel::kStatic;
     Cause cause = Cause::kNotJudged;
   };
@@ -101,9 +104,11 @@ class VerdictWriter {
     PointLabel* const labels = labels_.data();
     Cause* const causes = causes_.data();
     float* const beliefs = beliefs_.data();
+    std::uint32_t* const instances = instances_.data();
     for (std::size_t i = 0; i < count; ++i) {
       const Group group = groups[group_of[i]];
       beliefs[i] = group.belief;
+      instances[i] = group.instance;
       causes[i] = group.cause;
       labels[i] = group.label;
     }
@@ -116,10 +121,9 @@ class VerdictWriter {
   std::vector<Cause> causes_;
   std::vector<std::uint32_t> group_of_input_;
 
-  std::vector<std::uint8_t> is_kept_;      // by point of the split
-  std::vector<std::uint32_t> input_;       // by point of the split
-  std::vector<std::uint32_t> cluster_of_;  // by non-ground point
-  std::vector<Group> groups_;              // fixed groups, then those of the evidence
+  std::vector<std::uint8_t> is_kept_;  // by point of the split
+  std::vector<std::uint32_t> input_;   // by point of the split
+  std::vector<Group> groups_;          // fixed groups, then those of the evidence
 };
 
 }  // namespace dynains::detail
