@@ -45,24 +45,31 @@ class InstanceViews {
     }
   }
 
-  /// Sets the position of the reference of the next calls.
-  void look_from(const Position& reference) {
-    for (View& view : views_) view.is_other_side = is_other_side(view, reference);
+  /// Whether free samples of a reference on another side are no evidence on an instance.
+  bool contradicts(std::size_t instance) const {
+    return views_[instance].hits >= kFirmHits && !views_[instance].was_free;
   }
 
-  /// Whether free samples of the reference are no evidence on an instance.
-  bool is_contradicted(std::size_t instance) const {
-    const View& view = views_[instance];
-    return view.is_other_side && view.hits >= kFirmHits && !view.was_free;
-  }
-
-  /// Takes into account that the reference sees enough of an instance. `free_ratio`: ratio of free
-  /// to visible samples.
+  /// Takes into account that a reference on the side of the scan sees enough of an instance.
+  /// `free_ratio`: ratio of free to visible samples.
   void add(std::size_t instance, float free_ratio) {
     View& view = views_[instance];
-    if (view.is_other_side) return;
     if (free_ratio <= FreeSpaceSum::kHitRatio && view.hits < kFirmHits) ++view.hits;
     if (free_ratio >= FreeSpaceSum::kFreeRatio) view.was_free = true;
+  }
+
+  /// Whether the directions from an instance to the sensor and to a reference differ by more than
+  /// the largest angle on the own side.
+  bool is_other_side(std::size_t instance, const Position& reference) const {
+    const View& view = views_[instance];  // all vectors are scaled by the number of samples
+    float product = 0.0F, to_sensor = 0.0F, to_reference = 0.0F;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const float other = view.sum[i] - view.count * reference[i];
+      product += view.sum[i] * other;
+      to_sensor += view.sum[i] * view.sum[i];
+      to_reference += other * other;
+    }
+    return product < kCosine * std::sqrt(to_sensor) * std::sqrt(to_reference);
   }
 
  private:
@@ -73,21 +80,7 @@ class InstanceViews {
     float count = 0.0F;
     std::uint8_t hits = 0;  // references on the side of the scan that hit the instance
     bool was_free = false;  // a reference on the side of the scan saw the instance free
-    bool is_other_side = false;
   };
-
-  // Whether the directions from an instance to the sensor and to the reference differ by more than
-  // the largest angle. All vectors are scaled by the number of samples.
-  static bool is_other_side(const View& view, const Position& reference) {
-    float product = 0.0F, to_sensor = 0.0F, to_reference = 0.0F;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float other = view.sum[i] - view.count * reference[i];
-      product += view.sum[i] * other;
-      to_sensor += view.sum[i] * view.sum[i];
-      to_reference += other * other;
-    }
-    return product < kCosine * std::sqrt(to_sensor) * std::sqrt(to_reference);
-  }
 
   std::vector<View> views_;  // by instance
 };
@@ -170,11 +163,13 @@ class InstanceBeliefUpdater {
   /// position, m, in the sensor frame of the scan.
   void update(const InstanceSamples& samples, const Visibility& visibility,
               const InstanceViews::Position& reference, InstanceBeliefs& beliefs) const {
-    beliefs.views.look_from(reference);
     // AVX2 processors have an instruction that counts bits.
     with_packs([&](auto) {
       for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-        const float weight = update_instance(samples, visibility, instance, beliefs);
+        const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
+        const auto all = visibility.count(begin, begin + beliefs.counts[instance].total);
+        if (all.free + all.hit == 0) continue;
+        const float weight = update_instance(all, reference, instance, beliefs);
         for (std::uint32_t s = samples.supervoxel_begin[instance];
              s < samples.supervoxel_begin[instance + 1]; ++s) {
           update_supervoxel(samples, visibility, s, weight, beliefs);
@@ -207,8 +202,8 @@ class InstanceBeliefUpdater {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t size = samples.sample_begin[s + 1] - begin;
     const Visibility::Count visible = visibility.count(begin, begin + size);
-    if (visible.free + visible.hit == 0) return;
     Belief& belief = beliefs.supervoxels[s];
+    if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
     const Counts before = counts_of(belief, size);
     update(belief, visible, size, weight);
     Counts& counts = beliefs.counts[samples.instance_of[s]];
@@ -217,20 +212,18 @@ class InstanceBeliefUpdater {
     counts.decided += now.decided - before.decided;
   }
 
-  // Updates what is known of an instance as a whole. Returns the weight of its free samples.
-  float update_instance(const InstanceSamples& samples, const Visibility& visibility,
+  // Updates what is known of an instance as a whole. `all`: its visible samples, at least one.
+  // Returns the weight of the free ones.
+  float update_instance(const Visibility::Count& all, const InstanceViews::Position& reference,
                         std::size_t instance, InstanceBeliefs& beliefs) const {
-    const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
-    const std::uint32_t end = begin + beliefs.counts[instance].total;
-    const Visibility::Count all = visibility.count(begin, end);
-    const auto count = static_cast<float>(end - begin);
     const auto visible = static_cast<float>(all.free + all.hit);
-    const float least = kLeastVisible * count;
+    const float least = kLeastVisible * static_cast<float>(beliefs.counts[instance].total);
     const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
     const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
-    const float weight = beliefs.views.is_contradicted(instance)   ? 0.0F
-                         : is_hit && beliefs.merged[instance] == 0 ? kPartWeight
-                                                                   : 1.0F;
+    const float weight = is_hit && beliefs.merged[instance] == 0 ? kPartWeight : 1.0F;
+    if (beliefs.views.is_other_side(instance, reference)) {
+      return beliefs.views.contradicts(instance) ? 0.0F : weight;
+    }
     if (visible >= std::max(2.0F, least)) beliefs.views.add(instance, free_ratio);
     return weight;
   }
