@@ -100,7 +100,8 @@ inline float mean_of_lowest(Span<const float> values, std::size_t wanted, float 
   if (kept.empty()) return floor;
   const std::size_t count = std::min(wanted, kept.size());
   const auto end = kept.begin() + static_cast<std::ptrdiff_t>(count);
-  std::partial_sort(kept.begin(), end, kept.end());
+  std::nth_element(kept.begin(), end, kept.end());
+  std::sort(kept.begin(), end);
   return std::accumulate(kept.begin(), end, 0.0F) / static_cast<float>(count);
 }
 
