@@ -33,18 +33,21 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
   constexpr std::size_t kScans = 24;
   constexpr double kLeastMotion = 5.0;  // m
   const std::size_t count = std::min(kScans, range.size());
-  std::vector<PointBuffer> scans;
-  RecordedScan scan;
+  std::vector<std::size_t> chosen;
   double motion = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1));
-    motion = std::max(motion, (recording.T_world_sensor(i).translation() -
+    chosen.push_back(range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1)));
+    motion = std::max(motion, (recording.T_world_sensor(chosen.back()).translation() -
                                recording.T_world_sensor(range.first).translation())
                                   .norm());
+  }
+  if (motion < kLeastMotion) return otherwise;
+  std::vector<PointBuffer> scans;
+  RecordedScan scan;
+  for (const std::size_t i : chosen) {
     recording.read_scan(i, scan);
     scans.push_back(finite_points(scan));
   }
-  if (motion < kLeastMotion) return otherwise;
   const OwnBody body = estimate_own_body(scans);
   return body.known ? std::min(body.min_range(), otherwise) : otherwise;
 }

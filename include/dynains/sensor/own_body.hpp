@@ -43,10 +43,8 @@ class NearestReturns {
     friend bool operator<(const Return& a, const Return& b) { return a.range < b.range; }
   };
 
-  NearestReturns(std::size_t scans, const Mounting& mounting)
-      : mounting_(mounting), by_direction_(kColumns * kRows), ground_(kColumns) {
-    for (std::vector<Return>& returns : by_direction_) returns.reserve(scans);
-  }
+  explicit NearestReturns(const Mounting& mounting)
+      : mounting_(mounting), by_direction_(kColumns * kRows), ground_(kColumns) {}
 
   void add(PointsView points) {
     near_.clear();
@@ -188,7 +186,7 @@ inline OwnBody estimate_own_body(const std::vector<PointBuffer>& scans) {
   constexpr std::size_t kFewestScans = 8;
   if (scans.size() < kFewestScans) return {};
   const Mounting mounting = detail::usual_mounting(scans);
-  detail::NearestReturns nearest(scans.size(), mounting);
+  detail::NearestReturns nearest(mounting);
   for (const PointBuffer& scan : scans) nearest.add(scan);
   std::vector<detail::SteadyReturn> candidates;
   nearest.for_each_direction(
