@@ -157,16 +157,13 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
 void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
   const Pose& T_world_sensor = verdict.T_world_sensor;
   const double sensor_height = T_world_sensor.translation().z();
-  static_points_.clear();
   for (std::size_t i = 0; i < verdict.labels.size(); i += static_step_) {
     if (!is_static(verdict.labels[i])) continue;
     const Eigen::Vector3d p = T_world_sensor * scan.point(i).position;
-    if (Pixel* pixel = pixel_at(p)) {
-      __builtin_prefetch(pixel, 1);
-      static_points_.push_back({pixel, static_cast<float>(p.z()), shade(p.z() - sensor_height)});
-    }
+    Pixel* const pixel = pixel_at(p);
+    if (pixel != nullptr)
+      pixel->add_static(static_cast<float>(p.z()), shade(p.z() - sensor_height));
   }
-  for (const StaticPoint& point : static_points_) point.pixel->add_static(point.height, point.grey);
   for_each_moving(verdict.labels, [&](std::size_t i) {
     if (Pixel* pixel = pixel_at(T_world_sensor * scan.point(i).position)) pixel->has_moving = true;
   });

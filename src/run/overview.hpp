@@ -40,22 +40,15 @@ class Overview {
     bool has_static() const { return height > -std::numeric_limits<float>::infinity(); }
   };
 
-  struct StaticPoint {
-    Pixel* pixel;
-    float height;  // m
-    std::uint8_t grey;
-  };
-
   /// The pixel of a point (m, world); null outside of the picture.
   Pixel* pixel_at(const Eigen::Vector3d& p);
 
   std::size_t static_step_;
-  Eigen::Vector2d low_;                     // m, world, left and lower border
-  double scale_;                            // pixels per m
-  int width_;                               // pixels of a panel
-  int height_;                              // pixels of a panel
-  std::vector<std::vector<Pixel>> rows_;    // of a panel; empty before the first point of a row
-  std::vector<StaticPoint> static_points_;  // of one scan
+  Eigen::Vector2d low_;                   // m, world, left and lower border
+  double scale_;                          // pixels per m
+  int width_;                             // pixels of a panel
+  int height_;                            // pixels of a panel
+  std::vector<std::vector<Pixel>> rows_;  // of a panel; empty before the first point of a row
 };
 
 }  // namespace dynains::program
