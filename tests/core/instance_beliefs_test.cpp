@@ -135,13 +135,6 @@ TEST_CASE(
   stands.see(standing);
   CHECK_FALSE(stands.is_free());
 
-  Scan merged(Instances{{5, 12}});  // somebody who left a wall
-  merged.beliefs.merged[0] = 1;
-  merged.see(standing);
-  merged.see(part);
-  merged.see(part);
-  CHECK(merged.belief().peak == Approx(4.0F * kFreeStep));
-
   // Five of 20 samples are enough for the whole, four are not.
   for (const std::size_t seen : {4U, 5U}) {
     Scan partly(Instances{{5, 15}});
@@ -160,8 +153,8 @@ TEST_CASE(
 }
 
 // Cause of the last supervoxel of a scan with one instance. `others`: samples in other scans of its
-// track. `carried`: whether it is small enough for a track.
-Cause last_cause(const Scan& scan, const TrackedInstances::Seen& others = {}, bool carried = true) {
+// track.
+Cause last_cause(const Scan& scan, const TrackedInstances::Seen& others = {}) {
   InstanceEvidence evidence;
   evidence.samples = scan.samples;
   evidence.beliefs = scan.beliefs;
@@ -171,14 +164,13 @@ Cause last_cause(const Scan& scan, const TrackedInstances::Seen& others = {}, bo
   evidence.tracked.instances[0].past.seen = {moved + others.moved, stood + others.stood};
   evidence.tracked.instances[0].future.seen = {moved, stood};
   evidence.tracked.shapes.resize(1);
-  evidence.tracked.shapes[0].carried = carried;
   InstanceJudge judge{FreeSpaceConfig()};
   std::vector<InstanceJudge::Verdict> verdicts;
   judge.judge(evidence, scan.updater, false, verdicts);
   return verdicts.back().cause;
 }
 
-TEST_CASE("an instance is removed if .22 of its known samples moved, a large one if half did") {
+TEST_CASE("an instance is removed if .22 of its known samples moved") {
   Scan enough(Instances{{22, 78}});
   enough.see({{22, 0}, {0, 78}});
   CHECK(enough.beliefs.counts[0].moved == 22);
@@ -195,13 +187,6 @@ TEST_CASE("an instance is removed if .22 of its known samples moved, a large one
   hidden.see({{22, 0}, {0, 78}, {0, 0}});
   CHECK(hidden.beliefs.counts[0].decided == 101);
   CHECK(hidden.beliefs.counts[0].total == 301);
-
-  for (const std::uint32_t moved : {4U, 5U}) {
-    Scan large(Instances{{moved, 5}});
-    large.see({{moved, 0}, {0, 5}});
-    CHECK(last_cause(large) == Cause::kWithInstance);
-    CHECK(last_cause(large, {}, false) == (moved == 5 ? Cause::kWithInstance : Cause::kOccupied));
-  }
 }
 
 TEST_CASE("the samples of all scans of a track count") {

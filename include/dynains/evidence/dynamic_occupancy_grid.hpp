@@ -78,10 +78,8 @@ class DynamicOccupancyGrid {
   };
 
   static constexpr std::size_t kLines = 1U << 15;
-  static constexpr std::uint16_t kMaxCount = 1000;   // total at which both counts are halved
-  static constexpr std::uint16_t kLeastDynamic = 3;  // dynamic samples of a dynamic cell
-  // A supervoxel is dynamic if one of kSamplesPerDynamic samples lies in dynamic cells.
-  static constexpr std::uint32_t kSamplesPerDynamic = 4;
+  static constexpr std::uint16_t kMaxCount = 1000;      // total at which both counts are halved
+  static constexpr std::uint16_t kLeastDynamic = 3;     // dynamic samples of a dynamic cell
   static constexpr std::size_t kPrefetchDistance = 32;  // samples
 
   // Presumed instances count as static: they have no evidence of motion.
@@ -146,18 +144,14 @@ class DynamicOccupancyGrid {
                         Verdict& verdict) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
-    std::uint32_t inside = 0;
     float highest = 0.0F;
     for (std::uint32_t i = begin; i < end; ++i) {
       if (!may_be_dynamic_[line_of(keys_[i])]) continue;
       const Cell* const cell = find(keys_[i], now);
       if (cell == nullptr || cell->dynamic_count < kLeastDynamic) continue;
-      const float ratio = dynamic_ratio(*cell);
-      if (!(ratio > ratio_)) continue;
-      ++inside;
-      highest = std::max(highest, ratio);
+      highest = std::max(highest, dynamic_ratio(*cell));
     }
-    if (inside == 0 || kSamplesPerDynamic * inside < end - begin) return;
+    if (!(highest > ratio_)) return;
     verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
   }
 

@@ -24,7 +24,6 @@ struct FreeSpaceConfig {
   double tau_free = 0.65;        ///< form of Eq. 19
   double tau_contested = 0.9;    ///< form of Eq. 19
   double removal_ratio = 0.22;
-  double large_removal_ratio = 0.5;
   double footprint = 0.3;         ///< m
   double footprint_rise = 0.025;  ///< m
   double track_cell = 1.2;        ///< m
@@ -101,8 +100,6 @@ struct FreeSpaceConfig {
     visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
                       "ratio of free to decided samples along its track from which the whole "
                       "instance is removed"});
-    visitor(Parameter{"large_removal_ratio", self.large_removal_ratio, half_open_below(0, 1), "",
-                      "removal_ratio of instances beyond track_length or track_height"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
                       "ground at a smaller distance from removed points is removed"});
     visitor(Parameter{

@@ -240,7 +240,6 @@ class FreeSpaceEvidence {
                     evidence.tracked);
     if (scan > epoch_begin_) linker_.link(record_of(scan - 1).evidence.tracked, evidence.tracked);
     for (std::size_t i = 0; i < predecessors_.size(); ++i) {
-      evidence.beliefs.merged[i] = evidence.tracked.shapes[i].carried ? 0 : 1;
       predecessors_[i] = evidence.tracked.instances[i].past.instance;
     }
   }

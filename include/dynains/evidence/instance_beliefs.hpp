@@ -120,8 +120,6 @@ struct InstanceBeliefs {
   std::vector<Belief> supervoxels;
   std::vector<Counts> counts;  ///< by instance
   InstanceViews views;
-  std::vector<std::uint8_t>
-      merged;  ///< by instance: 1 if larger than one object; the caller sets it
 };
 
 /// Updates beliefs by the visibility of samples from reference scans, and evaluates them.
@@ -142,7 +140,6 @@ class InstanceBeliefUpdater {
   void begin(const InstanceSamples& samples, InstanceBeliefs& out) const {
     const std::size_t instances = samples.instance_count();
     out.supervoxels.assign(samples.supervoxel_count(), Belief());
-    out.merged.assign(instances, 0);
     out.counts.resize(instances);
     for (std::size_t instance = 0; instance < instances; ++instance) {
       out.counts[instance] = {samples.count(instance), 0, 0};
@@ -220,7 +217,7 @@ class InstanceBeliefUpdater {
     const float least = kLeastVisible * static_cast<float>(beliefs.counts[instance].total);
     const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
     const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
-    const float weight = is_hit && beliefs.merged[instance] == 0 ? kPartWeight : 1.0F;
+    const float weight = is_hit ? kPartWeight : 1.0F;
     if (beliefs.views.is_other_side(instance, reference)) {
       return beliefs.views.contradicts(instance) ? 0.0F : weight;
     }
@@ -231,9 +228,8 @@ class InstanceBeliefUpdater {
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
   // limits of FreeSpaceSum. `weight`: of free samples. Those of a reference that mostly hits an
-  // instance, or sees little of it, may lie at an edge of a standing object, if the instance is not
-  // larger than one object: they count half, and later hits take them back. A single hit sets
-  // `contested`, but does not count in `hits`.
+  // instance, or sees little of it, may lie at an edge of a standing object: they count half, and
+  // later hits take them back. A single hit sets `contested`, but does not count in `hits`.
   void update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);

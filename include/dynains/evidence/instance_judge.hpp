@@ -64,8 +64,7 @@ class InstanceJudge {
 
   explicit InstanceJudge(const FreeSpaceConfig& config)
       : presume_dynamic_(config.presume_dynamic),
-        removal_ratio_(static_cast<float>(config.removal_ratio)),
-        large_removal_ratio_(static_cast<float>(config.large_removal_ratio)) {}
+        removal_ratio_(static_cast<float>(config.removal_ratio)) {}
 
   /// Writes one verdict per supervoxel. `may_presume`: for provisional verdicts; allows kPresumed.
   void judge(const InstanceEvidence& evidence, const InstanceBeliefUpdater& updater,
@@ -132,13 +131,11 @@ class InstanceJudge {
   // track are free, in this scan or in others.
   Cause cause_of_whole(const InstanceEvidence& evidence, bool may_presume,
                        std::size_t instance) const {
-    const bool carried = evidence.tracked.shapes[instance].carried;
-    if (moved_ratio(evidence, instance) >= (carried ? removal_ratio_ : large_removal_ratio_)) {
+    if (moved_ratio(evidence, instance) >= removal_ratio_) {
       return evidence.beliefs.counts[instance].moved > 0 ? Cause::kWithInstance
                                                          : Cause::kAlongTrack;
     }
-    return carried && may_presume && is_presumed(evidence, instance) ? Cause::kPresumed
-                                                                     : Cause::kNoEvidence;
+    return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
   }
 
   // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
@@ -146,7 +143,7 @@ class InstanceJudge {
   bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
     constexpr std::uint32_t kLeastSamples = 5;
     constexpr float kMaxDecided = 0.1F;  // ratio to all samples
-    if (!presume_dynamic_) return false;
+    if (!presume_dynamic_ || !evidence.tracked.shapes[instance].carried) return false;
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
     return counts.total >= kLeastSamples &&
            static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);
@@ -159,7 +156,6 @@ class InstanceJudge {
 
   bool presume_dynamic_;
   float removal_ratio_;
-  float large_removal_ratio_;
   SupervoxelGroups groups_;
   std::vector<std::uint32_t> free_;  // free supervoxels of the current instance
 };
