@@ -164,8 +164,7 @@ TEST_CASE("the grid equals a slow reference count") {
         continue;
       }
       const Counts& counts = cells[cell_of(s)];
-      const bool expected =
-          counts.moved >= 3 && 10 * counts.moved > 6 * (counts.moved + counts.stayed);
+      const bool expected = 10 * counts.moved > 6 * (counts.moved + counts.stayed);
       REQUIRE((one.verdicts[s].cause == Cause::kDynamicOccupancy) == expected);
       ++(expected ? in_grid : stay);
     }

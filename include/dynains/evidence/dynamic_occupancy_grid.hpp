@@ -79,7 +79,6 @@ class DynamicOccupancyGrid {
 
   static constexpr std::size_t kLines = 1U << 15;
   static constexpr std::uint16_t kMaxCount = 1000;      // total at which both counts are halved
-  static constexpr std::uint16_t kLeastDynamic = 3;     // dynamic samples of a dynamic cell
   static constexpr std::size_t kPrefetchDistance = 32;  // samples
 
   // Presumed instances count as static: they have no evidence of motion.
@@ -112,7 +111,7 @@ class DynamicOccupancyGrid {
     oldest = {key, now, 0, 0};
     const bool may_be_dynamic =
         std::any_of(line.cells.begin(), line.cells.end(),
-                    [](const Cell& cell) { return cell.dynamic_count >= kLeastDynamic; });
+                    [](const Cell& cell) { return cell.dynamic_count > 0; });
     may_be_dynamic_[line_of(key)] = may_be_dynamic;
     return oldest;
   }
@@ -129,7 +128,7 @@ class DynamicOccupancyGrid {
     if (before == Count::kStatic && cell.static_count > 0) --cell.static_count;
     if (count == Count::kDynamic) ++cell.dynamic_count;
     if (count == Count::kStatic) ++cell.static_count;
-    if (cell.dynamic_count >= kLeastDynamic) may_be_dynamic_[line_of(key)] = true;
+    if (cell.dynamic_count > 0) may_be_dynamic_[line_of(key)] = true;
     if (cell.dynamic_count + cell.static_count < kMaxCount) return;
     cell.dynamic_count /= 2;
     cell.static_count /= 2;
@@ -137,7 +136,7 @@ class DynamicOccupancyGrid {
 
   static float dynamic_ratio(const Cell& cell) {
     return static_cast<float>(cell.dynamic_count) /
-           static_cast<float>(cell.dynamic_count + cell.static_count);
+           static_cast<float>(std::max(cell.dynamic_count + cell.static_count, 1));
   }
 
   void judge_supervoxel(const InstanceSamples& samples, std::size_t s, std::uint32_t now,
@@ -148,8 +147,7 @@ class DynamicOccupancyGrid {
     for (std::uint32_t i = begin; i < end; ++i) {
       if (!may_be_dynamic_[line_of(keys_[i])]) continue;
       const Cell* const cell = find(keys_[i], now);
-      if (cell == nullptr || cell->dynamic_count < kLeastDynamic) continue;
-      highest = std::max(highest, dynamic_ratio(*cell));
+      if (cell != nullptr) highest = std::max(highest, dynamic_ratio(*cell));
     }
     if (!(highest > ratio_)) return;
     verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
