@@ -116,7 +116,6 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       }
       const EvidenceVerdict evidence = {groups, first_cluster, group_of, {}};
       const ScanVerdict verdict = writer.write(scan, evidence);
-      writer.write_flags(scan, evidence);
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = order[ground + i];
         const bool dynamic = expected[i].votes >= votes;
@@ -215,10 +214,9 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         if (random.index(5) == 0) moved.push_back({i, {Cause::kUnderInstance, 0.75F}});
       }
     };
-    const auto check = [&](bool is_final) {
+    const auto check = [&] {
       const EvidenceVerdict evidence = {groups, scan.cluster_of, scan.group_of, moved};
       const ScanVerdict verdict = writer.write(slot, evidence);
-      if (is_final) writer.write_flags(slot, evidence);
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = scan.order[scan.ground + i];
         const std::uint32_t group = scan.group_of[i];
@@ -229,7 +227,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         REQUIRE(verdict.causes[to] == expected.cause);
         REQUIRE(verdict.beliefs[to] == expected.belief);
         REQUIRE(verdict.instances[to] == (cluster == kNoCluster ? kNoInstance : 100 + cluster));
-        if (is_final) REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
+        REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
       }
       for (std::uint32_t i = 0; i < scan.ground; ++i) {
         const std::uint32_t to = scan.order[i];
@@ -239,7 +237,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         REQUIRE(verdict.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
         REQUIRE(verdict.beliefs[to] == (dynamic ? 0.75F : 0.0F));
         REQUIRE(verdict.instances[to] == kNoInstance);
-        if (is_final) REQUIRE(writer.is_kept()[i] == (dynamic ? 0 : 1));
+        REQUIRE(writer.is_kept()[i] == (dynamic ? 0 : 1));
       }
       std::size_t outside = 0;
       for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
@@ -253,10 +251,10 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     };
 
     change();
-    check(false);
+    check();
     for (int again = 0; again < 2; ++again) {
       change();
-      check(true);
+      check();
     }
   }
 }

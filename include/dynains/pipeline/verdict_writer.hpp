@@ -21,7 +21,7 @@ constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::
 /// open scans need no arrays of their own.
 class VerdictWriter {
  public:
-  /// Keep flags of the last write_flags(), by point of the split (ground first): 1 if static.
+  /// Keep flags of the last write(), by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
   /// Writes the verdict on a scan, which is valid until the next call.
@@ -54,14 +54,16 @@ class VerdictWriter {
     for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
       group_of[input[i]] = kFirstGroup + evidence.group_of[i];
     }
-    expand_groups(count);
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
-      write(input_[ground.point], Group(ground.verdict));
+      group_of[input_[ground.point]] = static_cast<std::uint32_t>(groups_.size());
+      groups_.emplace_back(ground.verdict);
     }
+    expand_groups(count);
+    write_flags(scan, evidence);
     return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
   }
 
-  /// Writes the keep flags of the verdict of the last write().
+ private:
   void write_flags(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     is_kept_.assign(scan.split.count, 1);
     const std::uint32_t* const group_of = evidence.group_of.data();
@@ -73,7 +75,6 @@ class VerdictWriter {
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) is_kept_[ground.point] = 0;
   }
 
- private:
   // Verdict on the points of a group.
   struct Group {
     Group() = default;
@@ -90,12 +91,6 @@ class VerdictWriter {
   };
 
   static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
-
-  void write(std::size_t input, const Group& group) {
-    beliefs_[input] = group.belief;
-    causes_[input] = group.cause;
-    labels_[input] = group.label;
-  }
 
   void expand_groups(std::size_t count) {
     // Local copies of members avoid reloads after byte stores, which could alias them.
