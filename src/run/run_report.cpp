@@ -40,8 +40,8 @@ nlohmann::ordered_json pose_residual_to_json(const RunTiming& timing) {
   std::vector<double> metres, degrees;
   for (const TimingRow& row : timing.rows) {
     if (!row.pose_residual) continue;
-    metres.push_back(row.pose_residual->translation);
-    degrees.push_back(row.pose_residual->rotation);
+    metres.push_back(row.pose_residual->first);
+    degrees.push_back(row.pose_residual->second);
   }
   if (metres.empty()) return nullptr;
   return {{"metres", to_json(std::move(metres))}, {"degrees", to_json(std::move(degrees))}};
@@ -127,9 +127,9 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
     out << evaluation::csv_field(row.scan) << ',' << row.points;
     StageTimes::visit(row.stages, [&](const char*, double ms) { out << ',' << ms; });
     out << ',' << row.total << ',';
-    if (row.pose_residual) out << row.pose_residual->translation;
+    if (row.pose_residual) out << row.pose_residual->first;
     out << ',';
-    if (row.pose_residual) out << row.pose_residual->rotation;
+    if (row.pose_residual) out << row.pose_residual->second;
     out << ',' << std::setprecision(9) << row.time << std::setprecision(4) << '\n';
   }
   file.commit();

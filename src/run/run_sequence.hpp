@@ -57,8 +57,9 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
     const Clock::time_point begin = Clock::now();
     const FrameResult frame = push_scan(remover, recording, i, scan);
     timing.rows.push_back({recording.name(i), scan.size(), frame.times, ms_since(begin),
-                           frame.pose_residual, frame.began_epoch, frame.plausibility,
-                           recording.time(i)});
+                           frame.began_epoch, frame.plausibility, recording.time(i)});
+    if (const auto& residual = frame.pose_residual)
+      timing.rows.back().pose_residual.emplace(residual->translation, residual->rotation);
     results.take_newest(frame);
     if (frame.finished) take_final(*frame.finished);
     if (!keep_going(timing.rows.size())) break;

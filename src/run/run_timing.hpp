@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/verdict.hpp"
@@ -15,10 +16,10 @@ struct TimingRow {
   std::size_t points = 0;
   StageTimes stages;
   double total = 0.0;  ///< ms in the pipeline, reading and writing of files apart
-  std::optional<PoseResidual> pose_residual;
   std::optional<EpochReason> began_epoch = std::nullopt;
   Plausibility plausibility = {};
-  double time = 0.0;  ///< s, of the scan
+  double time = 0.0;                                            ///< s, of the scan
+  std::optional<std::pair<double, double>> pose_residual = {};  ///< m and deg
 };
 
 struct RunTiming {
