@@ -82,8 +82,7 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
                                                                     unsigned) {
     const PointLabel label = verdict.labels[i];
     const bool is_removed = label == PointLabel::kDynamic;
-    // Ground that left with the instance above it stays removed: it holds wheels and undersides.
-    if (is_removed ? verdict.causes[i] == Cause::kUnderInstance : !is_static(label)) return;
+    if (!is_removed && !is_static(label)) return;
     const VoxelKey cell = cell_of();
     if (cell != cell_of_place) place = places_.changed(cell);
     cell_of_place = cell;
@@ -99,7 +98,7 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
     }
   };
   for_each_in_cells(points, T_level_sensor, revise_point);
-  if (revised.removed > 0) revised.removed += remove_instances(verdict);
+  if (revised.removed > 0) revised.removed += remove_instances(points, scans_[number], verdict);
   return revised;
 }
 
@@ -111,10 +110,13 @@ bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and
-// no look passed it.
+// no look passed it. Ground that left with the instance above it stays removed: it holds wheels and
+// undersides.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m
+  const Cause cause = verdict.causes[i];
+  if (cause == Cause::kUnderInstance) return false;
   const auto is_ground = [&] {
     const std::optional<double> rise = places_.rise(point);
     return rise && *rise <= kMostRise && places_.is_level(point);
@@ -122,7 +124,7 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;
     verdict.causes[i] = Cause::kStands;
-  } else if (verdict.causes[i] != Cause::kFreeSpace && is_ground()) {
+  } else if (cause != Cause::kFreeSpace && is_ground()) {
     verdict.labels[i] = PointLabel::kGround;
     verdict.causes[i] = Cause::kGround;
     verdict.instances[i] = kNoInstance;
@@ -133,21 +135,32 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
   return true;
 }
 
-// Removes the instances of a scan of which at least half of the points have left. Returns the
-// number of points.
-std::uint64_t Visit::remove_instances(VerdictArrays& verdict) {
+// Removes the rest of the instances of a scan of which at least half of the points have left. What
+// the first pass kept while looks passed the others is another object. Returns the number of
+// points.
+std::uint64_t Visit::remove_instances(PointsView points, const Scan& scan, VerdictArrays& verdict) {
+  const auto cell_of = [&](std::size_t i) {
+    return cell_at(world_point(points, i, scan.T_level_sensor));
+  };
   std::uint64_t removed = 0;
-  majority_.assign(1 + *std::max_element(verdict.instances.begin(), verdict.instances.end()), 0);
+  leaving_.assign(1 + *std::max_element(verdict.instances.begin(), verdict.instances.end()), {});
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     const bool has_left = verdict.causes[i] == Cause::kCameOrWent;
     const bool stays = verdict.labels[i] == PointLabel::kStatic;
-    majority_[verdict.instances[i]] += (has_left ? 1 : 0) - (stays ? 1 : 0);
+    Leaving& instance = leaving_[verdict.instances[i]];
+    instance.majority += (has_left ? 1 : 0) - (stays ? 1 : 0);
+    const ChangedPlace* const place = has_left ? places_.changed(cell_of(i)) : nullptr;
+    if (place == nullptr) continue;
+    instance.first = std::min(instance.first, place->passed_first);
+    instance.last = std::max(instance.last, place->passed_last);
   }
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     const bool may_leave = verdict.labels[i] == PointLabel::kStatic &&
                            verdict.causes[i] != Cause::kStands &&
                            verdict.instances[i] != kNoInstance;
-    if (!may_leave || majority_[verdict.instances[i]] < 0) continue;
+    const Leaving& instance = leaving_[verdict.instances[i]];
+    if (!may_leave || instance.majority < 0) continue;
+    if (places_.any_kept(cell_of(i), instance.first, instance.last)) continue;
     remove(i, verdict);
     ++removed;
   }

@@ -16,6 +16,7 @@ using namespace dynains::test;
 namespace {
 
 constexpr std::uint32_t kHouse = 50, kTree = 70, kCar = 10, kFlat = 1, kHigh = 2;
+constexpr std::uint32_t kCarBeside = 1U << 16U | kCar;
 
 StreetBox car_at(double x, double y = 4.0) { return {{x, y, 0.0}, {x + 4.0, y + 1.8, 1.5}, kCar}; }
 
@@ -42,7 +43,7 @@ using Removes = std::function<Cause(std::size_t scan, std::uint32_t label)>;
 
 Cause removes_nothing(std::size_t, std::uint32_t) { return Cause::kUnknown; }
 
-/// Verdicts that call everything static but what `removes` tells; the boxes of one label are one
+/// Verdicts that call everything static but what `removes` tells; the boxes of one class are one
 /// instance.
 VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Removes& removes) {
   VerdictArrays verdict;
@@ -50,7 +51,7 @@ VerdictArrays first_verdict(const BoxScan& scan, std::size_t number, const Remov
     const bool is_ground = scan.verdicts[i] == PointLabel::kGround;
     verdict.labels.push_back(scan.verdicts[i]);
     verdict.causes.push_back(is_ground ? Cause::kGround : Cause::kOccupied);
-    verdict.instances.push_back(is_ground ? kNoInstance : scan.labels[i]);
+    verdict.instances.push_back(is_ground ? kNoInstance : scan.labels[i] & 0xFFFFU);
     verdict.beliefs.push_back(0.5F);
     const Cause removal = removes(number, scan.labels[i]);
     if (removal == Cause::kUnknown) continue;
@@ -194,6 +195,19 @@ TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
     CHECK(all.kept > 0);
     CHECK(all.removed == 0);
   }
+}
+
+TEST_CASE("a car beside one that leaves stays, though the first pass took both for one") {
+  std::vector<StreetBox> boxes = street();
+  boxes.push_back({{9, 4, 0}, {10, 5.8, 1.5}, kCarBeside});
+  Recorded recording;
+  recording.drive(boxes, 15.0, -15.0);
+  boxes.push_back(car_at(4.0));
+  recording.drive(boxes, -15.0, 15.0);
+  const Counts leaves = sum(count(recording, kCar)), stays = sum(count(recording, kCarBeside));
+  CHECK(leaves.removed > 9 * leaves.kept);
+  CHECK(stays.kept > 1000);
+  CHECK(stays.removed == 0);
 }
 
 TEST_CASE("a car that parks and stays is static if what stands at last is, and since it stands") {
