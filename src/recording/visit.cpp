@@ -93,12 +93,13 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
     if (is_removed) {
       revised.restored += restore(i, stands, point, verdict) ? 1 : 0;
     } else if (!stands && belongs_to_object(label, point)) {
-      remove(i, verdict);
+      verdict.labels[i] = PointLabel::kDynamic;
+      verdict.causes[i] = Cause::kCameOrWent;
+      if (!verdict.beliefs.empty()) verdict.beliefs[i] = std::max(verdict.beliefs[i], kBelief);
       ++revised.removed;
     }
   };
   for_each_in_cells(points, T_level_sensor, revise_point);
-  if (revised.removed > 0) revised.removed += remove_instances(points, scans_[number], verdict);
   return revised;
 }
 
@@ -133,46 +134,6 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
   }
   if (!verdict.beliefs.empty()) verdict.beliefs[i] = 0.0F;
   return true;
-}
-
-// Removes the rest of the instances of a scan of which at least half of the points have left. What
-// the first pass kept while looks passed the others is another object. Returns the number of
-// points.
-std::uint64_t Visit::remove_instances(PointsView points, const Scan& scan, VerdictArrays& verdict) {
-  const auto cell_of = [&](std::size_t i) {
-    return cell_at(world_point(points, i, scan.T_level_sensor));
-  };
-  std::uint64_t removed = 0;
-  leaving_.assign(1 + *std::max_element(verdict.instances.begin(), verdict.instances.end()), {});
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    const bool has_left = verdict.causes[i] == Cause::kCameOrWent;
-    const bool stays = verdict.labels[i] == PointLabel::kStatic;
-    Leaving& instance = leaving_[verdict.instances[i]];
-    instance.majority += (has_left ? 1 : 0) - (stays ? 1 : 0);
-    const ChangedPlace* const place = has_left ? places_.changed(cell_of(i)) : nullptr;
-    if (place == nullptr) continue;
-    instance.first = std::min(instance.first, place->passed_first);
-    instance.last = std::max(instance.last, place->passed_last);
-  }
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    const bool may_leave = verdict.labels[i] == PointLabel::kStatic &&
-                           verdict.causes[i] != Cause::kStands &&
-                           verdict.instances[i] != kNoInstance;
-    const Leaving& instance = leaving_[verdict.instances[i]];
-    if (!may_leave || instance.majority < 0) continue;
-    if (places_.any_kept(cell_of(i), instance.first, instance.last)) continue;
-    remove(i, verdict);
-    ++removed;
-  }
-  return removed;
-}
-
-void Visit::remove(std::size_t point, VerdictArrays& verdict) {
-  verdict.labels[point] = PointLabel::kDynamic;
-  verdict.causes[point] = Cause::kCameOrWent;
-  if (!verdict.beliefs.empty()) {
-    verdict.beliefs[point] = std::max(verdict.beliefs[point], kBelief);
-  }
 }
 
 }  // namespace dynains

@@ -139,9 +139,8 @@ struct alignas(64) RecordingPlace {
 
 /// A place of an object that came or went.
 struct ChangedPlace {
-  bool removed_last = false;                        ///< the last epoch of first verdicts removed it
-  std::uint16_t last_free = 0;                      ///< last epoch whose look passed it
-  std::uint16_t passed_first = 0, passed_last = 0;  ///< epochs of the longest row of free looks
+  bool removed_last = false;    ///< the last epoch of first verdicts removed its points
+  std::uint16_t last_free = 0;  ///< last epoch whose look passed it
 
   /// Whether what an epoch measured in it is there in the end of the recording: no later look
   /// passed it.
@@ -330,20 +329,14 @@ class RecordingPlaces {
             return;
           for (const std::uint32_t member : members) {
             const Place& place = found.values[member];
-            changed_.values[changed_.add(found.keys[member])] = {
-                place.first.removed_last, place.last_free, place.passed_first, place.passed_last};
+            changed_.values[changed_.add(found.keys[member])] = {place.first.removed_last,
+                                                                 place.last_free};
           }
         });
   }
 
   /// The changed place in a cell, after decide(); null: nothing has changed.
   const ChangedPlace* changed(VoxelKey cell) const { return changed_.find(cell); }
-
-  /// Whether the first pass kept points in a cell in the epochs `first` to `last`.
-  bool any_kept(VoxelKey cell, std::uint16_t first, std::uint16_t last) {
-    const Place* const place = find(cell);
-    return place != nullptr && place->kept.any_within(first, last);
-  }
 
   std::size_t size() const { return tiles_.size(); }
   /// Puts all places into the store.

@@ -35,10 +35,8 @@ struct RevisedPoints {
 };
 
 /// Scans whose poses fit to each other. All of them test the places of their points above the
-/// ground. What came or went is removed (see RecordingPlaces), and the ground comes back. An
-/// instance of the first pass leaves a scan if half of its points leave, but for places where the
-/// first pass kept points while looks passed the others. Scans of the visit are numbered from 0.
-/// Functions throw what the store throws.
+/// ground. What came or went is removed (see RecordingPlaces), and the ground comes back. Scans of
+/// the visit are numbered from 0. Functions throw what the store throws.
 class Visit {
  public:
   /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
@@ -66,10 +64,6 @@ class Visit {
     Pose T_level_sensor;  // as it was compared
     std::uint16_t epoch;
   };
-  struct Leaving {
-    std::int32_t majority = 0;                   // points that left, less those that stay
-    std::uint16_t first = UINT16_MAX, last = 0;  // epochs in which looks passed their places
-  };
   struct Reference {
     std::uint32_t scan;
     std::uint64_t offset;  // in the store
@@ -79,8 +73,6 @@ class Visit {
   void read(const Reference& kept, RecordingReference& reference);
   bool belongs_to_object(PointLabel label, const Eigen::Vector3d& point);
   bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
-  std::uint64_t remove_instances(PointsView points, const Scan& scan, VerdictArrays& verdict);
-  void remove(std::size_t point, VerdictArrays& verdict);
 
   SecondPassConfig config_;
   ByteStore& store_;
@@ -93,7 +85,6 @@ class Visit {
   bool is_suspicious_ = false;
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
-  std::vector<Leaving> leaving_;  // by instance
 };
 
 }  // namespace dynains
