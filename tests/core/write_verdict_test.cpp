@@ -116,6 +116,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       }
       const EvidenceVerdict evidence = {groups, first_cluster, group_of, {}};
       const ScanVerdict verdict = writer.write(scan, evidence);
+      writer.write_flags(scan, evidence);
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = order[ground + i];
         const bool dynamic = expected[i].votes >= votes;
@@ -217,6 +218,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
     const auto check = [&] {
       const EvidenceVerdict evidence = {groups, scan.cluster_of, scan.group_of, moved};
       const ScanVerdict verdict = writer.write(slot, evidence);
+      writer.write_flags(slot, evidence);
       for (std::size_t i = 0; i < above; ++i) {
         const std::uint32_t to = scan.order[scan.ground + i];
         const std::uint32_t group = scan.group_of[i];

@@ -245,8 +245,11 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     const ScanSlot& scan = scans_.finish_oldest();
     timed(times.judge, [&] { decision_->judge(scan, true); });
     ScanVerdict verdict;
-    timed(times.verdict,
-          [&] { verdict = final_writer_.write(scan, decision_->verdict(scan, true)); });
+    timed(times.verdict, [&] {
+      const EvidenceVerdict evidence = decision_->verdict(scan, true);
+      verdict = final_writer_.write(scan, evidence);
+      if (build_map_) final_writer_.write_flags(scan, evidence);
+    });
     if (build_map_) {
       const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
       timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });

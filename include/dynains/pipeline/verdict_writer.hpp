@@ -21,7 +21,7 @@ constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::
 /// open scans need no arrays of their own.
 class VerdictWriter {
  public:
-  /// Keep flags of the last write(), by point of the split (ground first): 1 if static.
+  /// Keep flags of the last write_flags(), by point of the split (ground first): 1 if static.
   Span<const std::uint8_t> is_kept() const { return is_kept_; }
 
   /// Writes the verdict on a scan, which is valid until the next call.
@@ -59,11 +59,10 @@ class VerdictWriter {
       groups_.emplace_back(ground.verdict);
     }
     expand_groups(count);
-    write_flags(scan, evidence);
     return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
   }
 
- private:
+  /// Writes the keep flags of the verdict of the last write().
   void write_flags(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     is_kept_.assign(scan.split.count, 1);
     const std::uint32_t* const group_of = evidence.group_of.data();
@@ -75,6 +74,7 @@ class VerdictWriter {
     for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) is_kept_[ground.point] = 0;
   }
 
+ private:
   // Verdict on the points of a group.
   struct Group {
     Group() = default;
