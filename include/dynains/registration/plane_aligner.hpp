@@ -452,10 +452,7 @@ class PlaneAligner {
       const auto add_to = [&](std::size_t group) {
         groups_[group].add(derivatives, match.distance, weight);
       };
-      // Each sector is in two pairs, so that no object is divided.
-      const std::size_t sector = sector_of(points.x[i], points.y[i]);
-      add_to(sector);
-      add_to((sector + 1) % kSectors);
+      add_to(sector_of(points.x[i], points.y[i]));
       if (!is_exact) return;
       add_to(kSectors + band_of(points.x[i], points.y[i], points.z[i]));
       if (selected.is_on_object(i)) add_to(kSectors + kBands);
@@ -466,9 +463,11 @@ class PlaneAligner {
     }
     const Vector all = equations.solve();
     for (std::size_t group = 0; group < groups_.size(); ++group) {
-      if (groups_[group].empty()) continue;
+      if (group >= kSectors && groups_[group].empty()) continue;
       Equations others = equations;
       others -= groups_[group];
+      // Each sector is in two pairs, so that no object is divided.
+      if (group < kSectors) others -= groups_[(group + 1) % kSectors];
       Vector change = others.solve();
       for (std::size_t i = 0; i < 6; ++i) change[i] -= all[i];
       const double weight = group < kSectors ? 0.5 : 1.0;

@@ -24,14 +24,13 @@ using SensorErrors = std::array<std::array<float, 3>, kSensorErrors>;
 inline SensorErrors sensor_errors(const Pose& T_map_sensor, double x, double y, double z) {
   const double distance = std::sqrt(x * x + y * y);
   const double along = distance > 0.0 ? -z / distance : 0.0;
-  const double moved[kSensorErrors][3] = {
-      {along * x, along * y, distance}, {0.0, -z, y}, {z, 0.0, -x}};
   SensorErrors errors;
-  for (std::size_t k = 0; k < kSensorErrors; ++k) {
-    for (int axis = 0; axis < 3; ++axis) {
-      errors[k][static_cast<std::size_t>(axis)] = static_cast<float>(
-          T_map_sensor(axis, 0) * moved[k][0] + T_map_sensor(axis, 1) * moved[k][1] +
-          T_map_sensor(axis, 2) * moved[k][2]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double R[3] = {T_map_sensor(axis, 0), T_map_sensor(axis, 1), T_map_sensor(axis, 2)};
+    const double moved[kSensorErrors] = {R[0] * (along * x) + R[1] * (along * y) + R[2] * distance,
+                                         R[2] * y - R[1] * z, R[0] * z - R[2] * x};
+    for (std::size_t k = 0; k < kSensorErrors; ++k) {
+      errors[k][static_cast<std::size_t>(axis)] = static_cast<float>(moved[k]);
     }
   }
   return errors;
