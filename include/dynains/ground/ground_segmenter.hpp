@@ -288,13 +288,13 @@ class GroundSegmenter {
     constexpr std::size_t kRun = 8;
     const auto most = static_cast<std::size_t>(config_.ground_fit_points);
     if (points.size() <= most) return points;
-    sample_.clear();
     const std::size_t runs = most / kRun;
+    sample_.resize(runs * kRun);
     for (std::size_t run = 0; run < runs; ++run) {
       const std::size_t begin = run * points.size() / runs;
-      for (std::size_t i = begin; i < begin + kRun; ++i) {
-        sample_.push_back(points.x[i], points.y[i], points.z[i]);
-      }
+      std::copy_n(points.x.data() + begin, kRun, sample_.x.data() + run * kRun);
+      std::copy_n(points.y.data() + begin, kRun, sample_.y.data() + run * kRun);
+      std::copy_n(points.z.data() + begin, kRun, sample_.z.data() + run * kRun);
     }
     return sample_;
   }
