@@ -71,7 +71,7 @@ struct FreeSpaceConfig {
                       "points at a larger horizontal range are not tested"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
                       "edge of the supervoxels, whose samples share a belief"});
-    visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 64), "",
+    visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 56), "",
                       "maximum number of samples of a supervoxel"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
                       "edge of the voxels that have one ground sample each"});

@@ -198,11 +198,11 @@ class InstanceBeliefUpdater {
                          std::uint32_t s, float weight, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t size = samples.sample_begin[s + 1] - begin;
-    const Visibility::Count visible = visibility.count(begin, begin + size);
+    const Visibility::Bits visible = visibility.bits(begin, begin + size);
     Belief& belief = beliefs.supervoxels[s];
     if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
     const Counts before = counts_of(belief, size);
-    update(belief, visible, size, weight);
+    update(belief, {count_ones(visible.free), count_ones(visible.hit)}, size, weight);
     Counts& counts = beliefs.counts[samples.instance_of[s]];
     const Counts now = counts_of(belief, size);
     counts.moved += now.moved - before.moved;

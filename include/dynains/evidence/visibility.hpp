@@ -38,31 +38,33 @@ class Visibility {
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
-  struct Count {
-    std::uint32_t free;
-    std::uint32_t hit;
-  };
-  /// Numbers of free and hit samples in [begin, end).
-  Count count(std::size_t begin, std::size_t end) const {
-    // A word that begins with the byte of a bit contains at least 56 bits from this bit on.
-    constexpr std::size_t kAtOnce = 56;
-    Count sum = {0, 0};
-    const auto add = [&](const Bits& some) {
-      sum.free += count_ones(some.free);
-      sum.hit += count_ones(some.hit);
-    };
-    for (; end - begin > kAtOnce; begin += kAtOnce) add(bits(begin, begin + kAtOnce));
-    add(bits(begin, end));
-    return sum;
-  }
+  /// Most samples of bits(): a word that begins with the byte of a bit contains at least as many
+  /// bits from this bit on.
+  static constexpr std::size_t kMostBits = 56;
   struct Bits {
     std::uint64_t free;
     std::uint64_t hit;
   };
-  /// Bits of the samples in [begin, end), at most 56; the lowest one is that of sample `begin`.
+  /// Bits of the samples in [begin, end), at most kMostBits; the lowest one is that of sample
+  /// `begin`.
   Bits bits(std::size_t begin, std::size_t end) const {
     const std::uint64_t all = (std::uint64_t{1} << (end - begin)) - 1;
     return {word_from(free_, begin) & all, word_from(hit_, begin) & all};
+  }
+
+  struct Count {
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+  };
+  /// Numbers of free and hit samples in [begin, end).
+  Count count(std::size_t begin, std::size_t end) const {
+    Count sum;
+    for (; begin < end; begin += kMostBits) {
+      const Bits some = bits(begin, std::min(begin + kMostBits, end));
+      sum.free += count_ones(some.free);
+      sum.hit += count_ones(some.hit);
+    }
+    return sum;
   }
   /// For each of the first `count` samples, increments its number of "free" references in `free`
   /// and its number of "hit" references in `hit`; the results must be below 256. The sizes of both
