@@ -131,7 +131,7 @@ class Odometry::Loop {
       if (turn == 0 && (!best || best->score < kLeastScore)) {
         best = register_scans(map_, points, turned(T_predicted));
       }
-      if (first_ && turn == 0 && best) search_first_motion(*best);
+      if (first_ && turn == 0 && best) search_first_motion(*best, period);
       result.fit = best ? best->score : 0.0;
       if (result.fit < kLeastScore) return OdometryLoss::kNoOverlap;
       result.free_directions = best->free_directions;
@@ -146,10 +146,10 @@ class Odometry::Loop {
 
   /// Traffic that moves with the sensor fits to it without a motion. Then landmarks tell the way
   /// along the direction that surfaces determine worst.
-  void search_first_motion(Registration& best) {
+  void search_first_motion(Registration& best, double period) {
     const Landmarks first = first_->landmarks(), second = scan_.landmarks();
     const auto found = register_along(map_, scan_.keypoints(), first, second, best.T_a_b,
-                                      best.uncertain[0], kFarthestStep);
+                                      best.uncertain[0], period / 0.1 * kFarthestStep);
     if (found && mean_gap(first, second, found->T_a_b) < mean_gap(first, second, best.T_a_b)) {
       best = *found;
     }

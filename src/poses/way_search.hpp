@@ -14,7 +14,7 @@ namespace dynains {
 /// Range (m) of landmarks for the search: beside a motorway, near ones may be traffic and rails.
 inline constexpr double kWayRange = 80.0;
 
-/// Longest way (m) from one scan to the next.
+/// Longest way (m) from one scan to the next in 0.1 s.
 inline constexpr double kFarthestStep = 6.0;
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.
