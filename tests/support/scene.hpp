@@ -60,12 +60,16 @@ struct Scene {
     Scan result{T_world_sensor, time, {}, {}};
     Random random(1000 + static_cast<std::uint64_t>(time * 1000.0));
     const Eigen::Vector3d origin = T_world_sensor.translation();
+    Eigen::Matrix<double, 2, kBeams> beams;  // cosine and sine of each elevation
+    for (int b = 0; b < kBeams; ++b) {
+      const double elevation = (-24.8 + 36.8 * b / (kBeams - 1)) * kRadians;
+      beams.col(b) << std::cos(elevation), std::sin(elevation);
+    }
     for (int a = 0; a < kAzimuths; ++a) {
       const double azimuth = (a + 0.25) * 0.25 * kRadians;
+      const Eigen::Vector2d ahead(std::cos(azimuth), std::sin(azimuth));
       for (int b = 0; b < kBeams; ++b) {
-        const double elevation = (-24.8 + 36.8 * b / (kBeams - 1)) * kRadians;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const Eigen::Vector3d ray(beams(0, b) * ahead.x(), beams(0, b) * ahead.y(), beams(1, b));
         const Eigen::Vector3d direction = T_world_sensor.linear() * ray;
         int object = kGroundObject;
         double range = direction.z() < 0.0 ? -origin.z() / direction.z() : kNever;
