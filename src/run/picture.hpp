@@ -1,10 +1,12 @@
-// A small colour picture.
+// A picture of few colours.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
+
+#include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains::program {
 
@@ -24,29 +26,29 @@ class Picture {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  /// `x`, `y`: pixels from the upper left corner, within the picture.
+  /// `x`, `y`: pixels from the upper left corner, within the picture. At most 256 colours.
   void set(int x, int y, Colour colour) {
-    std::uint8_t* const bytes = bytes_.data() + index(x, y);
-    bytes[0] = colour.r, bytes[1] = colour.g, bytes[2] = colour.b;
+    const auto number = numbers_.insert(voxel_key(colour.r, colour.g, colour.b));
+    if (number == palette_.size()) palette_.push_back(colour);
+    pixels_[index(x, y)] = static_cast<std::uint8_t>(number);
   }
 
-  Colour at(int x, int y) const {
-    const std::uint8_t* const bytes = bytes_.data() + index(x, y);
-    return {bytes[0], bytes[1], bytes[2]};
-  }
+  Colour at(int x, int y) const { return palette_[pixels_[index(x, y)]]; }
 
   /// Writes a PNG file, whole or not at all. Throws IoError.
   void write_png(const std::filesystem::path& path) const;
 
  private:
   std::size_t index(int x, int y) const {
-    return 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                static_cast<std::size_t>(x));
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
   }
 
   int width_;
   int height_;
-  std::vector<std::uint8_t> bytes_;
+  VoxelHashTable<> numbers_;  // of colours
+  std::vector<Colour> palette_;
+  std::vector<std::uint8_t> pixels_;  // numbers
 };
 
 }  // namespace dynains::program
