@@ -19,18 +19,18 @@ bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::I
                    double step) {
   constexpr std::size_t kFewest = 100;
   constexpr double kNear = 0.1;  // of a step
-  std::size_t count = 0, on_grid = 0;
+  std::size_t count = 0, off_grid = 0;
   double first = 0.0;
-  for (std::size_t i = 0; i < scan.size(); ++i) {
+  for (std::size_t i = 0; i < scan.size() && off_grid * 20 <= scan.size(); ++i) {
     const Eigen::Vector3d p = scan.point(i).position;
     if (!p.allFinite() || p.isZero(0.0)) continue;
     const double place = (T_file_sensor * p)[axis];
     if (count == 0) first = place;
     const double steps = (place - first) / step;
-    on_grid += std::abs(steps - std::round(steps)) < kNear ? 1 : 0;
+    off_grid += std::abs(steps - std::round(steps)) < kNear ? 0 : 1;
     ++count;
   }
-  return count >= kFewest && on_grid * 20 >= count * 19;
+  return count >= kFewest && off_grid * 20 <= count;
 }
 
 /// Upward normals (sensor frame) under which scan i has ground below the sensor, for a sensor that

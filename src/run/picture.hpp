@@ -39,10 +39,7 @@ class Picture {
   void write_png(const std::filesystem::path& path) const;
 
  private:
-  std::size_t index(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-           static_cast<std::size_t>(x);
-  }
+  std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * width_ + x); }
 
   int width_;
   int height_;

@@ -6,12 +6,15 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cloud_remarks.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
+#include "dynains/median.hpp"
 #include "pose_advice.hpp"
+#include "poses/landmarks.hpp"
 
 namespace dynains::program {
 namespace {
@@ -30,29 +33,22 @@ void check_poses(const Recording& recording, bool accepts_poses, StartCheck& res
   }
 }
 
-/// Ranges in the x-y plane of the points with a return.
-void add_ranges(const RecordedScan& scan, std::vector<double>& ranges) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const float* p = scan.xyzi.data() + 4 * i;
-    const double range = std::hypot(p[0], p[1]);
-    if (std::isfinite(range) && std::isfinite(p[2]) && range > 0.0) ranges.push_back(range);
-  }
-}
-
 }  // namespace
 
 void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
                   bool unit_is_given) {
   constexpr double kFarthestReturn = 250.0;  // m, of most points of a LiDAR
-  std::vector<double> ranges;
+  std::vector<float> ranges;                 // in the x-y plane
   for (const std::size_t i : range.sample()) {
-    add_ranges(recording.read_scan(i), ranges);
+    const PointBuffer points = sampled_points(recording.read_scan(i));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      ranges.push_back(std::hypot(points.x[k], points.y[k]));
+    }
   }
   if (ranges.empty()) return;
-  std::sort(ranges.begin(), ranges.end());
   const auto count_within = [&](double most) {
-    return static_cast<double>(std::upper_bound(ranges.begin(), ranges.end(), most) -
-                               ranges.begin());
+    return static_cast<double>(
+        std::count_if(ranges.begin(), ranges.end(), [&](float one) { return one <= most; }));
   };
   const auto count = static_cast<double>(ranges.size());
   const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
@@ -64,7 +60,7 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
       " % of the points can be judged, those from " + number(config.min_range) +
       " m (--min-range) to " + number(config.max_range) +
       " m (--max-range) from the sensor; half of the points are beyond " +
-      number(ranges[ranges.size() / 2]) +
+      number(median(std::move(ranges))) +
       " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units cm; "
       "in "
       "the frame of the world: --frame world; else --point-units m runs unless nothing can be "
