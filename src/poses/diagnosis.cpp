@@ -193,19 +193,22 @@ struct SampledPairs {
 /// Pairs of neighbours if these do not agree without motion, or if the sensor moves or turns so
 /// fast that scans farther apart see other places. Else the stride increases until pairs do not
 /// agree: scans farther apart show more of the motion of a slow sensor.
-SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double extent) {
+SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double extent,
+                          std::size_t most) {
   constexpr std::size_t kStride = 5;       // scans
   constexpr double kFast = 2.0;            // m from scan to scan, at points 10 m away
   constexpr double kFastAgreement = 0.35;  // of neighbours
   const std::size_t scans = recording.size();
   if (scans < 2) return {};
-  SampledPairs result{sample.pairs(0, scans - 1, 1, kPairs), 1, {}};
+  // They share scans with the pairs that are farther apart.
+  const std::size_t last = scans - (scans < 2 * kStride ? 1 : kStride);
+  SampledPairs result{sample.pairs(0, last, 1, most), 1, {}};
   result.neighbours = agreement_under(no_motion, result.pairs);
   if (extent > kFast || scans < 2 * kStride || result.neighbours.share < kFastAgreement) {
     return result;
   }
   for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
-    result = {sample.pairs(0, scans - 1, stride, kPairs), stride, result.neighbours};
+    result = {sample.pairs(0, scans - 1, stride, most), stride, result.neighbours};
     if (agreement_under(no_motion, result.pairs).share < kLeastAgreement) break;
   }
   return result;
@@ -295,11 +298,11 @@ bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion&
   return 4 * missed > moving;
 }
 
-/// Whether there are enough motions for a decision.
-bool are_enough(const std::vector<RegisteredMotion>& motions) {
+/// Whether there are enough motions for a decision, `steps` of neighbours.
+bool are_enough(const std::vector<RegisteredMotion>& motions, std::size_t steps) {
   const auto is_step = [](const RegisteredMotion& m) { return m.second == m.first + 1; };
-  const auto steps = std::count_if(motions.begin(), motions.end(), is_step);
-  return motions.size() >= kFewestMotions && steps >= std::ptrdiff_t{kFewestPairs};
+  return motions.size() >= kFewestMotions &&
+         std::count_if(motions.begin(), motions.end(), is_step) >= std::ptrdiff_t(steps);
 }
 
 /// What scans show: landmarks of pairs, and registered motions.
@@ -450,37 +453,42 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
 }
 
 /// The diagnosis under the options that `recording` has.
-Diagnosis diagnose_as_opened(const Recording& recording) {
+Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   Diagnosis d;
   d.scan_files = recording.scan_file_count();
   d.pose_rows = recording.pose_count();
   d.scans = recording.size();
   d.proposal = recording.options();
   const double extent = describe_motion(recording, d);
+  // Poses that are exact nearly everywhere need no further places.
+  const BodyMotion given = given_motion(recording);
+  const auto are_exact = [&](const std::vector<RegisteredMotion>& motions) {
+    const auto inexact = std::count_if(motions.begin(), motions.end(), [&](const auto& one) {
+      return error_at_points({one}, given) >= kExact;
+    });
+    return are_enough(motions, pairs) && 4 * static_cast<std::size_t>(inexact) <= motions.size();
+  };
+  const bool is_world = recording.frame() == PointFrame::kWorld;
+  std::vector<RegisteredMotion> motions;
+  if (!is_world) motions = register_motions(recording, are_exact);
   ScanSample sample(recording);
-  const SampledPairs sampled = sample_pairs(recording, sample, extent);
+  const SampledPairs sampled =
+      sample_pairs(recording, sample, extent, are_exact(motions) ? pairs : kPairs);
   if (recording.size() == 1) sample.read({0});
   sample.describe(d);
   d.stride = sampled.stride;
-  d.as_given = agreement_under(given_motion(recording), sampled.pairs);
+  d.as_given = agreement_under(given, sampled.pairs);
   d.standing = agreement_under(no_motion, sampled.pairs);
   if (d.as_given.points < kFewestCompared) return d;
-  Evidence evidence{recording, sampled.pairs, {}, d.as_given, d.standing};
-  if (recording.frame() == PointFrame::kWorld) {
+  const Evidence evidence{recording, sampled.pairs, std::move(motions), d.as_given, d.standing};
+  if (is_world) {
     constexpr double kTellingWay = 5.0;  // m
     d.verdict = follow_sensor(recording, kTellingWay).value_or(true)
                     ? verdict_of_agreement(evidence)
                     : PoseVerdict::kDisagree;
     return d;
   }
-  // Poses that are exact without exception need no further places.
-  const BodyMotion given = given_motion(recording);
-  evidence.motions = register_motions(recording, [&](const auto& motions) {
-    return are_enough(motions) && std::all_of(motions.begin(), motions.end(), [&](const auto& one) {
-             return error_at_points({one}, given) < kExact;
-           });
-  });
-  if (are_enough(evidence.motions)) {
+  if (are_enough(evidence.motions, kFewestPairs)) {
     judge_by_motions(evidence, d);
   } else {
     judge_by_landmarks(evidence, sampled.neighbours, d);
@@ -491,14 +499,14 @@ Diagnosis diagnose_as_opened(const Recording& recording) {
 
 }  // namespace
 
-Diagnosis diagnose(const Recording& recording) {
-  Diagnosis d = diagnose_as_opened(recording);
+Diagnosis diagnose(const Recording& recording, std::size_t pairs) {
+  Diagnosis d = diagnose_as_opened(recording, pairs);
   const bool agrees = d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
   if (agrees && !has_wrong_origin(recording)) return d;
   for (const RecordingOptions& options : other_options(recording)) {
     try {
       const Recording other(recording.folder(), options);
-      if (diagnose_as_opened(other).verdict != PoseVerdict::kAgree) continue;
+      if (diagnose_as_opened(other, pairs).verdict != PoseVerdict::kAgree) continue;
     } catch (const IoError&) {
       continue;  // it cannot be opened in this way
     }

@@ -56,6 +56,8 @@ bool is_certain(const std::optional<Registration>& registration) {
          registration->uncertainty < kUncertain && !registration->is_ambiguous;
 }
 
+bool is_exact(const Pose& T, const Pose& given) { return extent_of(given.inverse() * T) < kExact; }
+
 /// Residual of a motion: translation, and rotation times kLever, m.
 Vector6 residual(const Pose& body, const Pose& sensor, const Pose& T_body_sensor) {
   const Pose E = (body * T_body_sensor).inverse() * T_body_sensor * sensor;
@@ -94,11 +96,15 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
     const auto along = [&](const Pose& T, const Eigen::Vector3d& open, double most) {
       return register_along(a.surfaces(), b.points(), a.landmarks(), b.landmarks(), T, open, most);
     };
-    auto found = along(by_planes.T_a_b, direction, farthest);
-    if (!found) continue;
-    // The planes that meet at the found pose determine the open direction better.
-    if (const auto again = along(found->T_a_b, found->uncertain[0], kFarthestFromGuess)) {
-      found = again;
+    auto found = along(given, direction, kFarthestFromGuess);
+    const bool fits = found && is_exact(found->T_a_b, given);
+    if (!fits) {
+      found = along(by_planes.T_a_b, direction, farthest);
+      if (!found) continue;
+      // The planes that meet at the found pose determine the open direction better.
+      if (const auto again = along(found->T_a_b, found->uncertain[0], kFarthestFromGuess)) {
+        found = again;
+      }
     }
     const double gap = mean_gap(a.landmarks(), b.landmarks(), found->T_a_b);
     Pose standing = by_planes.T_a_b;
@@ -106,6 +112,7 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
     if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
       best = found;
       least_gap = gap;
+      if (fits) break;
     }
   }
   if (!best) return std::nullopt;
@@ -126,13 +133,17 @@ std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainS
                                                 double farthest) {
   constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
   constexpr double kWorse = 1.02;  // ratio of gaps
-  const auto forth = register_scans(a.surfaces(), b.points(), guesses);
+  // Poses that are exact need no other guesses, unless they stand, as those of another recording.
+  auto forth = register_near(a.surfaces(), b.points(), given);
+  if (!is_certain(forth) || !is_exact(forth->T_a_b, given) || extent_of(given) < kAgreeing) {
+    forth = register_scans(a.surfaces(), b.points(), guesses);
+  }
   if (!forth) return std::nullopt;
   const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
   const auto found =
       is_open
           ? complete(a, b, *forth, given, farthest)
-          : checked(forth, register_scans(b.surfaces(), a.points(), {forth->T_a_b.inverse()}), 0.0);
+          : checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
   return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
 }
@@ -270,16 +281,17 @@ std::vector<RegisteredMotion> register_motions(
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording);
   std::optional<Pose> elsewhere;
-  for (std::size_t number = 0; number < starts.size(); number += 2) {
+  for (std::size_t number = 0; number < starts.size();) {
     const auto chains =
-        in_two_threads(std::min<std::size_t>(2, starts.size() - number), [&](std::size_t k) {
+        in_two_threads(std::min<std::size_t>(3, starts.size() - number), [&](std::size_t k) {
           return chain_at(recording, number + k, starts[number + k], elsewhere);
         });
     for (const std::vector<RegisteredMotion>& chain : chains) {
       motions.insert(motions.end(), chain.begin(), chain.end());
       if (!chain.empty()) elsewhere = chain.front().T_first_second;
     }
-    if (suffice(motions)) break;
+    if (suffice(motions) || (motions.empty() && number > 0)) break;
+    number += chains.size();
   }
   return motions;
 }

@@ -72,7 +72,7 @@ struct Diagnosis {
 
 /// Compares and registers a sample of scans, in two threads. The time, a second, does not depend on
 /// the length of the recording; if scans do not agree, the recording may be opened again, with
-/// other options. Throws IoError.
-Diagnosis diagnose(const Recording& recording);
+/// other options. `pairs`: of neighbours that suffice if nearly all are exact. Throws IoError.
+Diagnosis diagnose(const Recording& recording, std::size_t pairs = 6);
 
 }  // namespace dynains
