@@ -27,35 +27,25 @@ class SurroundingGround {
   /// Height above ground with too few points for a plane.
   static constexpr float kUnknown = std::numeric_limits<float>::infinity();
 
-  /// Replaces the ground points (m). The planes exclude points that lie `rise` (m) or more above
-  /// the plane of all points, since these may belong to an object, and points of cells without a
-  /// plane.
-  void assign(PointsView points, float rise) {
+  /// Replaces the ground points (m).
+  void assign(PointsView points) {
     numbers_.clear();
     cells_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const float x = points.x[i], y = points.y[i], z = points.z[i];
-      add(x, y, z, 1.0, cell_at(x, y).all);
-    }
-    for (Cell& cell : cells_) {
-      cell.plane = plane_around(cell, &Cell::all);
-      cell.kept = cell.all;
-    }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const float x = points.x[i], y = points.y[i], z = points.z[i];
-      Cell& cell = cell_at(x, y);
-      if (cell.plane.height(x, y, z) >= rise) add(x, y, z, -1.0, cell.kept);
+      cell_at(points.x[i], points.y[i])
+          .moments.add(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                       static_cast<double>(points.z[i]), 1.0);
     }
   }
 
   /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
   float height(float x, float y, float z) {
     Cell& cell = cell_at(x, y);
-    if (!cell.has_final_plane) {
-      cell.has_final_plane = true;
-      cell.plane = plane_around(cell, &Cell::kept);
+    if (!cell.has_plane) {
+      cell.has_plane = true;
+      cell.plane = plane_around(cell.place);
     }
-    return cell.plane.height(x, y, z);
+    return z - (cell.plane.slope_x * x + cell.plane.slope_y * y + cell.plane.offset);
   }
 
  private:
@@ -67,37 +57,27 @@ class SurroundingGround {
   // Plane z = slope_x * x + slope_y * y + offset.
   struct Plane {
     float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
-
-    float height(float x, float y, float z) const {
-      return z - (slope_x * x + slope_y * y + offset);
-    }
   };
   struct Cell {
     VoxelKey place;
-    PlaneMoments all, kept;  // of all its points, and of those that do not rise
-    Plane plane;             // through all points around; if it is final, through the kept ones
-    bool has_final_plane = false;
+    PlaneMoments moments;  // of its points
+    Plane plane;           // through these and those of the cells around it
+    bool has_plane = false;
   };
 
   Cell& cell_at(float x, float y) {
     const VoxelKey place =
         voxel_key(floor_to<std::int32_t>(x / kCell), floor_to<std::int32_t>(y / kCell), 0);
     const std::uint32_t number = numbers_.insert(place);
-    if (number == cells_.size()) cells_.push_back({place, {}, {}, {}, false});
+    if (number == cells_.size()) cells_.push_back({place, {}, {}, false});
     return cells_[number];
   }
 
-  static void add(float x, float y, float z, double weight, PlaneMoments& moments) {
-    moments.add(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z), weight);
-  }
-
-  // Plane through the points of a cell and of the cells around it.
-  Plane plane_around(const Cell& cell, PlaneMoments Cell::*moments) const {
+  Plane plane_around(VoxelKey place) const {
     PlaneMoments sum;
     for (int i = 0; i < 9; ++i) {
-      const std::uint32_t beside =
-          numbers_.find(cell.place + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
-      if (beside != kNoIndex) sum += cells_[beside].*moments;
+      const std::uint32_t beside = numbers_.find(place + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
+      if (beside != kNoIndex) sum += cells_[beside].moments;
     }
     return fit(sum);
   }
@@ -219,7 +199,7 @@ class MovedGround {
         ++count;
       });
     }
-    around_.assign(PointsView(around_points_).subview(0, count), rise_);
+    around_.assign(PointsView(around_points_).subview(0, count));
   }
 
   // The bits of `which` whose points rise above the surrounding ground.

@@ -12,7 +12,7 @@ struct PlaneMoments {
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
 
-  /// Adds a point. Adding it again with the negative weight removes it.
+  /// Adds a point with a weight.
   void add(double px, double py, double pz, double weight) {
     const double wx = weight * px;
     const double wy = weight * py;
