@@ -24,7 +24,7 @@ struct FreeSpaceConfig {
   double tau_free = 0.65;        ///< form of Eq. 19
   double tau_contested = 0.9;    ///< form of Eq. 19
   double removal_ratio = 0.22;
-  double footprint = 0.35;        ///< m
+  double footprint = 0.4;         ///< m
   double footprint_rise = 0.025;  ///< m
   double track_cell = 1.2;        ///< m
   double track_overlap = 0.25;
