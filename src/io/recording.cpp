@@ -33,8 +33,7 @@ constexpr double kFarthestSensor = 1000.0;  // m, as RemoverConfig::sensor_origi
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
     ".las, .npy, .xyz or .csv scans (or with them in pcd/, ply/, scans/, points/, clouds/ or "
-    "lidar/), "
-    "or a log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)";
+    "lidar/), or a log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml)";
 
 /// Beams without a return stay at the origin.
 void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {

@@ -278,10 +278,8 @@ void add_remap_command(CLI::App& app) {
   command.footer(
       "The verdicts of the run stay: they were made between neighbouring scans, and a correction "
       "moves these\ntogether. The map is built from the points that OUT/labels calls static, in "
-      "the "
-      "order of the scans and of\ntheir points. Nothing in OUT changes but the map and its entry "
-      "in "
-      "report.json; earlier maps of remap are\nreplaced.");
+      "the order of the scans and of\ntheir points. Nothing in OUT changes but the map and its "
+      "entry in report.json; earlier maps of remap are\nreplaced.");
   command.callback([options] { remap(*options); });
 }
 

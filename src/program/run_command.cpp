@@ -154,14 +154,12 @@ void add_run_command(CLI::App& app) {
   command.footer(
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
-      "--errors`), "
-      "static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), report.json and "
-      "timing.csv. All appear in OUT at once,\nwhen the run is complete; until then they are in "
-      "OUT.partial. Ctrl-C ends the run after the scan at hand and exits\nwith 130: the results so "
-      "far stay in OUT.partial until the next run. Other exit codes: 0; 1 if a "
-      "file "
-      "cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the scans "
-      "disagree with; 3 if the odometry loses track: the results of the scans before are "
+      "--errors`), static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), "
+      "report.json and timing.csv. All appear in OUT at once,\nwhen the run is complete; until "
+      "then they are in OUT.partial. Ctrl-C ends the run after the scan at hand and exits\nwith "
+      "130: the results so far stay in OUT.partial until the next run. Other exit codes: 0; 1 if a "
+      "file cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the "
+      "scans disagree with; 3 if the odometry loses track: the results of the scans before are "
       "complete.");
   command.callback([flags] { run_as_asked(*flags); });
 }

@@ -116,8 +116,7 @@ RecordingPointer to_recording(const py::object& recording, const py::dict& optio
   }
   if (!options.empty()) {
     throw py::type_error(
-        "options of an open recording: give its path, or the options where it is "
-        "opened");
+        "options of an open recording: give its path, or the options where it is opened");
   }
   return recording.cast<RecordingPointer>();
 }
@@ -154,8 +153,7 @@ void bind_recording(py::module_& module) {
   const std::string doc =
       "Recorded scans with poses: recording[i] is scan i, read when it is asked for.\n\n"
       "path: folder of KITTI, SemanticKITTI or nuScenes, folder of .pcd, .ply, .bin, .las, .npy, "
-      ".xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with "
-      "metadata.yaml).\n"
+      ".xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml).\n"
       "What the files mean, by name (dynains.check finds out):\n" +
       describe_settings<program::RecordingSettings>();
   const auto of = [](auto member) {

@@ -227,9 +227,8 @@ void bind_run(py::module_& module) {
       "For the path of a recording also:\n" + describe_settings<program::RecordingSettings>() +
       "Returns a RunResult. Ctrl-C ends the run after the scan at hand and raises "
       "KeyboardInterrupt; the results so far stay in out.partial until the next run. Raises "
-      "IoError, "
-      "ConfigError, PoseError, and UsageError if another run writes to the folder. Warns by "
-      "RuntimeWarning. Other threads run meanwhile.";
+      "IoError, ConfigError, PoseError, and UsageError if another run writes to the folder. Warns "
+      "by RuntimeWarning. Other threads run meanwhile.";
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
   // For dynains.view().
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),

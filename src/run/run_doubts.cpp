@@ -64,8 +64,7 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
          percent(worst.instance_free) + " of what stands above it: " +
          (may_be_skewed ? "points may keep the frames of their times (--deskew), or " : "") +
          "rays may not begin at the origin of the clouds (--sensor-origin), poses be inexact, or "
-         "many points be noise; "
-         "see: dynains check";
+         "many points be noise; see: dynains check";
 }
 
 }  // namespace

@@ -62,8 +62,7 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
       " m (--max-range) from the sensor; half of the points are beyond " +
       number(median(std::move(ranges))) +
       " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units cm; "
-      "in "
-      "the frame of the world: --frame world; else --point-units m runs unless nothing can be "
+      "in the frame of the world: --frame world; else --point-units m runs unless nothing can be "
       "judged");
 }
 

@@ -45,8 +45,7 @@ class Motion {
       const auto pose = motion_at(motion, stamp + offset);
       if (!pose) {
         fail(place,
-             "the scan cannot be de-skewed: expected poses at most 1 s apart around its "
-             "points");
+             "the scan cannot be de-skewed: expected poses at most 1 s apart around its points");
       }
       T_stamp_sensor_.push_back(T_stamp_world * *pose);
     }

@@ -49,8 +49,7 @@ NpyPoints plain_points(const Bytes& place, const NpyArray& array, PointSink& sin
       array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMostHeaderItems;
   if (!is_table || (array.is_column_major && array.shape.size() > 2)) {
     place.fail(
-        "expected an array of N rows with x y z, or a structured array with the fields x, "
-        "y and z");
+        "expected an array of N rows with x y z, or a structured array with the fields x, y and z");
   }
   const std::uint64_t columns = array.shape.back();
   NpyPoints points{array.item_count() / columns, {}};
