@@ -200,9 +200,7 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double
   constexpr double kFastAgreement = 0.35;  // of neighbours
   const std::size_t scans = recording.size();
   if (scans < 2) return {};
-  // They share scans with the pairs that are farther apart.
-  const std::size_t last = scans - (scans < 2 * kStride ? 1 : kStride);
-  SampledPairs result{sample.pairs(0, last, 1, most), 1, {}};
+  SampledPairs result{sample.pairs(0, scans - 1, 1, most), 1, {}};
   result.neighbours = agreement_under(no_motion, result.pairs);
   if (extent > kFast || scans < 2 * kStride || result.neighbours.share < kFastAgreement) {
     return result;
