@@ -122,6 +122,18 @@ TEST_CASE("16 beams on a highway: the odometry moves with the road, not with the
   }
 }
 
+TEST_CASE("Times in nanoseconds do not widen the search for the first motion beyond that of 1 s") {
+  simulation::Config config = place(simulation::Scene::kHighway, 2);
+  config.seed = 204;
+  config.rate = 2.0;
+  simulation::Simulator highway(config);
+  Odometry odometry;
+  odometry.push(points_of(highway.scan(0)), {}, 0.0);
+  const Pose found = odometry.push(points_of(highway.scan(1)), {}, 5e8).T_world_sensor;
+  const Pose exact = highway.scan(0).T_world_sensor.inverse() * highway.scan(1).T_world_sensor;
+  CHECK((found.translation() - exact.translation()).norm() < 0.5);
+}
+
 TEST_CASE("Some lost scans are bridged, and a longer gap ends the track") {
   simulation::Config config = place(simulation::Scene::kUrban, 26);
   config.ego_speed = 10.0;
