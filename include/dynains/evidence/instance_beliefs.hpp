@@ -193,7 +193,8 @@ class InstanceBeliefUpdater {
     return {samples, free ? samples : 0, free || belief.hits != 0 ? samples : 0};
   }
 
-  // `weight`: of free samples, see update().
+  // `weight`: of free samples, see update(). A supervoxel has at most Visibility::kMostBits
+  // samples, which FreeSpaceConfig::supervoxel_samples ensures.
   void update_supervoxel(const InstanceSamples& samples, const Visibility& visibility,
                          std::uint32_t s, float weight, InstanceBeliefs& beliefs) const {
     const std::uint32_t begin = samples.sample_begin[s];
@@ -202,7 +203,7 @@ class InstanceBeliefUpdater {
     Belief& belief = beliefs.supervoxels[s];
     if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
     const Counts before = counts_of(belief, size);
-    update(belief, {count_ones(visible.free), count_ones(visible.hit)}, size, weight);
+    update(belief, visible.count(), size, weight);
     Counts& counts = beliefs.counts[samples.instance_of[s]];
     const Counts now = counts_of(belief, size);
     counts.moved += now.moved - before.moved;

@@ -41,9 +41,15 @@ class Visibility {
   /// Most samples of bits(): a word that begins with the byte of a bit contains at least as many
   /// bits from this bit on.
   static constexpr std::size_t kMostBits = 56;
+  struct Count {
+    std::uint32_t free = 0;
+    std::uint32_t hit = 0;
+  };
   struct Bits {
     std::uint64_t free;
     std::uint64_t hit;
+
+    Count count() const { return {count_ones(free), count_ones(hit)}; }
   };
   /// Bits of the samples in [begin, end), at most kMostBits; the lowest one is that of sample
   /// `begin`.
@@ -51,18 +57,13 @@ class Visibility {
     const std::uint64_t all = (std::uint64_t{1} << (end - begin)) - 1;
     return {word_from(free_, begin) & all, word_from(hit_, begin) & all};
   }
-
-  struct Count {
-    std::uint32_t free = 0;
-    std::uint32_t hit = 0;
-  };
   /// Numbers of free and hit samples in [begin, end).
   Count count(std::size_t begin, std::size_t end) const {
     Count sum;
     for (; begin < end; begin += kMostBits) {
-      const Bits some = bits(begin, std::min(begin + kMostBits, end));
-      sum.free += count_ones(some.free);
-      sum.hit += count_ones(some.hit);
+      const Count some = bits(begin, std::min(begin + kMostBits, end)).count();
+      sum.free += some.free;
+      sum.hit += some.hit;
     }
     return sum;
   }

@@ -287,9 +287,9 @@ class RecordingPlaces {
       Tile& tile = tiles_.at(index);
       const auto tell = [&](std::size_t i, const detail::Visibility::Bits& seen) {
         Place& place = tile.places.values[i];
-        const int verdict =
-            detail::FreeSpaceSum::judge(detail::count_ones(seen.free), detail::count_ones(seen.hit),
-                                        detail::count_ones(std::uint64_t{place.samples.octants}));
+        const auto [free, hit] = seen.count();
+        const int verdict = detail::FreeSpaceSum::judge(
+            free, hit, detail::count_ones(std::uint64_t{place.samples.octants}));
         if (verdict == 0) return;
         using Look = Place::Look;
         if (place.look == Look::kNone) touched_.push_back(&place);
