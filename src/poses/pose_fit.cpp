@@ -281,7 +281,7 @@ std::vector<RegisteredMotion> register_motions(
   if (recording.size() < 2) return motions;
   const std::vector<std::size_t> starts = starts_of_chains(recording);
   std::optional<Pose> elsewhere;
-  for (std::size_t number = 0; number < starts.size();) {
+  for (std::size_t number = 0; number < starts.size(); number += 3) {
     const auto chains =
         in_two_threads(std::min<std::size_t>(3, starts.size() - number), [&](std::size_t k) {
           return chain_at(recording, number + k, starts[number + k], elsewhere);
@@ -291,7 +291,6 @@ std::vector<RegisteredMotion> register_motions(
       if (!chain.empty()) elsewhere = chain.front().T_first_second;
     }
     if (suffice(motions) || (motions.empty() && number > 0)) break;
-    number += chains.size();
   }
   return motions;
 }

@@ -21,7 +21,7 @@ namespace {
 
 /// Judges the poses as `dynains check` does.
 void check_poses(const Recording& recording, bool accepts_poses, StartCheck& result) {
-  const Diagnosis d = diagnose(recording, 3);
+  const Diagnosis d = diagnose(recording, /*pairs=*/3);
   result.agreement = d.as_given;
   if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;
   const std::string text = advice(recording, d);
