@@ -94,13 +94,13 @@ PlaneMoments moments_within(const HalfSpace& space, PointsView points) {
 /// `floor` if there are none. `kept`: working memory.
 inline float mean_of_lowest(Span<const float> values, std::size_t wanted, float floor,
                             std::vector<float>& kept) {
-  kept.clear();
-  std::copy_if(values.begin(), values.end(), std::back_inserter(kept),
-               [floor](float value) { return value >= floor; });
-  if (kept.empty()) return floor;
-  const std::size_t count = std::min(wanted, kept.size());
-  const auto end = kept.begin() + static_cast<std::ptrdiff_t>(count);
-  std::nth_element(kept.begin(), end, kept.end());
+  grow(kept, values.size());
+  const auto last = std::copy_if(values.begin(), values.end(), kept.begin(),
+                                 [floor](float value) { return value >= floor; });
+  const auto count = std::min(static_cast<std::ptrdiff_t>(wanted), last - kept.begin());
+  if (count == 0) return floor;
+  const auto end = kept.begin() + count;
+  std::nth_element(kept.begin(), end, last);
   std::sort(kept.begin(), end);
   return std::accumulate(kept.begin(), end, 0.0F) / static_cast<float>(count);
 }
@@ -136,75 +136,53 @@ class GroundSegmenter {
 
   /// Splits `scan` (m, sensor frame, z up, finite coordinates). `input`: index of each point in the
   /// input of the remover. Points outside the rings and points of patches with few points are not
-  /// ground. Points below `noise_depth` lie behind the last point of `split`. Points of `split` are
-  /// ordered by patch, then as in the scan; only where a patch turned out not to be ground, the
-  /// last ground points take its place.
+  /// ground. Points below `noise_depth` lie behind the last point of `split`. The ground points of
+  /// `split` are ordered by patch, then as in the scan, and so are the others; only where a patch
+  /// turned out not to be ground, its ground points follow its others.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
     detail::grow(patch_of_, scan.size() + detail::kPackWidth);
-    detail::ensure_capacity(heights_of_points_, scan.size());
     zones_.find_patches(scan, patch_of_.data());
     if (config_.noise_depth > 0.0) find_noise(scan);
-    sort(scan, input);
+    sort(scan.size());
     heights_.fill(kNoGround);
+    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(scan, p);
+    if (config_.ground_step > 0.0) take_back_overhangs();
     split.resize(scan.size());
-    // By patch: begin of its ground in the split, and number of its other points.
-    PatchCounts begin{};
-    PatchCounts rest{};
     std::size_t count = 0;
-    for (std::size_t p = 0; p < kPatches; ++p) {
-      begin[p] = count;
-      rest[p] = segment_patch(p, split, count);
-    }
-    begin[kPatches] = count;
-    rest[kPatches] = size_of(kPatches);
-    if (config_.ground_step > 0.0) take_back_overhangs(begin, rest, split, count);
+    const auto write = [&](std::size_t begin, std::size_t end) {
+      for (std::size_t at = begin; at < end; ++at, ++count) {
+        const std::size_t i = order_[at];
+        split.points.x[count] = scan.x[i];
+        split.points.y[count] = scan.y[i];
+        split.points.z[count] = scan.z[i];
+        split.input[count] = input[i];
+      }
+    };
+    for (std::size_t p = 0; p < kPatches; ++p) write(ground_begin_[p], begin_[p + 1]);
     split.ground_count = count;
-    for (std::size_t p = 0; p <= kPatches; ++p) {
-      copy(sorted_, begin_[p], rest[p], split, count);
-      count += rest[p];
-    }
+    for (std::size_t p = 0; p < kPatches; ++p) write(begin_[p], ground_begin_[p]);
+    write(begin_[kPatches], begin_[kNoise]);
     split.count = count;
-    copy(sorted_, begin_[kNoise], size_of(kNoise), split, count);
+    write(begin_[kNoise], scan.size());
   }
 
  private:
   static constexpr std::size_t kPatches = detail::ConcentricZones::kPatches;
   static constexpr std::size_t kNoise = kPatches + 1;  // points below `noise_depth`
   static constexpr float kNoGround = std::numeric_limits<float>::quiet_NaN();
-  using PatchCounts = std::array<std::size_t, kPatches + 1>;  // last: points in no patch
-
-  // Copies points to `to`, from index `at` on.
-  static void copy(const GroundSplit& from, std::size_t begin, std::size_t count, GroundSplit& to,
-                   std::size_t at) {
-    std::copy_n(from.points.x.data() + begin, count, to.points.x.data() + at);
-    std::copy_n(from.points.y.data() + begin, count, to.points.y.data() + at);
-    std::copy_n(from.points.z.data() + begin, count, to.points.z.data() + at);
-    std::copy_n(from.input.data() + begin, count, to.input.data() + at);
-  }
-  static void copy(const GroundSplit& from, std::size_t i, GroundSplit& to, std::size_t at) {
-    to.points.x[at] = from.points.x[i];
-    to.points.y[at] = from.points.y[i];
-    to.points.z[at] = from.points.z[i];
-    to.input[at] = from.input[i];
-  }
 
   // Counting sort by patch; the points of a patch keep the order of the scan.
-  void sort(PointsView scan, Span<const std::uint32_t> input) {
-    sorted_.resize(scan.size());
+  void sort(std::size_t count) {
+    detail::grow(order_, count);
     begin_.fill(0);
-    for (std::size_t i = 0; i < scan.size(); ++i) ++begin_[patch(i) + 1];
+    for (std::size_t i = 0; i < count; ++i) ++begin_[patch(i) + 1];
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     next_ = begin_;
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      const std::size_t to = next_[patch(i)]++;
-      sorted_.points.x[to] = scan.x[i];
-      sorted_.points.y[to] = scan.y[i];
-      sorted_.points.z[to] = scan.z[i];
-      sorted_.input[to] = input[i];
+    for (std::size_t i = 0; i < count; ++i) {
+      order_[next_[patch(i)]++] = static_cast<std::uint32_t>(i);
     }
   }
   std::size_t patch(std::size_t point) const { return static_cast<std::size_t>(patch_of_[point]); }
-  std::size_t size_of(std::size_t patch) const { return begin_[patch + 1] - begin_[patch]; }
 
   void find_noise(PointsView scan) {
     const auto lowest = static_cast<float>(-config_.noise_depth * height_);
@@ -227,48 +205,48 @@ class GroundSegmenter {
     return known >= kMinKnown && 2 * lower > known;
   }
 
-  // Returns ground that overhangs to the other points of its patch; the last ground points take its
-  // place. Not in the outermost zone, where a slope of a few percent is a step from ring to ring.
-  // From the last patch to the first, so that the points that take the place of a patch were
-  // checked before.
-  void take_back_overhangs(const PatchCounts& begin, PatchCounts& rest, GroundSplit& split,
-                           std::size_t& count) {
+  // Ground that overhangs is none. Not in the outermost zone, where a slope of a few percent is a
+  // step from ring to ring.
+  void take_back_overhangs() {
     using Zones = detail::ConcentricZones;
     const std::int32_t outermost = Zones::kRings.back() * Zones::kSectors.back();
-    for (std::size_t p = kPatches - static_cast<std::size_t>(outermost); p-- > 0;) {
-      const std::size_t found = begin[p + 1] - begin[p];
-      if (found == 0 || !overhangs(p)) continue;
-      copy(split, begin[p], found, sorted_, begin_[p] + rest[p]);
-      rest[p] += found;
-      const std::size_t moved = std::min(found, count - begin[p + 1]);
-      copy(split, count - moved, moved, split, begin[p]);
-      count -= found;
+    for (std::size_t p = 0; p < kPatches - static_cast<std::size_t>(outermost); ++p) {
+      if (overhangs(p)) ground_begin_[p] = begin_[p + 1];
     }
   }
 
-  // Writes the ground of a patch to `split`, from index `count` on, and moves its other points to
-  // the front of the patch. Increases `count`; returns the number of the others.
-  std::size_t segment_patch(std::size_t patch, GroundSplit& split, std::size_t& count) {
-    const std::size_t begin = begin_[patch];
-    if (size_of(patch) < static_cast<std::size_t>(config_.ground_min_points)) return size_of(patch);
-    const PointsView points = PointsView(sorted_.points).subview(begin, size_of(patch));
+  // Orders the points of a patch: its ground last.
+  void segment_patch(PointsView scan, std::size_t patch) {
+    const std::size_t end = begin_[patch + 1];
+    const std::size_t size = end - begin_[patch];
+    ground_begin_[patch] = end;
+    if (size < static_cast<std::size_t>(config_.ground_min_points)) return;
+    std::uint32_t* const order = order_.data() + begin_[patch];
+    patch_.grow(size);
+    for (std::size_t k = 0; k < size; ++k) {
+      patch_.x[k] = scan.x[order[k]];
+      patch_.y[k] = scan.y[order[k]];
+      patch_.z[k] = scan.z[order[k]];
+    }
+    const PointsView points = PointsView(patch_).subview(0, size);
     const std::optional<detail::HalfSpace> below = find_ground(patch, points);
-    if (!below) return points.size();
-    std::size_t rest = begin;
+    if (!below) return;
+    detail::grow(ground_, size);
+    std::size_t rest = 0;
+    std::size_t ground = 0;
     detail::with_packs([&](auto packs) {
-      detail::for_slices<decltype(packs)>(points.size(), [&](const auto& at) {
+      detail::for_slices<decltype(packs)>(size, [&](const auto& at) {
         const unsigned is_ground = below->contains(below->local(at, points)).bits();
         for (std::size_t k = 0; k < at.size(); ++k) {
-          const std::size_t i = begin + at.begin + k;
-          if ((is_ground >> k & 1U) != 0) {
-            copy(sorted_, i, split, count++);
-          } else {
-            copy(sorted_, i, sorted_, rest++);
-          }
+          const std::uint32_t point = order[at.begin + k];
+          order[rest] = point;
+          ground_[ground] = point;
+          (is_ground >> k & 1U) != 0 ? ++ground : ++rest;
         }
       });
     });
-    return rest - begin;
+    std::copy_n(ground_.data(), ground, order + rest);
+    ground_begin_[patch] = end - ground;
   }
 
   // The half space of the ground points of a patch, if it has ground.
@@ -339,9 +317,11 @@ class GroundSegmenter {
   detail::ConcentricZones zones_;
   double height_ = 0.0;                                     // m, sensor over the ground
   std::vector<std::int32_t> patch_of_;                      // by point
-  GroundSplit sorted_;                                      // the points of a scan, by patch
-  std::array<std::size_t, kPatches + 3> begin_{}, next_{};  // by patch: its first and next point
-  PointBuffer sample_;                                      // of the current patch
+  std::vector<std::uint32_t> order_;                        // the points of a scan, by patch
+  std::array<std::size_t, kPatches + 3> begin_{}, next_{};  // in order_: of each patch
+  std::array<std::size_t, kPatches> ground_begin_{};        // in order_: of the ground of a patch
+  PointBuffer patch_, sample_;                              // of the current patch
+  std::vector<std::uint32_t> ground_;                       // of the current patch
   std::vector<float> heights_of_points_;                    // m, of the current patch
   std::array<float, kPatches + 1> heights_{};               // m, ground of each patch; last: none
 };
