@@ -150,11 +150,10 @@ class PoseCorrection {
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     const Pose T = composed(T_origin_world_, T_world_level);
-    const std::size_t wanted = inserted_ == 0 ? split.count + 1 : kInserted;
     ++inserted_;
     planes_.begin_scan(T);
     VoxelPlanes::Block block;
-    visit_some(split, wanted, [&](std::size_t i, double x, double y, double z) {
+    visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
       if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
       block.push_back(T, x, y, z);
       if (block.is_full()) planes_.add(block);
@@ -170,7 +169,7 @@ class PoseCorrection {
   const std::optional<EpochReason>& misfit() const { return misfit_; }
 
  private:
-  static constexpr std::size_t kInserted = 12000;  // points of a scan after the first
+  static constexpr std::size_t kInserted = 12000;  // points of a scan
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.5;  // ratio to the matches
 
