@@ -145,8 +145,6 @@ class NormalEquations {
   const Matrix& matrix() const { return matrix_; }
   const Vector& right() const { return right_; }
 
-  /// Whether no distance with a positive weight was added.
-  bool empty() const { return weights_ <= 0.0; }
   /// Mean square of the distances, m^2.
   double variance() const { return squares_ / std::max(weights_, kLeastWeight); }
 
@@ -395,23 +393,29 @@ class PlaneAligner {
     const Equations::Matrix inverse = equations.inverse();
     elevation_ += found[6];
     elevation_weight_ = std::max(kLeastWeight, kMemory / inverse[6][6]);
-    result.covariance = covariance_of(selected, equations, inverse, is_exact, scale);
-    result.supported = supported_part(result.found, result.covariance, is_exact);
+    result.covariance = covariance_of(selected, equations, inverse, scale);
+    PoseCovariance tested = result.covariance;
+    if (is_exact && is_certain(result.found, tested)) {
+      add_tests_of_exact(selected, equations, scale, tested);
+    }
+    if (!is_exact || is_certain(result.found, tested)) {
+      result.supported = supported_part(result.found, tested);
+    }
     result.change = equations.change(result.supported);
     add_first_error(inverse, result.covariance);
     return result;
   }
 
-  // The expected step by its covariance, if steps of this size are usual. None if the pose may be
-  // exact.
-  static PoseStep supported_part(const PoseStep& found, const PoseCovariance& covariance,
-                                 bool is_exact) {
-    if (is_exact) {
-      const PoseStep weighted = solve_symmetric<6>(covariance, found);
-      double squared = 0.0;
-      for (std::size_t i = 0; i < 6; ++i) squared += found[i] * weighted[i];
-      if (squared < kOfExact * kOfExact) return {};
-    }
+  // Whether a step is too large for its covariance to be an error of the alignment.
+  static bool is_certain(const PoseStep& found, const PoseCovariance& covariance) {
+    const PoseStep weighted = solve_symmetric<6>(covariance, found);
+    double squared = 0.0;
+    for (std::size_t i = 0; i < 6; ++i) squared += found[i] * weighted[i];
+    return squared >= kOfExact * kOfExact;
+  }
+
+  // The expected step by its covariance, if steps of this size are usual.
+  static PoseStep supported_part(const PoseStep& found, const PoseCovariance& covariance) {
     PoseStep variances;
     PoseCovariance sum = covariance;
     for (std::size_t i = 0; i < 6; ++i) {
@@ -444,38 +448,50 @@ class PlaneAligner {
   }
 
   PoseCovariance covariance_of(const AlignmentPoints& selected, const Equations& equations,
-                               const Equations::Matrix& inverse, bool is_exact, double scale) {
+                               const Equations::Matrix& inverse, double scale) {
     const PointsView points = selected.points();
-    groups_.assign(is_exact ? kSectors + kBands + 1 : kSectors, Equations());
-    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
-      const std::size_t i = match.point;
-      const auto add_to = [&](std::size_t group) {
-        groups_[group].add(derivatives, match.distance, weight);
-      };
-      add_to(sector_of(points.x[i], points.y[i]));
-      if (!is_exact) return;
-      add_to(kSectors + band_of(points.x[i], points.y[i], points.z[i]));
-      if (selected.is_on_object(i)) add_to(kSectors + kBands);
-    });
     PoseCovariance covariance;
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) covariance[i][j] = equations.variance() * inverse[i][j];
     }
+    // Pairs of sectors, so that no object is divided.
+    add_changes<kSectors, 2>(
+        equations, scale, [&](std::size_t i) { return sector_of(points.x[i], points.y[i]); },
+        covariance);
+    return covariance;
+  }
+
+  void add_tests_of_exact(const AlignmentPoints& selected, const Equations& equations, double scale,
+                          PoseCovariance& covariance) {
+    const PointsView points = selected.points();
+    add_changes<kBands, 1>(
+        equations, scale,
+        [&](std::size_t i) { return band_of(points.x[i], points.y[i], points.z[i]); }, covariance);
+    add_changes<1, 1>(
+        equations, scale,
+        [&](std::size_t i) { return selected.is_on_object(i) ? std::size_t{0} : std::size_t{1}; },
+        covariance);
+  }
+
+  // Adds the squared changes of the solution without `kTogether` groups of matches in a row, which
+  // begin at each group. `group_of(point)`: at most kGroups, which is in no group.
+  template <std::size_t kGroups, std::size_t kTogether, class GroupOf>
+  void add_changes(const Equations& equations, double scale, GroupOf&& group_of,
+                   PoseCovariance& covariance) {
+    groups_.assign(kGroups + 1, Equations());
+    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
+      groups_[group_of(match.point)].add(derivatives, match.distance, weight);
+    });
     const Vector all = equations.solve();
-    for (std::size_t group = 0; group < groups_.size(); ++group) {
-      if (group >= kSectors && groups_[group].empty()) continue;
+    for (std::size_t group = 0; group < kGroups; ++group) {
       Equations others = equations;
-      others -= groups_[group];
-      // Each sector is in two pairs, so that no object is divided.
-      if (group < kSectors) others -= groups_[(group + 1) % kSectors];
+      for (std::size_t k = 0; k < kTogether; ++k) others -= groups_[(group + k) % kGroups];
       Vector change = others.solve();
       for (std::size_t i = 0; i < 6; ++i) change[i] -= all[i];
-      const double weight = group < kSectors ? 0.5 : 1.0;
       for (std::size_t i = 0; i < 6; ++i) {
-        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += weight * change[i] * change[j];
+        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += change[i] * change[j] / kTogether;
       }
     }
-    return covariance;
   }
 
   // Where the surfaces tell nothing, attractions keep the first estimate and its error, a standard
