@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -36,17 +35,11 @@ class RangeImage {
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
 
-  /// Maximum number of cells on each side that a return of an object protects.
-  static constexpr std::size_t kWidest = 4;
-
   /// Buffers of build(), which several images can share.
   struct Scratch {
-    std::vector<std::int16_t> nearest;  // by cell: nearest return
-    std::vector<std::int16_t> objects;  // by cell: nearest return of a static object
-    std::vector<std::uint8_t> reach;    // by row and group of columns: protected cells per side
-    std::vector<std::uint8_t> nearby;   // by group of columns: protected cells around one row
-    std::array<std::vector<std::int16_t>, kWidest> lines;  // by protected cells and column
-    std::vector<std::int16_t> below, gap;                  // by column, see close_holes()
+    std::vector<std::int16_t> nearest;         // by cell: nearest return
+    std::vector<std::int16_t> objects, wider;  // by cell: nearest static object, see widen()
+    std::vector<std::int16_t> below, gap;      // by column, see close_holes()
     std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
     std::vector<std::int16_t> border;                      // row of kNothing
   };
@@ -82,31 +75,18 @@ class RangeImage {
   /// poses.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
              Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
-    const ProtectionLimits limits(grid, reach);
     scratch.nearest.assign(grid.cell_count(), kNothing);
     scratch.border.assign(grid.stride(), kNothing);
     collect(grid, objects, moving, scratch.nearest.data());
-    keep_objects(grid, limits, scratch);
+    keep_objects(scratch);
     collect(grid, ground, {}, scratch.nearest.data());
     close_holes(grid, scratch);
     store_with_least_around(grid, scratch);
-    widen(grid, limits, scratch);
+    widen(grid, reach, scratch);
   }
 
  private:
   static constexpr float kFarthest = 320.0F;  // m
-
-  // Returns of objects at ranges below limit[k] (cm) protect k + 1 cells on each side.
-  struct ProtectionLimits {
-    std::array<std::int16_t, kWidest> limit;
-
-    ProtectionLimits(const RangeImageGrid& grid, float reach) {
-      for (std::size_t k = 0; k < kWidest; ++k) {
-        const float metres = reach * grid.columns_per_radian / (static_cast<float>(k) + 0.5F);
-        limit[k] = static_cast<std::int16_t>(std::min(metres, kFarthest) * kCentimetres);
-      }
-    }
-  };
 
   // Writes the nearest range of each cell. Cells and ranges of a block are stored in arrays, which
   // is faster than an extraction of single numbers from packs.
@@ -143,15 +123,6 @@ class RangeImage {
     });
   }
 
-  // Columns are processed in groups. The group stride includes one additional group on each side.
-  static std::size_t group_count(const RangeImageGrid& grid) {
-    return (grid.stride() - 2 * detail::kPackWidth) / detail::kShortPackWidth;
-  }
-  static std::size_t group_stride(const RangeImageGrid& grid) { return group_count(grid) + 2; }
-  static std::size_t column_of(std::size_t group) {
-    return detail::kPackWidth + group * detail::kShortPackWidth;
-  }
-
   template <class Short>
   static Short is_moving(const Short& range) {
     return (range & Short(kMoving)) == Short(kMoving);
@@ -166,33 +137,11 @@ class RangeImage {
     return select(is_moving(range), Short(kNothing), range);
   }
 
-  // Copies the returns of static objects, before the ground is added to the image. Stores the
-  // number of cells that they protect on each side, by group of columns, if it is above one.
-  static void keep_objects(const RangeImageGrid& grid, const ProtectionLimits& limits,
-                           Scratch& scratch) {
-    const std::size_t stride = grid.stride();
-    const std::size_t groups = group_count(grid);
-    const auto rows = static_cast<std::size_t>(grid.rows);
-    scratch.objects.resize(grid.cell_count());
-    scratch.reach.assign(rows * group_stride(grid), 0);
-    detail::with_packs([&](auto packs) {
-      using Short = typename decltype(packs)::Short;
-      const Short far(limits.limit[1]);
-      for (std::size_t row = 0; row < rows; ++row) {
-        const std::int16_t* const from = &scratch.nearest[row * stride];
-        std::int16_t* const to = &scratch.objects[row * stride];
-        std::uint8_t* const reach = &scratch.reach[row * group_stride(grid) + 1];
-        for (std::size_t group = 0; group < groups; ++group) {
-          const Short here = only_staying(Short::load(from + column_of(group)));
-          here.store(to + column_of(group));
-          if (!(here < far).any()) continue;
-          std::size_t cells = 2;
-          while (cells < kWidest && (here < Short(limits.limit[cells])).any()) ++cells;
-          reach[group] = static_cast<std::uint8_t>(cells);
-        }
-        wrap(to, static_cast<std::size_t>(grid.columns), 1);
-      }
-    });
+  // Copies the returns of static objects, before the ground is added to the image.
+  static void keep_objects(Scratch& scratch) {
+    scratch.objects.resize(scratch.nearest.size());
+    std::transform(scratch.nearest.begin(), scratch.nearest.end(), scratch.objects.begin(),
+                   [](std::int16_t range) { return (range & kMoving) != 0 ? kNothing : range; });
   }
 
   // Fills gaps of up to `hole_rows` empty rows between two beams with the nearer return of the rows
@@ -243,7 +192,7 @@ class RangeImage {
     scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
-      wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns), 1);
+      wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns));
     }
     detail::with_packs([&](auto packs) {
       using Short = typename decltype(packs)::Short;
@@ -288,6 +237,12 @@ class RangeImage {
     }
   }
 
+  // The least of the numbers at a place of a row and at both places beside it.
+  template <class Short>
+  static Short least_of_three(const std::int16_t* at) {
+    return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
+  }
+
   // Writes one row of cells. A cell is unknown if its 3x3 cells have a single static return, or if
   // no beam crosses it.
   template <class Short>
@@ -299,9 +254,6 @@ class RangeImage {
     const std::int16_t* const moving_leasts = scratch.least_moving.data();
     const std::int16_t* const counts = scratch.count.data();
     Cell* const cells = &cells_[row * stride];
-    const auto least_of_three = [](const std::int16_t* at) {
-      return min(min(Short::load(at - 1), Short::load(at)), Short::load(at + 1));
-    };
     for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < stride;
          column += detail::kShortPackWidth) {
       const std::int16_t* const count = counts + column;
@@ -310,96 +262,55 @@ class RangeImage {
       const Short is_crossed = (here < nothing) | ((Short::load(middle + column - 1) < nothing) &
                                                    (Short::load(middle + column + 1) < nothing));
       const Short known = (returns < one_return) & is_crossed;
-      const Short staying = select(known, least_of_three(leasts + column), unknown);
+      const Short staying = select(known, least_of_three<Short>(leasts + column), unknown);
       // A moving point in the cell itself occludes the points behind it.
       const Short hiding = min(select(staying < zero, nothing, staying), here);
       const Short around = select(is_moving(here), hiding, staying);
-      const Short moving = least_of_three(moving_leasts + column);
+      const Short moving = least_of_three<Short>(moving_leasts + column);
       const Short nearest = select(moving < nothing, moving, here);
       nearest.store_interleaved_with(around, &cells[column].nearest);
     }
   }
 
-  // Extends the protection of near objects beyond their 3x3 cells.
-  void widen(const RangeImageGrid& grid, const ProtectionLimits& limits, Scratch& scratch) {
-    const auto rows = static_cast<std::size_t>(grid.rows);
-    for (std::vector<std::int16_t>& line : scratch.lines) line.resize(grid.stride());
+  // Extends the protection of near objects beyond their 3x3 cells: cell by cell, as far as the
+  // objects are near enough.
+  void widen(const RangeImageGrid& grid, float reach, Scratch& scratch) {
+    constexpr int kWidest = 4;  // cells on each side
+    scratch.wider.resize(grid.cell_count());
     detail::with_packs([&](auto packs) {
-      using Short = typename decltype(packs)::Short;
-      for (std::size_t row = 0; row < rows; ++row) {
-        if (!find_nearby(grid, row, scratch)) continue;
-        widen_upwards<Short>(grid, limits, row, scratch);
-        widen_sideways<Short>(grid, row, scratch);
+      for (int cells = 1; cells <= kWidest; ++cells) {
+        const float farthest = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
+        const auto limit = static_cast<std::int16_t>(std::min(farthest, kFarthest) * kCentimetres);
+        for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
+          widen_row<typename decltype(packs)::Short>(grid, row, limit, cells > 1, scratch);
+        }
+        scratch.objects.swap(scratch.wider);
       }
     });
   }
 
-  // Computes for each group of columns the largest number of protected cells among the objects that
-  // protect this row. Returns false if no object protects it.
-  static bool find_nearby(const RangeImageGrid& grid, std::size_t row, Scratch& scratch) {
-    const auto rows = static_cast<std::size_t>(grid.rows);
-    const std::size_t groups = group_count(grid);
-    const std::size_t stride = group_stride(grid);
-    scratch.nearby.assign(stride, 0);
-    std::uint8_t* const nearby = scratch.nearby.data();
-    for (std::size_t r = row - std::min(row, kWidest); r < std::min(row + kWidest + 1, rows); ++r) {
-      const auto distance = static_cast<std::uint8_t>(r < row ? row - r : r - row);
-      const std::uint8_t* const reach = &scratch.reach[r * stride];
-      for (std::size_t i = 0; i < stride; ++i) {
-        const std::uint8_t cells = reach[i] >= distance ? reach[i] : std::uint8_t{0};
-        nearby[i] = std::max(nearby[i], cells);
-      }
-    }
-    // At the seam of the image, the last group may be narrower than the protected cells.
-    nearby[0] = std::max(nearby[groups], nearby[groups - 1]);
-    nearby[groups + 1] = nearby[1];
-    return *std::max_element(nearby, nearby + stride) > 0;
-  }
-
-  // Writes to lines[cells - 1], for each column and each number of cells: the nearest object of the
-  // column at most `cells` rows above or below, if it protects that many cells.
+  // Writes to one row of `wider` the least of the 3x3 cells of `objects`, if it is below `limit`
+  // (cm), which then protects the cells of the image.
   template <class Short>
-  static void widen_upwards(const RangeImageGrid& grid, const ProtectionLimits& limits,
-                            std::size_t row, Scratch& scratch) {
-    const std::size_t stride = grid.stride();
-    const auto rows = static_cast<std::size_t>(grid.rows);
-    const Short nothing(kNothing);
-    for (std::size_t group = 0; group < group_count(grid); ++group) {
-      const std::size_t column = column_of(group);
-      const auto load = [&](std::size_t r) {
-        return r < rows ? Short::load(&scratch.objects[r * stride + column]) : nothing;
-      };
-      const std::size_t farthest = scratch.nearby[group + 1];
-      Short least = nothing;
-      if (farthest > 0) least = min(load(row), min(load(row - 1), load(row + 1)));
-      for (std::size_t cells = 2; cells <= kWidest; ++cells) {
-        Short line = nothing;
-        if (cells <= farthest) {
-          least = min(least, min(load(row - cells), load(row + cells)));
-          line = select(least < Short(limits.limit[cells - 1]), least, nothing);
-        }
-        line.store(&scratch.lines[cells - 1][column]);
-      }
+  void widen_row(const RangeImageGrid& grid, std::size_t row, std::int16_t limit, bool protects,
+                 Scratch& scratch) {
+    const Short nothing(kNothing), most(limit);
+    const std::int16_t* const low = row_of(scratch.objects, row - 1, grid, scratch);
+    const std::int16_t* const middle = row_of(scratch.objects, row, grid, scratch);
+    const std::int16_t* const high = row_of(scratch.objects, row + 1, grid, scratch);
+    std::int16_t* const leasts = scratch.least.data();
+    for (std::size_t column = 0; column < grid.stride(); column += detail::kShortPackWidth) {
+      const Short least = min(min(Short::load(low + column), Short::load(middle + column)),
+                              Short::load(high + column));
+      select(least < most, least, nothing).store(leasts + column);
     }
-    for (std::size_t cells = 2; cells <= kWidest; ++cells) {
-      wrap(scratch.lines[cells - 1].data(), static_cast<std::size_t>(grid.columns), cells);
-    }
-  }
-
-  // Applies the protection of the nearest objects in the neighbouring columns to one row.
-  template <class Short>
-  void widen_sideways(const RangeImageGrid& grid, std::size_t row, const Scratch& scratch) {
-    for (std::size_t group = 0; group < group_count(grid); ++group) {
-      const std::uint8_t* const nearby = &scratch.nearby[group];
-      const std::size_t farthest = std::max({nearby[0], nearby[1], nearby[2]});
-      if (farthest == 0) continue;
-      const std::size_t column = column_of(group);
-      Short least(kNothing);
-      for (std::size_t cells = 2; cells <= farthest; ++cells) {
-        const std::int16_t* const line = &scratch.lines[cells - 1][column - cells];
-        for (std::size_t i = 0; i <= 2 * cells; ++i) least = min(least, Short::load(line + i));
-      }
-      if ((least < Short(kNothing)).any()) protect(&cells_[row * grid.stride() + column], least);
+    wrap(leasts, static_cast<std::size_t>(grid.columns));
+    for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < grid.stride();
+         column += detail::kShortPackWidth) {
+      const Short least = least_of_three<Short>(leasts + column);
+      const std::size_t cell = row * grid.stride() + column;
+      least.store(&scratch.wider[cell]);
+      if (protects && (least < nothing).any()) protect(&cells_[cell], least);
     }
   }
 
@@ -415,13 +326,11 @@ class RangeImage {
     }
   }
 
-  // Copies `width` cells of each end of a row beyond its other end: the neighbours across the seam.
-  static void wrap(std::int16_t* row, std::size_t columns, std::size_t width) {
+  // Copies the cell at each end of a row beyond its other end: the neighbours across the seam.
+  static void wrap(std::int16_t* row, std::size_t columns) {
     std::int16_t* const first = row + detail::kPackWidth;
-    for (std::size_t i = 0; i < width; ++i) {
-      first[-1 - static_cast<std::ptrdiff_t>(i)] = first[columns - 1 - i];
-      first[columns + i] = first[i];
-    }
+    first[-1] = first[columns - 1];
+    first[columns] = first[0];
   }
 
   std::unique_ptr<Cell[]> cells_;
