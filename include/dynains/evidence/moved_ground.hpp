@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
@@ -41,28 +42,26 @@ class SurroundingGround {
   /// Height (m) of a point (m) above the plane of its cell, along z, or kUnknown.
   float height(float x, float y, float z) {
     Cell& cell = cell_at(x, y);
-    if (!cell.has_plane) {
-      cell.has_plane = true;
+    if (!cell.is_fitted) {
+      cell.is_fitted = true;
       cell.plane = plane_around(cell.place);
     }
-    return z - (cell.plane.slope_x * x + cell.plane.slope_y * y + cell.plane.offset);
+    if (!cell.plane) return kUnknown;
+    const Plane& plane = *cell.plane;
+    const double distance = plane.normal_x * (static_cast<double>(x) - plane.mean_x) +
+                            plane.normal_y * (static_cast<double>(y) - plane.mean_y) +
+                            plane.normal_z * (static_cast<double>(z) - plane.mean_z);
+    return static_cast<float>(distance / plane.normal_z);
   }
 
  private:
   static constexpr float kCell = 2.0F;  // m
-  // Fewer points, or points on a line, do not define a plane.
-  static constexpr double kLeastPoints = 8.0;
-  static constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
 
-  // Plane z = slope_x * x + slope_y * y + offset.
-  struct Plane {
-    float slope_x = 0.0F, slope_y = 0.0F, offset = -kUnknown;
-  };
   struct Cell {
     VoxelKey place;
-    PlaneMoments moments;  // of its points
-    Plane plane;           // through these and those of the cells around it
-    bool has_plane = false;
+    PlaneMoments moments;        // of its points
+    std::optional<Plane> plane;  // through these and those of the cells around it
+    bool is_fitted = false;
   };
 
   Cell& cell_at(float x, float y) {
@@ -73,36 +72,22 @@ class SurroundingGround {
     return cells_[number];
   }
 
-  Plane plane_around(VoxelKey place) const {
+  // Few points, or points on a line, do not define a plane.
+  std::optional<Plane> plane_around(VoxelKey place) const {
+    constexpr double kLeastPoints = 8.0;
+    constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
     PlaneMoments sum;
     for (int i = 0; i < 9; ++i) {
       const std::uint32_t beside = numbers_.find(place + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
       if (beside != kNoIndex) sum += cells_[beside].moments;
     }
-    return fit(sum);
-  }
-
-  // Least squares of z.
-  static Plane fit(const PlaneMoments& sum) {
-    Plane plane;
-    if (sum.count < kLeastPoints) return plane;
-    const double weight = 1.0 / sum.count;
-    const double mean_x = sum.x * weight, mean_y = sum.y * weight, mean_z = sum.z * weight;
-    const double xx = sum.xx * weight - mean_x * mean_x;
-    const double xy = sum.xy * weight - mean_x * mean_y;
-    const double yy = sum.yy * weight - mean_y * mean_y;
-    const double xz = sum.xz * weight - mean_x * mean_z;
-    const double yz = sum.yz * weight - mean_y * mean_z;
+    if (sum.count < kLeastPoints) return std::nullopt;
+    const double xx = variance_along(sum, {1.0, 0.0, 0.0});
+    const double yy = variance_along(sum, {0.0, 1.0, 0.0});
+    const double xy = variance_along(sum, {M_SQRT1_2, M_SQRT1_2, 0.0}) - 0.5 * (xx + yy);
     const double half = 0.5 * (xx - yy);
-    const double least_variance = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
-    if (!(least_variance >= kLeastVariance)) return plane;
-    const double inverse = 1.0 / (xx * yy - xy * xy);
-    const double slope_x = (xz * yy - yz * xy) * inverse;
-    const double slope_y = (yz * xx - xz * xy) * inverse;
-    plane.slope_x = static_cast<float>(slope_x);
-    plane.slope_y = static_cast<float>(slope_y);
-    plane.offset = static_cast<float>(mean_z - slope_x * mean_x - slope_y * mean_y);
-    return plane;
+    const double least = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
+    return least >= kLeastVariance ? std::optional(fit_plane(sum)) : std::nullopt;
   }
 
   VoxelHashTable<> numbers_;  // of the cells
