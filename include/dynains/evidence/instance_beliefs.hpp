@@ -163,13 +163,18 @@ class InstanceBeliefUpdater {
     // AVX2 processors have an instruction that counts bits.
     with_packs([&](auto) {
       for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
-        const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[instance]];
-        const auto all = visibility.count(begin, begin + beliefs.counts[instance].total);
+        const std::uint32_t last = samples.supervoxel_begin[instance + 1];
+        std::uint32_t s = samples.supervoxel_begin[instance];
+        std::uint32_t begin = samples.sample_begin[s];
+        Counts& counts = beliefs.counts[instance];
+        const auto all = visibility.count(begin, begin + counts.total);
         if (all.free + all.hit == 0) continue;
         const float weight = update_instance(all, reference, instance, beliefs);
-        for (std::uint32_t s = samples.supervoxel_begin[instance];
-             s < samples.supervoxel_begin[instance + 1]; ++s) {
-          update_supervoxel(samples, visibility, s, weight, beliefs);
+        for (; s < last; ++s) {
+          const std::uint32_t end = samples.sample_begin[s + 1];
+          update_supervoxel(visibility.bits(begin, end), end - begin, weight,
+                            beliefs.supervoxels[s], counts);
+          begin = end;
         }
       }
     });
@@ -193,19 +198,15 @@ class InstanceBeliefUpdater {
     return {samples, free ? samples : 0, free || belief.hits != 0 ? samples : 0};
   }
 
-  // `weight`: of free samples, see update(). A supervoxel has at most Visibility::kMostBits
-  // samples, which FreeSpaceConfig::supervoxel_samples ensures.
-  void update_supervoxel(const InstanceSamples& samples, const Visibility& visibility,
-                         std::uint32_t s, float weight, InstanceBeliefs& beliefs) const {
-    const std::uint32_t begin = samples.sample_begin[s];
-    const std::uint32_t size = samples.sample_begin[s + 1] - begin;
-    const Visibility::Bits visible = visibility.bits(begin, begin + size);
-    Belief& belief = beliefs.supervoxels[s];
+  // `visible`: its samples, at most Visibility::kMostBits, which
+  // FreeSpaceConfig::supervoxel_samples ensures. `weight`: of free samples, see update(). `counts`:
+  // of its instance.
+  void update_supervoxel(const Visibility::Bits& visible, std::uint32_t samples, float weight,
+                         Belief& belief, Counts& counts) const {
     if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
-    const Counts before = counts_of(belief, size);
-    update(belief, visible.count(), size, weight);
-    Counts& counts = beliefs.counts[samples.instance_of[s]];
-    const Counts now = counts_of(belief, size);
+    const Counts before = counts_of(belief, samples);
+    update(belief, visible.count(), samples, weight);
+    const Counts now = counts_of(belief, samples);
     counts.moved += now.moved - before.moved;
     counts.decided += now.decided - before.decided;
   }
