@@ -47,28 +47,19 @@ float reference_height(const std::vector<Eigen::Vector3d>& points, const Eigen::
     }
   }
   if (around.size() < 8) return kUnknown;
-  Eigen::MatrixX3d rows(around.size(), 3);
-  Eigen::VectorXd heights(around.size());
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < around.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    rows.row(row) << around[i].x(), around[i].y(), 1.0;
-    heights[row] = around[i].z();
-    mean += around[i].head<2>() / static_cast<double>(around.size());
-  }
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  for (const Eigen::Vector3d& p : around) {
-    const Eigen::Vector2d off = p.head<2>() - mean;
-    covariance += off * off.transpose() / static_cast<double>(around.size());
-  }
-  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance).eigenvalues()[0] < 0.4) {
-    return kUnknown;
-  }
-  const Eigen::Vector3d plane = rows.colPivHouseholderQr().solve(heights);
-  return static_cast<float>(at.z() - plane.dot(Eigen::Vector3d(at.x(), at.y(), 1.0)));
+  Eigen::Matrix3Xd off(3, around.size());
+  for (std::size_t i = 0; i < around.size(); ++i) off.col(static_cast<Eigen::Index>(i)) = around[i];
+  const Eigen::Vector3d mean = off.rowwise().mean();
+  off.colwise() -= mean;
+  const Eigen::Matrix3d covariance = off * off.transpose() / static_cast<double>(around.size());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> horizontal(covariance.topLeftCorner<2, 2>());
+  if (horizontal.eigenvalues()[0] < 0.4) return kUnknown;
+  const Eigen::Vector3d normal =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors().col(0);
+  return static_cast<float>(normal.dot(at - mean) / normal.z());
 }
 
-TEST_CASE("heights equal those of a least-squares fit") {
+TEST_CASE("heights equal those of a fit by total least squares") {
   Random random(71);
   SurroundingGround ground;
   std::size_t known = 0, unknown = 0;
