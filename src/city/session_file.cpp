@@ -1,7 +1,6 @@
 #include "session_file.hpp"
 
 #include <array>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "io/byte_reader.hpp"
@@ -17,19 +16,13 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using Vector = std::array<double, 3>;
 
-constexpr char kMagic[9] = "DYNSESS3";
+constexpr char kMagic[9] = "DYNSESS4";
 constexpr std::uint64_t kNumber = sizeof(std::uint64_t);
 
 std::uint64_t checksum(const char* data, std::size_t size) {
   Fingerprint fingerprint;
   fingerprint.add(data, size);
   return fingerprint.value();
-}
-
-std::uint64_t number_at(const std::string& bytes, std::size_t offset) {
-  std::uint64_t value = 0;
-  std::memcpy(&value, bytes.data() + offset, sizeof(value));
-  return value;
 }
 
 Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -146,11 +139,7 @@ SessionBlock SessionFileWriter::add(Span<const char> bytes) {
 
 void SessionFileWriter::finish(const SessionInfo& session) {
   const std::string text = json_of(session).dump(1, ' ', false, Json::error_handler_t::replace);
-  write(text);
-  write(ByteWriter()
-            .number(std::uint64_t{text.size()})
-            .number(checksum(text.data(), text.size()))
-            .bytes());
+  write(ByteWriter().number(add(text).size).bytes());
 }
 
 SessionInfo read_session(const fs::path& path) {
@@ -160,21 +149,15 @@ SessionInfo read_session(const fs::path& path) {
     fail_at_byte(path, 0, std::string("expected \"") + kMagic + '"');
   }
   if (size < 8 + 2 * kNumber) fail_at_byte(path, size, "expected a whole session");
-  file.skip(size - 8 - 2 * kNumber, "a session");
-  const std::string end = file.read_block(2 * kNumber, "a session");
-  const std::uint64_t length = number_at(end, 0);
+  file.skip(size - 8 - kNumber, "a session");
+  std::uint64_t length = 0;
+  file.read(&length, 1, "a session");
   if (length > size - 8 - 2 * kNumber) {
-    fail_at_byte(path, size - 2 * kNumber, "expected the size of the JSON before");
+    fail_at_byte(path, size - kNumber, "expected the size of the JSON before");
   }
   const std::uint64_t begin = size - 2 * kNumber - length;
-  ByteReader again(path);
-  again.skip(begin, "a session");
-  const std::string text = again.read_block(length, "JSON");
-  if (checksum(text.data(), text.size()) != number_at(end, kNumber)) {
-    fail_at_byte(path, begin, "expected JSON with the checksum behind it; the file is damaged");
-  }
   try {
-    SessionInfo session = session_of(Json::parse(text));
+    SessionInfo session = session_of(Json::parse(read_block(path, {begin, length})));
     session.name = path.stem().string();
     return session;
   } catch (const Json::exception& error) {
@@ -188,8 +171,9 @@ std::string read_block(const fs::path& path, const SessionBlock& block) {
   ByteReader file(path);
   file.skip(block.offset, "a part of a session");
   std::string bytes = file.read_block(block.size, "a part of a session");
-  if (number_at(file.read_block(kNumber, "a checksum"), 0) !=
-      checksum(bytes.data(), bytes.size())) {
+  std::uint64_t sum = 0;
+  file.read(&sum, 1, "a checksum");
+  if (sum != checksum(bytes.data(), bytes.size())) {
     fail_at_byte(path, block.offset, "expected the checksum behind the bytes; the file is damaged");
   }
   return bytes;

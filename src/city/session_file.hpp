@@ -1,13 +1,13 @@
 // The file of a session. Numbers are little endian, checksums FNV-1a of 64 bits. In this order:
 //
-//  "DYNSESS3"
-//  blocks, each with the uint64 checksum of its bytes behind it:
+//  "DYNSESS4"
+//  blocks, each with the uint64 checksum of its bytes behind it; the last one is the JSON:
 //    tiles: for each point float x, y (m, from the corner of the tile), z (m, world); uint32 number
 //    of its scan, label of the recording or 0, 1 for ground, else 0
 //    references: 12 double, the upper three rows of T_world_sensor, row by row; then the image, see
 //    pack_image()
-//  JSON of SessionInfo, with the offset and the size (bytes) of each block
-//  uint64 size of the JSON; uint64 checksum of the JSON
+//    JSON of SessionInfo, with the offset and the size (bytes) of each block before
+//  uint64 size of the JSON
 #pragma once
 
 #include <array>

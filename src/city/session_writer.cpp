@@ -15,14 +15,12 @@ namespace fs = std::filesystem;
 
 /// Removes the files of killed writers from a locked city: each writer has the lock.
 void remove_temporaries(const City& city) {
-  std::vector<fs::path> left;
+  std::error_code ignored;  // files of another user, for example, do not stop this writer
   for (const auto& entry : fs::directory_iterator(city.folder())) {
     const fs::path target = target_of_temporary(entry.path().filename().string());
     const bool is_file = fs::is_regular_file(entry.symlink_status());
-    if (is_file && target.extension() == ".session") left.push_back(entry.path());
+    if (is_file && target.extension() == ".session") fs::remove(entry.path(), ignored);
   }
-  std::error_code ignored;  // files of another user, for example, do not stop this writer
-  for (const fs::path& file : left) fs::remove(file, ignored);
 }
 
 }  // namespace
@@ -79,8 +77,8 @@ void SessionWriter::add(PointsView points, Span<const PointLabel> verdicts,
   if (reference == nullptr) return;
   session_.image_grid = references_.grid();
   const PoseRows rows = rows_of(T_world_sensor);
-  const auto* const row_bytes = reinterpret_cast<const std::uint8_t*>(rows.data());
-  bytes_.assign(row_bytes, row_bytes + sizeof(rows));
+  bytes_.clear();
+  add_bytes(&rows, 1, bytes_);
   pack_image(reference->image, bytes_);
   session_.references.push_back(
       {scan, T_world_sensor.translation(), {store_.append(bytes_), bytes_.size()}});

@@ -47,8 +47,7 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
       return static_cast<std::int16_t>(std::lround(metres / kStoredStep));
     };
     const Steps at = {steps(x), steps(y), steps(z)};
-    bytes_.resize(bytes_.size() + sizeof(at));
-    std::memcpy(bytes_.data() + bytes_.size() - sizeof(at), at.data(), sizeof(at));
+    add_bytes(&at, 1, bytes_);
   }
   kept_.count = kept_.points.size();
 }

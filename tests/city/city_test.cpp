@@ -386,7 +386,7 @@ TEST_CASE("a city: another grid or version and a name that leads out are refused
   std::ofstream(folder.path() / "old.session") << "DYNSESS1 and more";
   fs::create_directory(folder.path() / "older");
   fs::rename(folder.path() / "old.session", folder.path() / "older" / "monday.session");
-  CHECK_THROWS_WITH(City(folder.path() / "older"), ContainsSubstring("expected \"DYNSESS3\""));
+  CHECK_THROWS_WITH(City(folder.path() / "older"), ContainsSubstring("expected \"DYNSESS4\""));
 
   fs::create_directory(folder.path() / "other");
   std::ofstream(folder.path() / "other" / "holiday.txt") << "mine";

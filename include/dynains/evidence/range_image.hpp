@@ -46,7 +46,7 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
-  /// A cell to write, for images that are read from files. Call clear() before.
+  /// A cell to write, for images that are read from files. Call allocate() before.
   Cell& cell(std::size_t index) { return cells_[index]; }
   /// The grid of the image; empty before the first allocate().
   const RangeImageGrid& grid() const { return grid_; }
@@ -60,12 +60,6 @@ class RangeImage {
       cells_[0] = {kNothing, kUnknown};
     }
     grid_ = grid;
-  }
-
-  /// Makes an empty image.
-  void clear(const RangeImageGrid& grid) {
-    allocate(grid);
-    std::fill_n(cells_.get(), grid.cell_count(), Cell{kNothing, kUnknown});
   }
 
   /// Replaces the image by the image of one scan. `ground`, `objects`: its points, m, sensor frame.

@@ -4,11 +4,20 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <type_traits>
 #include <vector>
 
 #include "dynains/points.hpp"
 
 namespace dynains {
+
+/// Adds values as they are in memory.
+template <class Value>
+void add_bytes(const Value* values, std::size_t count, std::vector<std::uint8_t>& bytes) {
+  static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
+  const auto* const begin = reinterpret_cast<const std::uint8_t*>(values);
+  bytes.insert(bytes.end(), begin, begin + count * sizeof(Value));
+}
 
 /// Bytes that are added once and read later, in any order. They are in a file that no folder lists:
 /// it ends with this object or with the process, however that ends. Errors throw IoError and name

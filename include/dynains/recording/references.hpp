@@ -2,8 +2,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -12,84 +15,95 @@
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/recording/byte_store.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/bits.hpp"
 
 namespace dynains {
 
-/// Bytes of a range image: for each of the two values of Cell, the cells row by row. A value is the
-/// difference to the previous value of its row (to 0 for the first), zigzag-coded as 2d or -2d - 1,
-/// in groups of 7 bits, the lowest first; bit 7 tells that another group follows. A byte 0 is a
-/// difference of 0, and the coded number behind it counts further differences of 0.
-/// They are added to `bytes`.
+namespace detail {
+
+/// A value of up to 64 cells in a row, as changes from cell to cell.
+struct RowChanges {
+  std::uint64_t cells = 0;  ///< bits of those that change, the first lowest
+  std::array<std::int16_t, kWordBits + 1> values =
+      {};  ///< before these cells, and after each change
+
+  /// Takes the next `count` cells of the row, and adds the changes to `bytes`.
+  void pack(const RangeImage::Cell* from, std::int32_t count, std::int16_t RangeImage::Cell::*value,
+            std::vector<std::uint8_t>& bytes) {
+    std::int16_t latest = values[0];
+    std::uint8_t changes = 0;
+    cells = 0;
+    for (std::int32_t i = 0; i < count; ++i) {
+      const bool is_new = from[i].*value != latest;
+      latest = from[i].*value;
+      values[changes + 1U] = latest;
+      cells |= std::uint64_t{is_new} << i;
+      changes = static_cast<std::uint8_t>(changes + is_new);
+    }
+    bytes.push_back(changes);
+    if (changes > 0) add_bytes(&cells, 1, bytes);
+    add_bytes(&values[1], changes, bytes);
+    values[0] = latest;
+  }
+  /// Takes what pack() added. Returns whether it is valid.
+  bool unpack(const std::uint8_t*& at, const std::uint8_t* end) {
+    if (at == end) return false;
+    const std::size_t changes = *at++;
+    const std::size_t size = changes == 0 ? 0 : sizeof(cells) + changes * sizeof(values[0]);
+    if (changes > kWordBits || static_cast<std::size_t>(end - at) < size) return false;
+    cells = 0;
+    if (changes > 0) {
+      std::memcpy(&cells, at, sizeof(cells));
+      std::memcpy(&values[1], at + sizeof(cells), size - sizeof(cells));
+    }
+    at += size;
+    return count_ones(cells) == changes;
+  }
+};
+
+}  // namespace detail
+
+/// Adds a range image to `bytes`, row by row. For each 64 columns, less at the end of a row, and
+/// each of the two values of Cell: the number of cells whose value is another one than in the cell
+/// before (than 0 in the first of a row), as a byte, and if it is not 0, 64 bits, the lowest for
+/// the first column, that tell which cells these are, and their values as int16.
 inline void pack_image(const RangeImage& image, std::vector<std::uint8_t>& bytes) {
   const RangeImageGrid& grid = image.grid();
-  const auto put = [&](std::uint32_t value) {
-    for (; value >= 0x80U; value >>= 7U) bytes.push_back(static_cast<std::uint8_t>(value | 0x80U));
-    bytes.push_back(static_cast<std::uint8_t>(value));
-  };
-  std::uint32_t zeros = 0;
-  const auto end_zeros = [&] {
-    if (zeros == 0) return;
-    put(0);
-    put(zeros - 1);
-    zeros = 0;
-  };
-  for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
-    for (std::int32_t row = 0; row < grid.rows; ++row) {
-      const RangeImage::Cell* const cells = &image[grid.cell(row, 0)];
-      std::int32_t before = 0;
-      for (std::int32_t column = 0; column < grid.columns; ++column) {
-        const std::int32_t step = cells[column].*value_of - before;
-        before = cells[column].*value_of;
-        if (step == 0) {
-          ++zeros;
-          continue;
-        }
-        end_zeros();
-        put(static_cast<std::uint32_t>(step) << 1U ^ (step < 0 ? ~0U : 0U));
-      }
+  for (std::int32_t row = 0; row < grid.rows; ++row) {
+    detail::RowChanges nearest, around;
+    for (std::int32_t begin = 0; begin < grid.columns; begin += 64) {
+      const RangeImage::Cell* const cells = &image[grid.cell(row, begin)];
+      const std::int32_t count = std::min(64, grid.columns - begin);
+      nearest.pack(cells, count, &RangeImage::Cell::nearest, bytes);
+      around.pack(cells, count, &RangeImage::Cell::around, bytes);
     }
   }
-  end_zeros();
 }
 
 /// Inverse of pack_image(). Returns false if `bytes` is not an image of this grid.
 inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> bytes,
                          RangeImage& image) {
   const std::uint8_t* at = bytes.begin();
-  bool is_valid = true;
-  const auto get = [&]() -> std::uint32_t {
-    std::uint32_t value = 0;
-    for (std::uint32_t shift = 0; shift < 32 && at != bytes.end(); shift += 7) {
-      const std::uint8_t byte = *at++;
-      value |= static_cast<std::uint32_t>(byte & 0x7FU) << shift;
-      if (byte < 0x80U) return value;
-    }
-    is_valid = false;
-    return 0;
-  };
-  image.clear(grid);
-  std::uint64_t zeros = 0;
-  for (const auto value_of : {&RangeImage::Cell::nearest, &RangeImage::Cell::around}) {
-    for (std::int32_t row = 0; row < grid.rows; ++row) {
-      RangeImage::Cell* const cells = &image.cell(grid.cell(row, 0));
-      std::int32_t value = 0;
-      for (std::int32_t column = 0; column < grid.columns; ++column) {
-        if (zeros > 0) {
-          --zeros;
-        } else if (const std::uint32_t code = get(); code == 0) {
-          zeros = get();
-        } else {
-          const auto half = static_cast<std::int32_t>(code >> 1U);
-          value += (code & 1U) == 0 ? half : -half - 1;
-          is_valid = is_valid && value >= INT16_MIN && value <= INT16_MAX;
-        }
-        if (!is_valid) return false;
-        cells[column].*value_of = static_cast<std::int16_t>(value);
+  image.allocate(grid);
+  for (std::int32_t row = 0; row < grid.rows; ++row) {
+    detail::RowChanges nearest, around;
+    for (std::int32_t begin = 0; begin < grid.columns; begin += 64) {
+      if (!nearest.unpack(at, bytes.end()) || !around.unpack(at, bytes.end())) return false;
+      RangeImage::Cell* const cells = &image.cell(grid.cell(row, begin));
+      const std::int32_t count = std::min(64, grid.columns - begin);
+      const std::int16_t *near = &nearest.values[0], *least = &around.values[0];
+      for (std::int32_t i = 0; i < count; ++i) {
+        near += nearest.cells >> i & 1U;
+        least += around.cells >> i & 1U;
+        cells[i] = {*near, *least};
       }
+      nearest.values[0] = *near;
+      around.values[0] = *least;
     }
   }
-  return zeros == 0 && at == bytes.end();
+  return at == bytes.end();
 }
 
 /// One reference scan of a session.
@@ -115,10 +129,18 @@ class RecordingReferences {
   /// unknown: if their verdicts are wrong, nothing else is removed by them.
   const RecordingReference* add(PointsView points, Span<const PointLabel> verdicts,
                                 const Pose& T_world_sensor, std::uint32_t scan) {
-    if (is_near_latest(T_world_sensor.translation(), scan)) return nullptr;
+    constexpr double kWay = 1.0;  // m
+    const Eigen::Vector3d position = T_world_sensor.translation();
+    const bool is_near = latest_ && (position - *latest_).norm() < kWay;
+    if (is_near && scan - reference_.scan < most_scans_) return nullptr;
     split(points, verdicts);
-    if (grid_.rows == 0 && !choose_grid()) return nullptr;
-    latest_ = T_world_sensor.translation();
+    if (grid_.rows == 0) {
+      const SensorModel sensor =
+          estimate_sensor_model(PointsView(split_.points).subview(0, split_.count));
+      if (!sensor.known()) return nullptr;
+      grid_ = RangeImageGrid::for_sensor(sensor);
+    }
+    latest_ = position;
     reference_.scan = scan;
     reference_.T_world_beams = T_world_sensor;
     reference_.image.build(grid_, split_.ground(), split_.non_ground(), moving_,
@@ -128,18 +150,13 @@ class RecordingReferences {
   }
 
  private:
-  bool is_near_latest(const Eigen::Vector3d& position, std::uint32_t scan) const {
-    constexpr double kWay = 1.0;  // m
-    return latest_ && (position - *latest_).norm() < kWay && scan - reference_.scan < most_scans_;
-  }
-
   static void forget_moving(RangeImage& image) {
     for (std::int32_t row = 0; row < image.grid().rows; ++row) {
-      for (std::int32_t column = 0; column < image.grid().columns; ++column) {
-        RangeImage::Cell& cell = image.cell(image.grid().cell(row, column));
-        const bool has_moving = (cell.nearest & RangeImage::kMoving) != 0;
-        if (has_moving) cell = {RangeImage::kNothing, RangeImage::kUnknown};
-      }
+      RangeImage::Cell* const cells = &image.cell(image.grid().cell(row, 0));
+      std::replace_if(
+          cells, cells + image.grid().columns,
+          [](const RangeImage::Cell& cell) { return (cell.nearest & RangeImage::kMoving) != 0; },
+          RangeImage::Cell{RangeImage::kNothing, RangeImage::kUnknown});
     }
   }
 
@@ -160,13 +177,6 @@ class RecordingReferences {
       if (takes_ground) split_.ground_count = count;
     }
     split_.count = count;
-  }
-
-  bool choose_grid() {
-    const SensorModel sensor =
-        estimate_sensor_model(PointsView(split_.points).subview(0, split_.count));
-    if (sensor.known()) grid_ = RangeImageGrid::for_sensor(sensor);
-    return sensor.known();
   }
 
   std::uint32_t most_scans_;
