@@ -8,7 +8,6 @@
 #include <cstring>
 #include <map>
 #include <optional>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -47,15 +46,10 @@ struct VoxelTile {
 
   /// Adds all to `bytes`.
   void pack(std::vector<std::uint8_t>& bytes) const {
-    static_assert(std::is_trivially_copyable_v<Value>, "values are stored as bytes");
     const std::uint64_t count = keys.size();
-    const auto add = [&](const void* data, std::size_t size) {
-      const auto* const begin = static_cast<const std::uint8_t*>(data);
-      bytes.insert(bytes.end(), begin, begin + size);
-    };
-    add(&count, sizeof(count));
-    add(keys.data(), count * sizeof(VoxelKey));
-    add(values.data(), count * sizeof(Value));
+    add_bytes(&count, 1, bytes);
+    add_bytes(keys.data(), count, bytes);
+    add_bytes(values.data(), count, bytes);
   }
   /// Takes what pack() added. Returns its end.
   const std::uint8_t* unpack(const std::uint8_t* bytes) {
@@ -85,7 +79,6 @@ class PagedTiles {
   /// The tile, which is new or not, to be changed. Throws what the store throws.
   Tile& at(const TileIndex& index) {
     if (!is_recent(index)) take_recent(*entries_.try_emplace(index).first);
-    load(*recent_);
     recent_->is_changed = true;
     return *recent_->tile;
   }
@@ -96,7 +89,6 @@ class PagedTiles {
       if (found == entries_.end()) return nullptr;
       take_recent(*found);
     }
-    load(*recent_);
     return &*recent_->tile;
   }
 
@@ -164,6 +156,7 @@ class PagedTiles {
     return recent_ != nullptr && recent_index_[0] == index[0] && recent_index_[1] == index[1];
   }
   void take_recent(std::pair<const TileIndex, Entry>& entry) {
+    load(entry.second);
     recent_index_ = entry.first;
     recent_ = &entry.second;
   }
@@ -188,13 +181,14 @@ class PagedTiles {
       entry.count = entry.tile->size();
     }
     entry.tile.reset();
+    recent_ = nullptr;
   }
 
   ByteStore* store_;
   std::size_t budget_;
   double edge_;                         // m
   std::map<TileIndex, Entry> entries_;  // its elements do not move
-  Entry* recent_ = nullptr;
+  Entry* recent_ = nullptr;             // in memory
   TileIndex recent_index_ = {};
   std::vector<std::uint8_t> bytes_;
   std::vector<std::pair<double, Entry*>> far_;

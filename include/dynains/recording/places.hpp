@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -107,8 +108,10 @@ struct alignas(64) RecordingPlace {
   bool was_hit = false;                             ///< by any look
   bool free_before = false, free_after = false;     ///< before, after any epoch measured it
 
-  /// Whether looks tell that what was measured in it came or went. Beams that pass what others hit
-  /// tell of something porous.
+  /// Whether looks tell that what was measured in it came or went: they passed it before any epoch
+  /// measured it, and the first one removed its points, or passed it after all, and the last one
+  /// did; or kFreeLooks looks in a row passed it, and the first pass kept no points of that time:
+  /// beams that pass what others hit tell of something porous.
   bool has_changed() const {
     const bool came = first.removed_first && free_before;
     const bool left = first.removed_last && free_after;
@@ -162,9 +165,8 @@ struct RecordingTile {
 
   /// The ground in the column of a cell.
   static std::size_t column(VoxelKey cell) {
-    const VoxelKey last = (1U << kTileShift) - 1;
-    const auto index = [&](int axis) { return static_cast<VoxelKey>(voxel_index(cell, axis)); };
-    return (index(0) & last) << kTileShift | (index(1) & last);
+    const auto index = [&](int axis) { return voxel_index(cell, axis) & ((1 << kTileShift) - 1); };
+    return static_cast<std::size_t>(index(0) << kTileShift | index(1));
   }
   /// The samples of all places; none is added then.
   const TestedCells& tested() {
@@ -178,8 +180,7 @@ struct RecordingTile {
   }
   void pack(std::vector<std::uint8_t>& bytes) const {
     places.pack(bytes);
-    const auto* const begin = reinterpret_cast<const std::uint8_t*>(ground.data());
-    bytes.insert(bytes.end(), begin, begin + ground_bytes());
+    add_bytes(ground.data(), ground.size(), bytes);
   }
   void unpack(const std::uint8_t* bytes) {
     std::memcpy(ground.data(), places.unpack(bytes), ground_bytes());
@@ -194,13 +195,7 @@ struct RecordingTile {
 /// Places are cells of 0.4 m with points above the ground. The verdicts of the first pass on them
 /// are kept by epochs. Then reference scans test the points of each place, in the order of their
 /// times. Those of an epoch are one look. A look is free if beams passed the place and none hit it.
-/// A place has changed by its state over time, not by the sum of its looks, in one of
-/// these ways:
-/// - kFreeLooks looks in a row are free, no hit lies between, and the first pass kept no points of
-///   that time: beams that pass what others hit tell of something porous.
-/// - An object came: looks passed the place before any scan measured it, and the first epoch
-///   removed its points.
-/// - An object left: the last epoch removed its points, and looks passed the place after it.
+/// A place has changed by its state over time, not by the sum of its looks.
 /// The height of the ground is the mean of all scans: single scans have noise and hidden ground.
 class RecordingPlaces {
  public:
@@ -213,35 +208,30 @@ class RecordingPlaces {
   /// Epochs ascend.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const Cause> causes,
            const Pose& T_world_sensor, std::uint16_t epoch) {
-    Place* place = nullptr;
-    VoxelKey cell_of_place = 0;
-    const auto add_point = [&](std::size_t i, auto&& cell_of, unsigned octant) {
-      const bool is_removed = verdicts[i] == PointLabel::kDynamic;
+    std::array<Added, 128> batch;
+    std::size_t count = 0;
+    const auto add_batch = [&] {
+      add_places({batch.data(), count}, points, verdicts, T_world_sensor, epoch);
+      count = 0;
+    };
+    for_each_in_cells(points, T_world_sensor, [&](std::size_t i, auto&& cell_of, unsigned octant) {
       if (verdicts[i] == PointLabel::kGround) {
         const VoxelKey cell = cell_of();
         GroundColumn& ground = tiles_.at(tile_of(cell)).ground[Tile::column(cell)];
         ground.height_sum += world_point(points, i, T_world_sensor).z();
         ++ground.count;
+      } else if (verdicts[i] == PointLabel::kStatic ||
+                 (verdicts[i] == PointLabel::kDynamic && causes[i] != Cause::kUnderInstance)) {
+        Added& added = batch[count++];
+        added.i = i;
+        added.octant = octant;
+        added.cell = cell_of();
+        added.places = &tiles_.at(tile_of(added.cell)).places;
+        added.places->numbers.prefetch(added.cell);
+        if (count == batch.size()) add_batch();
       }
-      const bool is_above_ground =
-          verdicts[i] == PointLabel::kStatic || (is_removed && causes[i] != Cause::kUnderInstance);
-      if (!is_above_ground) return;
-      const VoxelKey cell = cell_of();
-      if (place == nullptr || cell != cell_of_place) {
-        VoxelTile<Place>& places = tiles_.at(tile_of(cell)).places;
-        place = &places.values[places.add(cell)];
-        cell_of_place = cell;
-      }
-      if (!is_removed) place->kept.add(epoch);
-      // The first verdicts on points that are too far for looks say little of their place.
-      const float squared = points.x[i] * points.x[i] + points.y[i] * points.y[i];
-      const bool is_near = squared <= static_cast<float>(kLookRange * kLookRange);
-      if (is_near) place->first.add(is_removed, epoch);
-      if (place->samples.has(octant)) return;
-      const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
-      place->samples.add(octant, (point - corner_of(cell)).array() / kWorldCell);
-    };
-    for_each_in_cells(points, T_world_sensor, add_point);
+    });
+    add_batch();
     free_far(T_world_sensor.translation());
   }
 
@@ -333,6 +323,7 @@ class RecordingPlaces {
                                                                  place.last_free};
           }
         });
+    changed_.numbers.reserve(8 * changed_.size());  // most searches end at once: nothing is there
   }
 
   /// The changed place in a cell, after decide(); null: nothing has changed.
@@ -345,6 +336,40 @@ class RecordingPlaces {
  private:
   using Place = RecordingPlace;
   using Tile = RecordingTile;
+
+  // A point above the ground.
+  struct Added {
+    std::size_t i;
+    unsigned octant;
+    std::uint32_t place;  // its number
+    VoxelKey cell;
+    VoxelTile<Place>* places;
+  };
+
+  // Adds points of a scan. All places are found first, so that memory accesses overlap.
+  void add_places(Span<Added> batch, PointsView points, Span<const PointLabel> verdicts,
+                  const Pose& T_world_sensor, std::uint16_t epoch) {
+    const Added* latest = nullptr;
+    for (Added& added : batch) {
+      const bool is_same = latest != nullptr && added.cell == latest->cell;
+      added.place = is_same ? latest->place : added.places->add(added.cell);
+      __builtin_prefetch(&added.places->values[added.place]);
+      latest = &added;
+    }
+    for (const Added& added : batch) {
+      Place& place = added.places->values[added.place];
+      const std::size_t i = added.i;
+      const bool is_removed = verdicts[i] == PointLabel::kDynamic;
+      if (!is_removed) place.kept.add(epoch);
+      // The first verdicts on points that are too far for looks say little of their place.
+      const float squared = points.x[i] * points.x[i] + points.y[i] * points.y[i];
+      const bool is_near = squared <= static_cast<float>(kLookRange * kLookRange);
+      if (is_near) place.first.add(is_removed, epoch);
+      if (place.samples.has(added.octant)) continue;
+      const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
+      place.samples.add(added.octant, (point - corner_of(added.cell)).array() / kWorldCell);
+    }
+  }
 
   // Adds the open look to the states of the places that it saw.
   void end_look() {
