@@ -81,25 +81,24 @@ class Candidates {
 
 CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, std::uint32_t a,
                          std::uint32_t b) {
-  VoxelHashTable<> before, after;
   const auto voxel = [&](std::size_t session, std::size_t i) {
     return session_voxel(grid, history.points(session)[i]);
   };
-  const auto is_in = [](const VoxelHashTable<>& voxels, VoxelKey key) {
-    return voxels.find(key) != kNoIndex;
+  const auto voxels_after = [&](std::uint32_t last) {
+    VoxelHashTable<> voxels;
+    history.for_each_standing(
+        last, [&](std::size_t session, std::size_t i) { voxels.insert(voxel(session, i)); });
+    return voxels;
   };
-  history.for_each_standing(
-      a, [&](std::size_t session, std::size_t i) { before.insert(voxel(session, i)); });
-  history.for_each_standing(
-      b, [&](std::size_t session, std::size_t i) { after.insert(voxel(session, i)); });
+  const VoxelHashTable<> before = voxels_after(a), after = voxels_after(b);
   Candidates removed(grid, history), added(grid, history);
   history.for_each_standing(a, [&](std::size_t session, std::size_t i) {
     if (history.points(session)[i].is_ground != 0) return;
-    if (!is_in(after, voxel(session, i))) removed.add(session, i);
+    if (after.find(voxel(session, i)) == kNoIndex) removed.add(session, i);
   });
   history.for_each_standing(b, [&](std::size_t session, std::size_t i) {
     if (history.points(session)[i].is_ground != 0) return;
-    if (is_in(before, voxel(session, i))) {
+    if (before.find(voxel(session, i)) != kNoIndex) {
       removed.add_standing(session, i);
       added.add_standing(session, i);
     } else if (history.was_free(session, i)) {
@@ -157,8 +156,7 @@ void City::revise(TileHistory& history, const TileIndex& tile, const SessionInfo
     read_reference(session, which, reference);
     history.revise(
         which.sensor - corner,
-        [&](const PointBuffer& points, std::size_t count,
-            const Eigen::Vector3d& origin) -> const auto& {
+        [&](const auto& points, std::size_t count, const auto& origin) -> const auto& {
           return test_visibility(reference, session.evidence, points, count, corner + origin,
                                  visibility);
         });

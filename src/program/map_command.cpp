@@ -69,7 +69,7 @@ class CityPointFile {
     attributes.label = attributes.instance = point.label;
     attributes.session = static_cast<std::uint16_t>(std::min(session, 65535U));
     attributes.is_ground = point.is_ground != 0;
-    file_->add(city_.position(tile, point), attributes);
+    file_->add(position_of(city_.grid(), tile, point), attributes);
   }
 
   std::size_t size() const { return file_->size(); }

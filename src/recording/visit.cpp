@@ -19,17 +19,13 @@ Visit::Visit(ByteStore& store, const SecondPassConfig& config)
       places_(store, config.memory),
       references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
 
-// Axes of the places: which way is up is told by the ground of the first scan, not by the world.
-void Visit::find_up(PointsView points, const Pose& T_world_sensor) {
-  T_level_world_.linear() = estimate_mounting(points).R_level_sensor();
-  T_level_world_ = orthonormalized(T_level_world_ * T_world_sensor.inverse());
-}
-
 void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
   const std::uint32_t number = scans();
   if (number == 0) {
     first_ = static_cast<std::uint32_t>(verdict.scan);
-    find_up(points, compared.T_world_sensor);
+    // Which way is up is told by the ground of the first scan, not by the world.
+    T_level_world_.linear() = estimate_mounting(points).R_level_sensor();
+    T_level_world_ = orthonormalized(T_level_world_ * compared.T_world_sensor.inverse());
   }
   const Pose T = orthonormalized(T_level_world_ * compared.T_world_sensor);
   is_suspicious_ = is_suspicious_ || compared.is_suspicious;
@@ -51,25 +47,19 @@ bool Visit::test(const std::function<bool()>& keep_going) {
   RecordingReference reference;
   for (const Reference& kept : kept_) {
     if (!keep_going()) return false;
-    read(kept, reference);
+    store_.read(kept.offset, kept.size, packed_);
+    reference.T_world_beams = scans_[kept.scan].T_level_sensor;
+    if (!unpack_image(references_.grid(), packed_, reference.image)) {
+      throw IoError("a reference of the second pass was damaged in its store");
+    }
     places_.test(
-        scans_[kept.scan].epoch, reference.T_world_beams.translation(),
-        [&](const PointBuffer& points, std::size_t count,
-            const Eigen::Vector3d& origin) -> const auto& {
-          return test_visibility(reference, config_.evidence, points, count, origin, visibility);
+        scans_[kept.scan].epoch,
+        reference.T_world_beams.translation(), [&](const auto&... points) -> const auto& {
+          return test_visibility(reference, config_.evidence, points..., visibility);
         });
   }
   places_.decide();
   return true;
-}
-
-void Visit::read(const Reference& kept, RecordingReference& reference) {
-  store_.read(kept.offset, kept.size, packed_);
-  reference.scan = kept.scan;
-  reference.T_world_beams = scans_[kept.scan].T_level_sensor;
-  if (!unpack_image(references_.grid(), packed_, reference.image)) {
-    throw IoError("a reference of the second pass was damaged in its store");
-  }
 }
 
 RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArrays& verdict) {

@@ -70,10 +70,6 @@ class City {
   TileHistory history(const TileIndex& tile, std::uint32_t last = TileHistory::kNever) const;
   /// find_changes(). Throws ConfigError unless `a` is before `b`.
   CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
-  /// World position of a point of a tile, m.
-  Eigen::Vector3d position(const TileIndex& tile, const SessionPoint& point) const {
-    return position_of(grid_, tile, point);
-  }
 
   /// Removes one session: the map is as if it had never come.
   void drop(const std::string& name);

@@ -34,12 +34,9 @@ class SessionPoints {
       const Eigen::Vector3d position = world_point(points, i, T_world_sensor);
       const TileIndex index = tile_index(grid_, position);
       const Eigen::Vector3f p = (position - tile_corner(grid_, index)).cast<float>();
-      const SessionPoint point = {p.x(),
-                                  p.y(),
-                                  p.z(),
-                                  scan,
-                                  labels.empty() ? 0 : labels[i],
-                                  verdicts[i] == PointLabel::kGround ? 1U : 0U};
+      const std::uint32_t label = labels.empty() ? 0 : labels[i];
+      const std::uint32_t is_ground = verdicts[i] == PointLabel::kGround ? 1 : 0;
+      const SessionPoint point = {p.x(), p.y(), p.z(), scan, label, is_ground};
       VoxelTile<SessionPoint>& tile = tiles_.at(index);
       const std::size_t count = tile.size();
       const std::uint32_t number = tile.add(session_voxel(grid_, point));

@@ -69,8 +69,6 @@ class Visit {
     std::uint64_t offset;  // in the store
     std::size_t size;      // bytes
   };
-  void find_up(PointsView points, const Pose& T_world_sensor);
-  void read(const Reference& kept, RecordingReference& reference);
   bool belongs_to_object(PointLabel label, const Eigen::Vector3d& point);
   bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
 
