@@ -148,10 +148,9 @@ class Odometry::Loop {
   /// Traffic that moves with the sensor fits to it without a motion. Then landmarks tell the way
   /// along the direction that surfaces determine worst.
   void search_first_motion(Registration& best, double period) {
-    const double farthest = std::min(period, kLongestPoseGap) / 0.1 * kFarthestStep;
     const Landmarks first = first_->landmarks(), second = scan_.landmarks();
     const auto found = register_along(map_, scan_.keypoints(), first, second, best.T_a_b,
-                                      best.uncertain[0], farthest);
+                                      best.uncertain[0], longest_way(period));
     if (found && mean_gap(first, second, found->T_a_b) < mean_gap(first, second, best.T_a_b)) {
       best = *found;
     }

@@ -33,11 +33,12 @@ class ChainScan {
 constexpr double kFarthestFromGuess = 1.5;  // m
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
-/// and the motion at another place.
-std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& elsewhere) {
+/// less than `farthest` (m), and the motion at another place.
+std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& elsewhere,
+                                double farthest) {
   std::vector<Pose> guesses = {Pose::Identity()};
   const double way = given.translation().norm();
-  if (way < kFarthestStep) {
+  if (way < farthest) {
     guesses.push_back(given);
     for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(-1, 0),
                                              Eigen::Vector2d(0, 1), Eigen::Vector2d(0, -1)}) {
@@ -257,8 +258,9 @@ std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t n
     motions.push_back({number, first, second, found->T_a_b, found->difference, found->deviation});
     return true;
   };
-  add(first + 1, first_guesses(motion_between(recording, first, first + 1), elsewhere),
-      kFarthestStep);
+  const double farthest = longest_way(recording.time(first + 1) - recording.time(first));
+  add(first + 1, first_guesses(motion_between(recording, first, first + 1), elsewhere, farthest),
+      farthest);
   for (std::size_t step = 3; step <= kLongest && !motions.empty(); step *= 3) {
     const Pose T = motions.back().T_first_second;
     if (extent_of(T) > kFar || first + step >= recording.size()) break;

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <optional>
 #include <vector>
 
+#include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 #include "landmarks.hpp"
 #include "scan_registration.hpp"
@@ -14,8 +16,11 @@ namespace dynains {
 /// Range (m) of landmarks for the search: beside a motorway, near ones may be traffic and rails.
 inline constexpr double kWayRange = 80.0;
 
-/// Longest way (m) from one scan to the next in 0.1 s.
-inline constexpr double kFarthestStep = 6.0;
+/// Longest way (m) of a sensor in `period` (s), of which 0.1 to 1 s count: times may be wrong.
+inline double longest_way(double period) {
+  constexpr double kFastest = 60.0;  // m/s
+  return kFastest * std::clamp(period, 0.1, kLongestPoseGap);
+}
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.
 double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b);
