@@ -495,12 +495,29 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   return d;
 }
 
+/// Whether de-skewing leaves less than half of the error of the given motion, as `d` has it.
+bool is_skewed(const Recording& recording, const Diagnosis& d) {
+  if (!recording.columns().time || recording.is_deskewed()) return false;
+  RecordingOptions options = recording.options();
+  options.deskew = true;
+  try {
+    const Recording other(recording.folder(), options);
+    const auto suffice = [](const auto& motions) { return are_enough(motions, kFewestPairs); };
+    const std::vector<RegisteredMotion> motions = register_motions(other, suffice);
+    const MotionError steps = motion_error(motions, given_motion(other), Pose::Identity(), true);
+    return suffice(motions) && std::hypot(steps.translation, kLever * steps.rotation) <
+                                   0.5 * std::hypot(d.translation_error, kLever * d.rotation_error);
+  } catch (const IoError&) {
+    return false;  // its times are none of points
+  }
+}
+
 }  // namespace
 
 Diagnosis diagnose(const Recording& recording, std::size_t pairs) {
   Diagnosis d = diagnose_as_opened(recording, pairs);
   const bool agrees = d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (agrees && !has_wrong_origin(recording)) return d;
+  if (agrees && !has_wrong_origin(recording) && !is_skewed(recording, d)) return d;
   for (const RecordingOptions& options : other_options(recording)) {
     try {
       const Recording other(recording.folder(), options);
