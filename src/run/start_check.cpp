@@ -21,7 +21,8 @@ namespace {
 
 /// Judges the poses as `dynains check` does.
 void check_poses(const Recording& recording, bool accepts_poses, StartCheck& result) {
-  const Diagnosis d = diagnose(recording, /*pairs=*/3);
+  Diagnosis d = diagnose(recording, /*pairs=*/3);
+  if (d.verdict == PoseVerdict::kUnknown) d = diagnose(recording);  // the places may be empty
   result.agreement = d.as_given;
   if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;
   const std::string text = advice(recording, d);
@@ -79,7 +80,7 @@ std::optional<std::string> remark_on_lone_scans(const Recording& recording, cons
     const double pause = recording.time(i) - recording.time(i - 1);
     breaks += config.starts_epoch(pause, step.norm()) ? 1 : 0;
   }
-  if (2 * breaks <= last - first) return std::nullopt;
+  if (10 * breaks <= last - first) return std::nullopt;
   return std::to_string(breaks) + " of " + std::to_string(last - first + 1) +
          " scans come so long after the one before, or so far from it, that they are not compared, "
          "and nothing is removed from scans that stand alone; are times in seconds and poses in "
