@@ -285,7 +285,7 @@ void Recording::list_scans() {
                           [](const Scan& scan) { return is_number(scan.name); });
   for (const Scan& scan : scans_) {
     const bool is_kitti = format_ == ScanFormat::kBin && scan_folder_ == folder_ / "velodyne";
-    if (!is_kitti || scan.name.find_first_not_of("0123456789") == std::string::npos) continue;
+    if (!is_kitti || scan.name.find_first_not_of("0123456789._") == std::string::npos) continue;
     fail(scan.file, "expected a number as name, such as 000123.bin");
   }
   for (std::size_t i = 0; i < scans_.size(); ++i) {

@@ -502,7 +502,8 @@ TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
 TEST_CASE("Digits behind the point of a name are decimals, or nanoseconds without leading zeros") {
   const auto times = [](const std::vector<std::string>& names) {
     const TemporaryFolder folder;
-    for (const std::string& name : names) write_text(folder / (name + ".pcd"), pcd({1, 0, 0}));
+    for (const std::string& name : names)
+      write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
     RecordingOptions options;
     options.without_poses = true;
     const Recording recording(folder.path(), options);
