@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <initializer_list>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "dynains/median.hpp"
 
@@ -14,14 +14,12 @@ namespace {
 
 using Motions = std::vector<RegisteredMotion>;
 
-/// The order of quaternions that the format does not define; kNone if it is given, or if there are
-/// none.
+/// The order of quaternions that is neither given nor, else, that of the format; kNone without any.
 QuaternionOrder other_order(const Recording& recording) {
-  if (!recording.has_quaternions() || recording.convention().quaternion != QuaternionOrder::kNone) {
-    return QuaternionOrder::kNone;
-  }
-  const bool is_xyzw = recording.quaternion_order() == QuaternionOrder::kXyzw;
-  return is_xyzw ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+  if (!recording.has_quaternions()) return QuaternionOrder::kNone;
+  QuaternionOrder order = recording.convention().quaternion;
+  if (order == QuaternionOrder::kNone) order = recording.quaternion_order();
+  return order == QuaternionOrder::kXyzw ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
 }
 
 Reading given_reading(const Recording& recording) {
@@ -126,7 +124,7 @@ std::vector<Reading> usual_readings(const Recording& recording) {
   const PoseConvention& given = recording.convention();
   std::vector<Reading> all = {given_reading(recording)};
   using Change = std::function<void(PoseConvention&)>;
-  const auto combine = [&](std::initializer_list<Change> alternatives) {
+  const auto combine = [&](const std::vector<Change>& alternatives) {
     const std::size_t count = all.size();
     for (const Change& change : alternatives) {
       for (std::size_t i = 0; i < count; ++i) {
@@ -136,21 +134,23 @@ std::vector<Reading> usual_readings(const Recording& recording) {
       }
     }
   };
-  if (!given.invert) combine({[](PoseConvention& c) { c.invert = true; }});
+  combine({[](PoseConvention& c) { c.invert = !c.invert; }});
   const QuaternionOrder order = other_order(recording);
   if (order != QuaternionOrder::kNone) {
     combine({[order](PoseConvention& c) { c.quaternion = order; }});
   }
-  if (!given.left_handed) combine({[](PoseConvention& c) { c.left_handed = true; }});
-  if (given.frame == PoseFrame::kAuto) {
-    const bool is_camera = recording.has_calibration() && !recording.has_quaternions();
-    combine({[is_camera](PoseConvention& c) {
-      c.frame = is_camera ? PoseFrame::kLidar : PoseFrame::kCamera;
-    }});
+  combine({[](PoseConvention& c) { c.left_handed = !c.left_handed; }});
+  const bool is_camera = given.frame == PoseFrame::kCamera ||
+                         (given.frame == PoseFrame::kAuto && recording.has_calibration() &&
+                          !recording.has_quaternions());
+  combine({[is_camera](PoseConvention& c) {
+    c.frame = is_camera ? PoseFrame::kLidar : PoseFrame::kCamera;
+  }});
+  std::vector<Change> units;
+  for (const double unit : {0.001, 0.01, 1.0}) {
+    if (unit != given.unit) units.emplace_back([unit](PoseConvention& c) { c.unit = unit; });
   }
-  if (given.unit == 1.0) {
-    combine({[](PoseConvention& c) { c.unit = 0.001; }, [](PoseConvention& c) { c.unit = 0.01; }});
-  }
+  combine(units);
   for (const int shift : {1, -1, 2, -2}) {
     all.push_back({given, recording.time_offset(), 1});
     all.back().convention.shift += shift;
@@ -167,11 +167,9 @@ std::vector<Reading> fitted_readings(const Recording& recording, const Motions& 
                            [&](const Motions& some) { return fit_offset(recording, some); }};
   const Reading given = given_reading(recording);
   std::vector<Reading> bases = {given};
-  if (!given.convention.invert) {
-    bases.push_back(given);
-    bases.back().convention.invert = true;
-    bases.back().complexity = 1;
-  }
+  bases.push_back(given);
+  bases.back().convention.invert = !given.convention.invert;
+  bases.back().complexity = 1;
   const QuaternionOrder order = other_order(recording);
   if (order != QuaternionOrder::kNone) {
     bases.push_back(given);

@@ -25,7 +25,7 @@ BodyMotion motion_under(const Recording& recording, const Reading& reading);
 /// Whether an error (m) of points 10 m from the sensor is clearly smaller than another one.
 bool is_much_smaller(double error, double other);
 
-/// All combinations of common mistakes, except options that were given; shifts alone.
+/// All combinations of common mistakes, also of options that were given; shifts alone.
 std::vector<Reading> usual_readings(const Recording& recording);
 
 /// A scale of the ways, an offset of the clocks, and bodies that carry the sensor, as far as the

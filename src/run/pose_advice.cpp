@@ -75,7 +75,8 @@ std::string text_on_proposal(const Recording& recording, const Diagnosis& d) {
   const Changes changes = changes_of(recording, d.proposal);
   std::string text = "Scans agree under other options (" + changes.meaning + ')';
   if (!changes.left_out.empty()) text += ": leave out " + changes.left_out;
-  if (!changes.flags.empty()) text += ": pass " + changes.flags;
+  if (!changes.flags.empty())
+    text += (changes.left_out.empty() ? ": pass " : ", pass ") + changes.flags;
   return text + '.';
 }
 
@@ -99,7 +100,8 @@ std::string text_on_flaws(const PoseFlaws& flaws) {
 }  // namespace
 
 std::string proposed_flags(const Recording& recording, const RecordingOptions& proposal) {
-  return changes_of(recording, proposal).flags;
+  const Changes changes = changes_of(recording, proposal);
+  return changes.left_out.empty() ? changes.flags : std::string();
 }
 
 std::string advice(const Recording& recording, const Diagnosis& d) {

@@ -268,6 +268,9 @@ TEST_CASE("check and run report a problem in one sentence") {
   const Outcome right = start({"check", seq, "--invert-poses"});
   CHECK(right.code == 0);
   CHECK_THAT(right.out, ContainsSubstring("agree as they are"));
+  CHECK_THAT(
+      start({"check", seq, "--left-handed-poses", "--pose-units", "cm", "--invert-poses"}).out,
+      ContainsSubstring("leave out --left-handed-poses, pass --pose-units m.\n"));
 
   const TemporaryFolder out;
   const Outcome stopped = start({"run", seq, "-o", out / "wrong", "-q"});
