@@ -366,12 +366,6 @@ std::optional<Reading> best_reading(const Evidence& evidence, const std::vector<
   return best;
 }
 
-void propose(const Reading& reading, Diagnosis& d) {
-  d.verdict = PoseVerdict::kOtherwise;
-  d.proposal.convention = reading.convention;
-  d.proposal.time_offset = reading.time_offset;
-}
-
 /// Whether errors from one scan to the next exceed those that exact poses leave: by the noise of
 /// the registration, and by the motion within de-skewed scans, which is taken as even between two
 /// poses. If a sensor sways, the middle of a scan is off by an eighth of the change of motion, and
@@ -433,7 +427,12 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
       for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);
     }
     const auto reading = best_reading(evidence, readings, all.at_points);
-    if (reading) return propose(*reading, d);
+    if (reading) {
+      d.verdict = PoseVerdict::kOtherwise;
+      d.proposal.convention = reading->convention;
+      d.proposal.time_offset = reading->time_offset;
+      return;
+    }
   }
   d.verdict = verdict_of_agreement(evidence);
   if (all.at_points > kRough || miss_motion(motions, given)) {
@@ -495,32 +494,26 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   return d;
 }
 
-/// Whether de-skewing leaves less than half of the error of the given motion, as `d` has it.
-bool is_skewed(const Recording& recording, const Diagnosis& d) {
-  if (!recording.columns().time || recording.is_deskewed()) return false;
-  RecordingOptions options = recording.options();
-  options.deskew = true;
-  try {
-    const Recording other(recording.folder(), options);
-    const auto suffice = [](const auto& motions) { return are_enough(motions, kFewestPairs); };
-    const std::vector<RegisteredMotion> motions = register_motions(other, suffice);
-    const MotionError steps = motion_error(motions, given_motion(other), Pose::Identity(), true);
-    return suffice(motions) && std::hypot(steps.translation, kLever * steps.rotation) <
-                                   0.5 * std::hypot(d.translation_error, kLever * d.rotation_error);
-  } catch (const IoError&) {
-    return false;  // its times are none of points
-  }
+/// Whether the scans leave less than half of the error of the given motion in `d`.
+bool halves_error(const Recording& recording, const Diagnosis& d) {
+  const auto suffice = [](const auto& motions) { return are_enough(motions, kFewestPairs); };
+  const std::vector<RegisteredMotion> motions = register_motions(recording, suffice);
+  const MotionError steps = motion_error(motions, given_motion(recording), Pose::Identity(), true);
+  return suffice(motions) && std::hypot(steps.translation, kLever * steps.rotation) <
+                                 0.5 * std::hypot(d.translation_error, kLever * d.rotation_error);
 }
 
 }  // namespace
 
 Diagnosis diagnose(const Recording& recording, std::size_t pairs) {
   Diagnosis d = diagnose_as_opened(recording, pairs);
-  const bool agrees = d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion;
-  if (agrees && !has_wrong_origin(recording) && !is_skewed(recording, d)) return d;
+  const bool agrees = (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) &&
+                      !has_wrong_origin(recording);
+  if (agrees && (!recording.columns().time || recording.is_deskewed())) return d;
   for (const RecordingOptions& options : other_options(recording)) {
     try {
       const Recording other(recording.folder(), options);
+      if (agrees && !(options.deskew && halves_error(other, d))) continue;
       if (diagnose_as_opened(other, pairs).verdict != PoseVerdict::kAgree) continue;
     } catch (const IoError&) {
       continue;  // it cannot be opened in this way

@@ -55,8 +55,6 @@ double sharpness(const PointBuffer& points, const Eigen::Vector3d& origin) {
 
 }  // namespace
 
-/// Whether points in the files move with the sensor, as those in the frame of the world do. Empty
-/// if the sensor stays at its place.
 std::optional<bool> follow_sensor(const Recording& recording, double least_way) {
   std::size_t farthest = 0;
   const auto way_to = [&](std::size_t i) -> Eigen::Vector3d {
@@ -86,9 +84,7 @@ std::vector<RecordingOptions> other_options(const Recording& recording) {
     change(all.back());
   };
   const bool is_world = recording.frame() == PointFrame::kWorld;
-  if (has_wrong_origin(recording)) {
-    add([](RecordingOptions& o) { o.sensor_origin.setZero(); });
-  }
+  if (has_wrong_origin(recording)) add([](RecordingOptions& o) { o.sensor_origin.setZero(); });
   if (recording.columns().time && !is_world) add([](RecordingOptions& o) { o.deskew = !o.deskew; });
   // A short way tells little, but what is proposed must agree, too.
   constexpr double kLeastWay = 1.0;  // m

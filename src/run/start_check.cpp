@@ -25,13 +25,8 @@ void check_poses(const Recording& recording, bool accepts_poses, StartCheck& res
   if (d.verdict == PoseVerdict::kUnknown) d = diagnose(recording);  // the places may be empty
   result.agreement = d.as_given;
   if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;
-  const std::string text = advice(recording, d);
   const bool may_run = accepts_poses || d.sound() || d.verdict == PoseVerdict::kUnknown;
-  if (may_run) {
-    result.warnings.push_back(text);
-  } else {
-    result.refusal = text;
-  }
+  (may_run ? result.warnings.emplace_back() : result.refusal) = advice(recording, d);
 }
 
 }  // namespace

@@ -61,7 +61,6 @@ TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame
   CHECK(recording.name(1) == "000009");
   CHECK(recording.number(1) == 9);
   CHECK(recording.frame() == PointFrame::kWorld);
-  CHECK(recording.has_viewpoints());
   const RecordedScan scan = recording.read_scan(1);
   REQUIRE(scan.size() == 3);
   // One metre along x of the world is one metre along -y of the sensor.

@@ -170,8 +170,6 @@ class Recording {
   PointFrame frame() const { return frame_; }
   /// Columns of the first scan in addition to x y z.
   const PointColumns& columns() const { return columns_; }
-  /// Whether the poses are those of VIEWPOINT.
-  bool has_viewpoints() const { return has_viewpoints_; }
   bool has_labels() const { return labels_ != Labels::kNone; }
   /// Whether scan i has labels: files of some scans may be missing.
   bool has_labels(std::size_t i) const;
