@@ -16,8 +16,8 @@ namespace dynains::program {
 /// `range`. Throws IoError.
 std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range);
 
-/// The mounting under which there is ground below the sensor, if it is tilted by more than the 45
-/// deg up to which a run finds it. Reads a few scans of `range`. Throws IoError.
+/// What to do if a few scans of `range` have no ground below the sensor: the mounting under which
+/// there is some, beyond the 45 deg up to which a run finds it, or the options. Throws IoError.
 std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range);
 
 }  // namespace dynains::program

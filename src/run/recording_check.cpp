@@ -61,12 +61,8 @@ void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::
     text << "note: " << remark << '\n';
   }
   if (d.mounting.known) return;
-  text << "note: "
-       << remark_on_tilt(recording, whole_of(recording))
-              .value_or(
-                  "no ground in sight below the sensor, so that height and tilt are not known; if "
-                  "it is tilted by more than 45 deg: --mounting-pitch, --mounting-roll")
-       << '\n';
+  const auto remark = remark_on_tilt(recording, whole_of(recording));
+  if (remark) text << "note: " << *remark << '\n';
 }
 
 /// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws

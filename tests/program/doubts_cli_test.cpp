@@ -235,6 +235,11 @@ TEST_CASE("check and run propose the mounting of a sensor that lies on its side"
   CHECK_THAT(told, !ContainsSubstring("no option is needed"));
   CHECK_THAT(drive.run().err, ContainsSubstring("tilted by 60 deg: pass --mounting-pitch "));
   CHECK(drive.run({"--mounting-pitch", "60"}).err.empty());
+  const Drive body;  // on the ground
+  body.move_points([](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
+    return Eigen::Vector3d(p + Eigen::Vector3d(1.0, 0.0, 1.8));
+  });
+  CHECK_THAT(body.run().err, ContainsSubstring("frame of a body: --sensor-origin"));
 }
 
 TEST_CASE("check names ways of the poses that are too long, and the factor") {
