@@ -41,8 +41,8 @@ class ReentrancyGuard {
     explicit Guard(ReentrancyGuard& owner) : owner_(owner) {
       if (owner_.is_busy_.exchange(true, std::memory_order_acquire)) {
         throw UsageError(
-            "DynaInsRemover: push, flush, reset and reserve must not be called while one of them "
-            "is at work; take one object for each thread, or a lock");
+            "DynaInsRemover: no call may begin while another one is at work; take one object for "
+            "each thread, or a lock");
       }
     }
     ~Guard() { owner_.is_busy_.store(false, std::memory_order_release); }

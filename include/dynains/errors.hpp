@@ -24,8 +24,8 @@ class CloudError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// A call is not permitted in the present state: during another call on the same object, reserve()
-/// after the first push, a moved-from object, or a folder that another process writes to.
+/// A call is not permitted in the present state: during another call on the same object,
+/// reserve_like() after the first push, a moved-from object, or a folder of another process.
 class UsageError : public std::logic_error {
  public:
   using std::logic_error::logic_error;

@@ -118,7 +118,7 @@ namespace detail {
 /// Throws a ConfigError about the value of a parameter.
 [[noreturn]] inline void refuse_value(const std::string& name, const std::string& value,
                                       const std::string& expected, const char* help) {
-  throw ConfigError(name + " = " + value + " must be " + expected + ": " + help);
+  throw ConfigError(name + " = " + value + " must be " + expected + " (" + help + ')');
 }
 
 /// Throws ConfigError unless `value` is within `bounds`.

@@ -134,7 +134,7 @@ TEST_CASE("an enum beyond its values is refused by field and names") {
   Config config;
   config.decision = static_cast<Decision>(2);
   CHECK_THAT(error_of(config),
-             StartsWith("DynaInsRemover.decision = 2 must be window|free_space: "));
+             StartsWith("DynaInsRemover.decision = 2 must be window|free_space ("));
 }
 
 TEST_CASE("a value out of bounds is refused by field, value and bound") {
