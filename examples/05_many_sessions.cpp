@@ -69,7 +69,7 @@ std::size_t count_box_points(const dynains::City& city, std::uint32_t last) {
   for (const dynains::TileIndex& tile : city.tiles()) {
     const dynains::TileHistory history = city.history(tile, last);
     history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      const Eigen::Vector3d p = city.position(tile, history.points(session)[i]);
+      const Eigen::Vector3d p = position_of(city.grid(), tile, history.points(session)[i]);
       const bool is_inside = p.x() > 7.5 && p.x() < 10.5 && std::abs(p.y()) < 1.2;
       if (is_inside && p.z() > 0.5) ++count;
     });
