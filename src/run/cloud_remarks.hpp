@@ -16,8 +16,9 @@ namespace dynains::program {
 /// `range`. Throws IoError.
 std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range);
 
-/// What to do if a few scans of `range` have no ground below the sensor: the mounting under which
-/// there is some, beyond the 45 deg up to which a run finds it, or the options. Throws IoError.
+/// Advice if a few scans of `range` show no ground below the sensor, else nothing. A run finds the
+/// ground if the sensor is tilted by up to 45 deg. The advice names the mounting if ground is found
+/// under a larger tilt, else the options that may help. Throws IoError.
 std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range);
 
 }  // namespace dynains::program

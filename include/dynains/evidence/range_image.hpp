@@ -283,8 +283,8 @@ class RangeImage {
     });
   }
 
-  // Writes to one row of `wider` the least of the 3x3 cells of `objects`, if it is below `limit`
-  // (cm), which then protects the cells of the image.
+  // Writes one row of `wider`: the least of the 3x3 cells of `objects`, or kNothing if it is not
+  // below `limit` (cm). If `protects`, this least range limits Cell::around.
   template <class Short>
   void widen_row(const RangeImageGrid& grid, std::size_t row, std::int16_t limit, bool protects,
                  Scratch& scratch) {

@@ -108,10 +108,11 @@ struct alignas(64) RecordingPlace {
   bool was_hit = false;                             ///< by any look
   bool free_before = false, free_after = false;     ///< before, after any epoch measured it
 
-  /// Whether looks tell that what was measured in it came or went: they passed it before any epoch
-  /// measured it, and the first one removed its points, or passed it after all, and the last one
-  /// did; or kFreeLooks looks in a row passed it, and the first pass kept no points of that time:
-  /// beams that pass what others hit tell of something porous.
+  /// Whether looks tell that what was measured in it came or went. It came if looks passed the
+  /// place before any epoch measured it, and the first epoch removed its points. It left if looks
+  /// passed the place after all epochs, and the last epoch removed its points. It also came or went
+  /// if kFreeLooks looks in a row passed the place, and the first pass kept no points of that time:
+  /// points that stay where beams pass are those of something porous.
   bool has_changed() const {
     const bool came = first.removed_first && free_before;
     const bool left = first.removed_last && free_after;

@@ -65,10 +65,11 @@ struct RowChanges {
 
 }  // namespace detail
 
-/// Adds a range image to `bytes`, row by row. For each 64 columns, less at the end of a row, and
-/// each of the two values of Cell: the number of cells whose value is another one than in the cell
-/// before (than 0 in the first of a row), as a byte, and if it is not 0, 64 bits, the lowest for
-/// the first column, that tell which cells these are, and their values as int16.
+/// Adds a range image to `bytes`, row by row. A part of a row has 64 columns, the last part fewer.
+/// Each part has the changes of Cell::nearest, then those of Cell::around. A cell changes if its
+/// value differs from that of the cell before it; the value before the first cell of a row is 0. A
+/// byte counts the changes of the part. If there are any, 64 bits mark the cells that change, the
+/// lowest bit for the first column, and the new values follow as int16.
 inline void pack_image(const RangeImage& image, std::vector<std::uint8_t>& bytes) {
   const RangeImageGrid& grid = image.grid();
   for (std::int32_t row = 0; row < grid.rows; ++row) {
