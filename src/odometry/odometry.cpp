@@ -1,6 +1,5 @@
 #include "dynains/odometry/odometry.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>

@@ -511,9 +511,10 @@ Diagnosis diagnose(const Recording& recording, std::size_t pairs) {
                       !has_wrong_origin(recording);
   if (agrees && (!recording.columns().time || recording.is_deskewed())) return d;
   for (const RecordingOptions& options : other_options(recording)) {
+    if (agrees && !options.deskew) continue;
     try {
       const Recording other(recording.folder(), options);
-      if (agrees && !(options.deskew && halves_error(other, d))) continue;
+      if (agrees && !halves_error(other, d)) continue;
       if (diagnose_as_opened(other, pairs).verdict != PoseVerdict::kAgree) continue;
     } catch (const IoError&) {
       continue;  // it cannot be opened in this way

@@ -166,8 +166,7 @@ std::vector<Reading> fitted_readings(const Recording& recording, const Motions& 
   std::vector<Fit> fits = {[&](const Motions& some) { return fit_scale(recording, some); },
                            [&](const Motions& some) { return fit_offset(recording, some); }};
   const Reading given = given_reading(recording);
-  std::vector<Reading> bases = {given};
-  bases.push_back(given);
+  std::vector<Reading> bases = {given, given};
   bases.back().convention.invert = !given.convention.invert;
   bases.back().complexity = 1;
   const QuaternionOrder order = other_order(recording);

@@ -53,9 +53,9 @@ bool Visit::test(const std::function<bool()>& keep_going) {
       throw IoError("a reference of the second pass was damaged in its store");
     }
     places_.test(
-        scans_[kept.scan].epoch,
-        reference.T_world_beams.translation(), [&](const auto&... points) -> const auto& {
-          return test_visibility(reference, config_.evidence, points..., visibility);
+        scans_[kept.scan].epoch, reference.T_world_beams.translation(),
+        [&](const auto& points, std::size_t count, const auto& origin) -> const auto& {
+          return test_visibility(reference, config_.evidence, points, count, origin, visibility);
         });
   }
   places_.decide();

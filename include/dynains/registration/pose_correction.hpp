@@ -104,7 +104,7 @@ class PoseCorrection {
   /// As begin_epoch(), after a scan that does not fit to earlier ones: the motion goes on.
   void begin_planes(const Pose& T_world_sensor) {
     planes_.clear();
-    inserted_ = 0;
+    has_planes_ = false;
     T_world_origin_ = T_world_sensor;
     T_origin_world_ = inverted(T_world_sensor);
     T_origin_newest_ = Pose::Identity();
@@ -127,7 +127,7 @@ class PoseCorrection {
     correction_ = offset_;
     Pose T_newest = T_guess;
     motion_.begin_scan(time);
-    if (inserted_ > 0) {
+    if (has_planes_) {
       selected_.select(split, instances);
       align(T_pushed, T_guess, T_newest);
       check_motion(T_newest);
@@ -150,7 +150,7 @@ class PoseCorrection {
               Span<const std::uint8_t> moving) {
     if (!is_active()) return;
     const Pose T = composed(T_origin_world_, T_world_level);
-    ++inserted_;
+    has_planes_ = true;
     planes_.begin_scan(T);
     VoxelPlanes::Block block;
     visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
@@ -273,8 +273,8 @@ class PoseCorrection {
   }
 
   double tolerance_;
-  VoxelPlanes planes_;  // in the origin frame: the first scan of the epoch
-  std::size_t inserted_ = 0;
+  VoxelPlanes planes_;       // in the origin frame: the first scan of the epoch
+  bool has_planes_ = false;  // whether a scan was inserted
   Pose T_world_origin_ = Pose::Identity();
   Pose T_origin_world_ = Pose::Identity();
   // Corrections in the origin frame, multiplied from the left: of the newest scan, and the part

@@ -167,7 +167,7 @@ class VoxelPlanes {
         index[axis] = floor_to<std::int64_t>(block.points[i][axis] * per_metre_);
       }
       keys[i] = voxel_key(index[0], index[1], index[2]);
-      __builtin_prefetch(&table_.first_slot(voxel_hash(keys[i])));
+      table_.prefetch(keys[i]);
     }
   }
 
