@@ -1,7 +1,12 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <sstream>
 #include <string>
+#include <type_traits>
 
 #include "command.hpp"
 #include "dynains/compiled_remover.hpp"
@@ -42,45 +47,74 @@ std::string member_of(const DynaInsRemover::Config& config, const void* section)
   return members.at(section);
 }
 
-// By parameter: its default, and the values of the presets that differ from it.
+// By parameter: its default, and other values with the presets that have them.
 std::map<std::string, std::string> describe_values() {
   std::map<std::string, std::string> values;
-  std::map<std::string, std::string> defaults;
+  std::map<std::string, std::map<std::string, std::string>> others;  // presets by value
   for (const std::string& name : preset_names()) {
     const DynaInsRemover::Config config = DynaInsRemover::Config::preset(name);
     DynaInsRemover::Config::visit(config, [&](const auto& parameter) {
       const std::string value = format_value(parameter.value);
-      if (defaults.emplace(parameter.name, value).second) {
-        values[parameter.name] = value;
-      } else if (value != defaults[parameter.name]) {
-        values[parameter.name] += " (" + name + ": " + value + ')';
-      }
+      if (value == values.emplace(parameter.name, value).first->second) return;
+      std::string& presets = others[parameter.name][value];
+      presets += (presets.empty() ? "" : ", ") + name;
     });
+  }
+  for (const auto& [parameter, presets_of] : others) {
+    for (const auto& [value, presets] : presets_of) {
+      values[parameter] += " (" + presets + ": " + value + ')';
+    }
   }
   return values;
 }
 
-// The parameters in the documentation.
+// Cells of a table row with a parameter: default, range, unit and meaning.
+template <class Parameter>
+std::string table_cells(const Parameter& parameter, const std::string& values) {
+  std::string range = describe_range(parameter);
+  const std::string unit = parameter.unit, number = "FLOAT in ";
+  if (range.rfind(number, 0) == 0) range.erase(0, number.size());
+  if (!unit.empty()) range.erase(range.size() - unit.size() - 1);
+  for (std::size_t at = 0; (at = range.find('|', at)) != std::string::npos;) {
+    range.replace(at, 1, ", ");
+  }
+  return values + " | " + range + " | " + unit + " | " + parameter.help + " |\n";
+}
+
+// The parameters in the documentation: the ones that users change first, then the rest, folded.
 void print_markdown() {
-  std::map<std::string, std::string> values = describe_values();
-  const std::string number = "FLOAT in ";
-  std::cout
-      << "# Parameters\n\n"
-         "Written by `dynains config --markdown`: name, default, values of presets that differ, "
-         "range, meaning. Flags and config\nfiles have hyphens (`--tau-s 0.5`). In C++, a name is "
-         "a field of the member in the heading (`config.belief.tau_p`), in\nPython one of the "
-         "configuration (`config.tau_p`).\n";
+  const std::array<const char*, 10> first = {
+      "map_voxel",     "min_range", "max_range",       "sensor_height",  "mounting_pitch",
+      "mounting_roll", "max_gap",   "lookahead_scans", "pose_tolerance", "threads"};
+  std::map<std::string, std::string> values = describe_values(), rows;
+  std::ostringstream folded;
+  const std::string columns = " default (by preset) | range | unit | meaning |\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
-    std::cout << "\n## " << name << ": `" << member_of(config, &section) << "`\n\n";
+    const std::string member = member_of(config, &section);
+    folded << "\n<details>\n<summary><code>" << member << "</code>: " << name
+           << "</summary>\n\n| name |" << columns << "|---|---|---|---|---|\n";
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     Section::visit(section, [&](const auto& parameter) {
-      std::string range = describe_range(parameter);
-      if (range.rfind(number, 0) == 0) range.erase(0, number.size());
-      std::cout << "- `" << parameter.name << "` " << values[parameter.name] << ", " << range
-                << ": " << parameter.help << '\n';
+      const std::string cells = table_cells(parameter, values[parameter.name]);
+      if (std::find(first.begin(), first.end(), std::string(parameter.name)) == first.end()) {
+        folded << "| `" << parameter.name << "` | " << cells;
+      } else {
+        rows[parameter.name] = "| `" + (member + '.') + parameter.name + "` | " + cells;
+      }
     });
+    folded << "\n</details>\n";
   });
+  std::cout
+      << "# Parameters\n\n"
+         "Written by `dynains config --markdown`. A name is a flag and a line of a configuration "
+         "file with hyphens\n(`--map-voxel 0.1`), in C++ a field of the member shown "
+         "(`config.map.map_voxel`), in Python a field of the configuration\n(`config.map_voxel`). "
+         "`dynains config > my.cfg` prints a file for `--config my.cfg`.\n\n"
+         "## Parameters that users change first\n\n| name |"
+      << columns << "|---|---|---|---|---|\n";
+  for (const char* name : first) std::cout << rows.at(name);
+  std::cout << "\n## All others, by member of the configuration\n" << folded.str();
 }
 
 }  // namespace
