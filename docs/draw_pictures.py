@@ -104,6 +104,11 @@ class Workshop:
         return self.run(self.simulate("street"), "street", "--passes", "2", "--view")
 
 
+    def drive(self):
+        """The recording of the tutorial, as a folder."""
+        sequence = self.simulate("drive", "--sensor", "hdl32", "--scans", "200", "--seed", "5")
+        return self.run(sequence, "drive", "--passes", "2")
+
     def save(self, figure, name):
         path = self.out / f"{name}.png"
         figure.savefig(path, dpi=100, bbox_inches="tight", pad_inches=0.08)
@@ -332,7 +337,7 @@ def draw_before_and_after(workshop, recording, name, half_width, step, every):
 
 
 def draw_map(workshop):
-    draw_before_and_after(workshop, workshop.street(), "map", 45, 5, 4)
+    draw_before_and_after(workshop, workshop.drive(), "map", 45, 3, 2)
 
 
 def draw_real(workshop):
