@@ -60,7 +60,7 @@ if(dynains_has_program OR dynains_has_python)
   set(dynains_has_components ON)
   set(dynains_has_evaluation ON)
 else()
-  dynains_part(components DYNAINS_BUILD_COMPONENTS "io, poses and simulation components" ${search})
+  dynains_part(components DYNAINS_BUILD_COMPONENTS "io and poses components" ${search})
   dynains_part(evaluation DYNAINS_BUILD_COMPONENTS "city and evaluation components" ${json} ${search})
 endif()
 
@@ -97,4 +97,4 @@ dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 
 # Folders of src/ and include/dynains/ that form one compiled component each.
-set(dynains_component_folders io poses odometry recording city evaluation simulation)
+set(dynains_component_folders io poses odometry recording city evaluation)

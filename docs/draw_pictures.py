@@ -89,8 +89,7 @@ class Workshop:
     def simulate(self, name, *flags):
         sequence = self.work / name
         if not sequence.exists():
-            simulator = self.programs / "dynains_simulate"
-            command = [simulator] if simulator.exists() else [self.programs / "dynains", "simulate"]
+            command = [self.programs / "dynains_simulate"]
             self.call(*command, sequence, "--labelling", "instant", *flags)
         return sequence
 

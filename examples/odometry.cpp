@@ -1,14 +1,14 @@
-// A small but complete LiDAR odometry (small_odometry.hpp) drives through a simulated street. Its
-// poses are refined as in docs/embedding.md, and both trajectories compared with the true poses.
+// A small but complete LiDAR odometry (small_odometry.hpp) estimates the poses of a recording. They
+// are refined as in docs/embedding.md, and both trajectories compared with the poses of the
+// recording.
 //
-//   example_odometry [scene] [sensor] [scans] [seed]
+//   example_odometry RECORDING
 //
-// for example: example_odometry crowd os1-64 200 1
+// for example after: dynains_simulate RECORDING --scene crowd --sensor os1-64
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
+#include <dynains/io/recording.hpp>
 #include <dynains/odometry/odometry.hpp>
-#include <dynains/simulation/simulator.hpp>
 #include <vector>
 
 #include "small_odometry.hpp"
@@ -35,40 +35,34 @@ class Errors {
   int count_ = 0;
 };
 
-Points points_of(const dynains::simulation::SimulatedScan& scan) {
+Points points_of(const std::vector<float>& xyzi) {
   Points points;
-  for (std::size_t i = 0; i < scan.xyzi.size(); i += 4) {
-    points.push_back(Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[i]).cast<double>());
+  for (std::size_t i = 0; i < xyzi.size(); i += 4) {
+    points.push_back(Eigen::Map<const Eigen::Vector3f>(&xyzi[i]).cast<double>());
   }
   return points;
 }
 
 int main(int argc, char** argv) {
-  dynains::simulation::Config street;
-  street.scene =
-      dynains::value_of_name<dynains::simulation::Scene>(argc > 1 ? argv[1] : "crowd").value();
-  street.sensor =
-      dynains::value_of_name<dynains::simulation::Sensor>(argc > 2 ? argv[2] : "os1-64").value();
-  street.scans = argc > 3 ? std::atoi(argv[3]) : 100;
-  street.seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1;
-  dynains::simulation::Simulator simulator(street);
+  if (argc != 2) return 1;
+  dynains::Recording recording(argv[1]);
 
   Odometry odometry;
   dynains::Odometry corrector;
-  const Eigen::Isometry3d T_first_world = simulator.scan(0).T_world_sensor.inverse();
+  const Eigen::Isometry3d T_first_world = recording.T_world_sensor(0).inverse();
   Errors of_odometry, refined;
   std::size_t points = 0, dynamic = 0;
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    const dynains::simulation::SimulatedScan scan = simulator.scan(i);
-    const Points cloud = points_of(scan);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    const Points cloud = points_of(recording.read_scan(i).xyzi);
+    const Eigen::Isometry3d T_first_sensor = T_first_world * recording.T_world_sensor(i);
     const Eigen::Isometry3d T_odometry = odometry.register_scan(cloud);
-    const auto result = corrector.push(cloud, {}, scan.time, T_odometry);
+    const auto result = corrector.push(cloud, {}, recording.time(i), T_odometry);
     for (const dynains::PointLabel label : result.frame.newest.labels) {
       dynamic += label == dynains::PointLabel::kDynamic ? 1 : 0;
     }
     points += result.frame.newest.labels.size();
-    of_odometry.add(T_odometry, T_first_world * scan.T_world_sensor);
-    refined.add(result.T_world_sensor, T_first_world * scan.T_world_sensor);
+    of_odometry.add(T_odometry, T_first_sensor);
+    refined.add(result.T_world_sensor, T_first_sensor);
   }
   of_odometry.print("odometry");
   refined.print("refined");

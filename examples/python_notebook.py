@@ -1,9 +1,8 @@
-# %% A crowd in ten lines: removes the moving points of a simulated street.
+# %% Ten lines: removes the moving points of the street of README.md, or of your own recording.
 import dynains
 
-street = dynains.Simulator("crowd", "os1-64", scans=20)  # or your own arrays
+scans = list(dynains.Recording("build/street"))
 remover = dynains.DynaInsRemover()
-scans = list(street)
 frames = [remover.push(scan.points, scan.T_world_sensor, scan.time) for scan in scans]
 verdicts = [frame.finished for frame in frames if frame.finished] + remover.flush()
 kept = [dynains.is_static(verdict.labels) for verdict in verdicts]

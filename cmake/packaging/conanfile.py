@@ -24,7 +24,6 @@ COMPONENTS = {
     "odometry": ("remover", "poses"),
     "city": ("io", "poses", "recording"),
     "evaluation": (),
-    "simulation": ("io",),
 }
 
 

@@ -56,7 +56,7 @@ def main(program, node, work):
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     bag = work / "drive.bag"
-    subprocess.run([program, "simulate", work / "seq", "--sensor", "vlp16", "--scans", str(SCANS),
+    subprocess.run([program + "_simulate", work / "seq", "--sensor", "vlp16", "--scans", str(SCANS),
                     "--quiet"], check=True)
     subprocess.run([sys.executable, WRITER, work / "seq", bag, "none"], check=True)
     subprocess.run([program, "run", bag, "--out", work / "out", "--min-range", "2.5",

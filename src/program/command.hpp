@@ -15,7 +15,6 @@ void add_map_command(CLI::App& app);
 void add_fleet_command(CLI::App& app);
 void add_check_command(CLI::App& app);
 void add_config_command(CLI::App& app);
-void add_simulate_command(CLI::App& app);
 void add_eval_command(CLI::App& app);
 void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);

@@ -34,7 +34,6 @@ PYBIND11_MODULE(_dynains, module) {
   dynains::python::bind_config(module);
   dynains::python::bind_remover(module);
   dynains::python::bind_evaluation(module);
-  dynains::python::bind_simulation(module);
   dynains::python::bind_recording(module);
   dynains::python::bind_check(module);
   dynains::python::bind_run(module);

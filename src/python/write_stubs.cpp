@@ -10,7 +10,6 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/parameters.hpp"
-#include "dynains/simulation/config.hpp"
 #include "run/recording_settings.hpp"
 #include "run/run_settings.hpp"
 
@@ -79,9 +78,6 @@ std::string expand(const std::string& indent, const std::string& line) {
   }
   if (line == "@RUN_ARGUMENTS@") {
     return lines_of<dynains::program::RunSettings>(indent, as_argument);
-  }
-  if (line == "@SIMULATION_ARGUMENTS@") {
-    return lines_of<dynains::simulation::Config>(indent, as_argument);
   }
   if (line.rfind("@property ", 0) == 0) {  // NAME: TYPE
     const std::size_t name = line.find(' ') + 1, colon = line.find(':');

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 #include "simulation/grid_index.hpp"
 #include "simulation/vector.hpp"
 

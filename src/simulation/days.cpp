@@ -3,11 +3,11 @@
 #include <limits>
 #include <utility>
 
-#include "dynains/simulation/simulator.hpp"
 #include "simulation/materials.hpp"
 #include "simulation/model_parts.hpp"
 #include "simulation/random.hpp"
 #include "simulation/scenes/layout.hpp"
+#include "simulation/simulator.hpp"
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {

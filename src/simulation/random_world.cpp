@@ -1,6 +1,6 @@
 #include <cstddef>
 
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/simulation/config.hpp"
 #include "simulation/beams.hpp"
+#include "simulation/config.hpp"
 
 namespace dynains::simulation {
 

@@ -1,4 +1,4 @@
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 
 #include <algorithm>
 #include <array>

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 #include "simulation/terrain.hpp"
 #include "simulation/traffic.hpp"
 

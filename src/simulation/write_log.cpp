@@ -2,11 +2,11 @@
 #include <cstdint>
 #include <string>
 
-#include "dynains/simulation/write_sequence.hpp"
 #include "io/logs/mcap_writer.hpp"
 #include "io/logs/message_types.hpp"
 #include "io/logs/message_writer.hpp"
 #include "io/scalar.hpp"
+#include "simulation/write_sequence.hpp"
 
 namespace dynains::simulation {
 namespace {

@@ -20,7 +20,7 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 
 using namespace dynains;
 namespace fs = std::filesystem;

@@ -24,9 +24,9 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
 #include "run/start_check.hpp"
+#include "simulation/simulator.hpp"
+#include "simulation/write_sequence.hpp"
 #include "support/simulated_runs.hpp"
 
 using namespace dynains;

@@ -21,8 +21,8 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
+#include "simulation/simulator.hpp"
+#include "simulation/write_sequence.hpp"
 
 using namespace dynains;
 namespace fs = std::filesystem;

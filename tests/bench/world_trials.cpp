@@ -18,8 +18,8 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/simulation/simulator.hpp"
 #include "program/parameter_flags.hpp"
+#include "simulation/simulator.hpp"
 #include "support/simulated_runs.hpp"
 
 using namespace dynains;

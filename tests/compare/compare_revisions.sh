@@ -50,8 +50,9 @@ for variant in ${VARIANTS:-gcc gcc-avx2 gcc-plain clang}; do
   build "$work/$revision" "$variant" "$work/$before"
   build "$root" "$variant" "$work/$after"
   if [[ $# -eq 0 ]]; then
+    cmake --build "$work/$after" -j2 --target dynains_simulate >/dev/null
     for scene in urban:hdl64 highway:hdl64 crowd:os1-64 stop-and-go:hdl64 vegetation:vlp16 car-park:hdl64; do
-      "$work/$after/bin/dynains" simulate "$work/${scene/:/_}" --force -q --seed 11 \
+      "$work/$after/bin/dynains_simulate" "$work/${scene/:/_}" --force -q --seed 11 \
         --scene "${scene%:*}" --sensor "${scene#*:}" --scans 60
       set -- "$@" "$work/${scene/:/_}"
     done

@@ -8,7 +8,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/random.hpp"

@@ -13,12 +13,12 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
 #include "program/command.hpp"
 #include "program/variants.hpp"
 #include "run/labelled_sequence.hpp"
 #include "scenes.hpp"
+#include "simulation/write_sequence.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::program {

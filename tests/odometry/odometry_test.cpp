@@ -10,7 +10,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 

@@ -91,6 +91,6 @@ chown nobody "$data"
 install -m 755 "$program" "$data/dynains"
 cd "$data"
 as_user() { setpriv --reuid=nobody --regid=nogroup --clear-groups "$@"; }
-as_user ./dynains simulate street --scans 5 --sensor vlp16 -q
+"$build_dir/bin/dynains_simulate" street --scans 5 --sensor vlp16 -q
 as_user ./dynains run street --out cleaned --view -q
 [[ -s cleaned/view.html ]] || fail "the program writes no page"

@@ -13,7 +13,7 @@ set(layers
   "^pipeline/"
   "^(compiled_remover|dyna_ins_remover|own_stages)\\.hpp$"
   "^(adapters|io|evaluation)/"
-  "^(poses|odometry|simulation)/"
+  "^(poses|odometry)/"
   "^city/")
 # Classes of stages. They meet in the pipeline alone: a stage includes no other stage.
 set(stages

@@ -24,7 +24,7 @@ if(NOT result EQUAL 0)
   message(FATAL_ERROR "cannot be configured with Eigen and a compiler alone:\n${output}")
 endif()
 expect("no program: not found: CLI11 .Debian: libcli11-dev." "no Python module: not found: "
-  "no io, poses and simulation components: not found: nanoflann"
+  "no io and poses components: not found: nanoflann"
   "no city and evaluation components: not found: nlohmann_json" "no tests: not found: Catch2")
 
 # vcpkg builds the target install alone. A dry run of make tells what that builds, one of Ninja not.

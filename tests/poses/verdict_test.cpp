@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
-#include "dynains/simulation/config.hpp"
 #include "poses/in_two_threads.hpp"
 #include "poses/scan_registration.hpp"
+#include "simulation/config.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/written_drive.hpp"

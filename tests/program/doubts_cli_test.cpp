@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "dynains/simulation/config.hpp"
 #include "program/start.hpp"
+#include "simulation/config.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/written_drive.hpp"

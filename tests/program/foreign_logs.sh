@@ -8,13 +8,13 @@ shift 3
 rm -rf "$work"
 mkdir -p "$work"
 flags=(--sensor vlp16 --scans 8 --quiet)
-"$program" simulate "$work/seq" "${flags[@]}"
+"${program}_simulate" "$work/seq" "${flags[@]}"
 "$program" run "$work/seq" --out "$work/of_seq" --quiet
 if [[ $kind == bag ]]; then
   input=$work/seq
   compressions="none bz2 lz4"
 else
-  "$program" simulate "$work/log" --format mcap "${flags[@]}"
+  "${program}_simulate" "$work/log" --format mcap "${flags[@]}"
   input=$work/log/drive.mcap
   compressions="lz4 zstd"
 fi

@@ -5,7 +5,7 @@ program=$1 work=$2 node=$3
 script=${0%/*}/check_las.mjs
 rm -rf "$work"
 mkdir -p "$work"
-"$program" simulate "$work/seq" --sensor vlp16 --scans 12 --quiet
+"${program}_simulate" "$work/seq" --sensor vlp16 --scans 12 --quiet
 "$program" run "$work/seq" --out "$work/of_ply" --map-attributes --quiet
 crs='LOCAL_CS["a yard"]'
 "$program" run "$work/seq" --out "$work/of_las" --map "$work/map.las" --crs "$crs" --quiet

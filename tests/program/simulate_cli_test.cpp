@@ -86,4 +86,7 @@ TEST_CASE("simulate refuses unknown values") {
   CHECK_THAT(simulate(out, {"--scans", "0"}).err, ContainsSubstring("--scans = 0: expected INT"));
   CHECK(simulate(out, {"--scans", "0"}).code == 2);
   CHECK_FALSE(fs::exists(out));
+  const Outcome without = start({"simulate"});
+  CHECK(without.code == 2);
+  CHECK(without.err == "dynains_simulate: error: OUT is required (see dynains_simulate --help)\n");
 }

@@ -1,4 +1,4 @@
-// Starts the dynains program and returns its exit code and output.
+// Starts dynains or dynains_simulate and returns its exit code and output.
 #pragma once
 
 #include <fcntl.h>
@@ -30,14 +30,19 @@ struct Outcome {
   std::string err;  ///< standard error
 };
 
-/// A running `dynains ARGUMENTS` with both outputs redirected to files. `prepare` is called in the
-/// new process, before the program starts.
+/// A running `dynains ARGUMENTS`, or `dynains_simulate` with the arguments that follow "simulate",
+/// with both outputs redirected to files. `prepare` is called in the new process, before the
+/// program starts.
 class Process {
  public:
   explicit Process(
       Arguments arguments, const std::function<void()>& prepare = [] {}) {
     std::vector<char*> argv;
-    arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
+    if (!arguments.empty() && arguments[0] == "simulate") {
+      arguments[0] = DYNAINS_PROGRAM "_simulate";
+    } else {
+      arguments.insert(arguments.begin(), DYNAINS_PROGRAM);
+    }
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
     const std::string out = folder_ / "out";
@@ -50,7 +55,7 @@ class Process {
     // A script that starts tests with `&` makes them ignore SIGINT.
     for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
     prepare();
-    ::execv(DYNAINS_PROGRAM, argv.data());
+    ::execv(argv[0], argv.data());
     ::_exit(127);
   }
   ~Process() {

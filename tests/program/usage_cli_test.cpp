@@ -18,7 +18,7 @@ TEST_CASE("Flags --version and --help") {
   CHECK(version.out == std::string("dynains ") + dynains::kVersionString + "\n");
   const Outcome help = start({"--help"});
   CHECK(help.code == 0);
-  for (const char* command : {"run", "config", "simulate", "eval"}) {
+  for (const char* command : {"run", "config", "eval"}) {
     CHECK_THAT(help.out, ContainsSubstring(command));
     CHECK(start({command, "--help"}).code == 0);
   }
@@ -45,10 +45,13 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
     std::string expected;
   };
   const std::vector<Case> cases = {
-      {{}, "expected a command"},           {{"walk"}, "walk"},
-      {{"run"}, "SEQ is required"},         {{"run", "seq"}, "--out is required"},
-      {{"run", "seq", "--out"}, "--out"},   {{"config", "--preset", "best"}, "best not in"},
-      {{"simulate"}, "OUT is required"},    {{"eval"}, "required"},
+      {{}, "expected a command"},
+      {{"walk"}, "walk"},
+      {{"run"}, "SEQ is required"},
+      {{"run", "seq"}, "--out is required"},
+      {{"run", "seq", "--out"}, "--out"},
+      {{"config", "--preset", "best"}, "best not in"},
+      {{"eval"}, "required"},
       {{"config", "--preste"}, "--preste"},
   };
   for (const Case& wrong : cases) {

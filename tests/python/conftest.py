@@ -1,3 +1,5 @@
+import os
+import subprocess
 import sys
 
 import dynains
@@ -5,11 +7,24 @@ import numpy as np
 import pytest
 
 
+def run_simulator(folder, *words, sensor="vlp16"):
+    """A recording by dynains_simulate."""
+    command = [os.environ["DYNAINS_PROGRAM"] + "_simulate", folder, "-q", "--sensor", sensor]
+    subprocess.run([*command, *map(str, words)], check=True)
+    return folder
+
+
 @pytest.fixture(scope="session")
-def street():
+def simulate():
+    return run_simulator
+
+
+@pytest.fixture(scope="session")
+def street(tmp_path_factory):
     """Twelve scans of a small simulated street with traffic."""
-    simulator = dynains.Simulator("urban", "vlp16", labelling="instant", scans=12, seed=3)
-    return [simulator[i] for i in range(len(simulator))]
+    folder = tmp_path_factory.mktemp("simulated") / "street"
+    words = "--labelling", "instant", "--scans", 12, "--seed", 3
+    return list(dynains.Recording(run_simulator(folder, *words)))
 
 
 @pytest.fixture

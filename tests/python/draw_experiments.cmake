@@ -8,7 +8,7 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR})
 file(MAKE_DIRECTORY ${WORK_DIR})
-run(${PROGRAM} simulate ${WORK_DIR}/street --scans 6 --sensor vlp16)
+run(${PROGRAM}_simulate ${WORK_DIR}/street --scans 6 --sensor vlp16)
 run(${PROGRAM} experiment sweep ${WORK_DIR}/street --quiet --values 0.2,0.6
   --csv ${WORK_DIR}/sweep.csv)
 run(${PROGRAM} experiment runtime ${WORK_DIR}/street --repeat 1 --csv ${WORK_DIR}/runtime.csv)

@@ -7,11 +7,10 @@ import {withPage} from '../viewer/browser.mjs';
 
 const [python, folder] = process.argv.slice(2);
 mkdirSync(folder, {recursive: true});
+const street = ['street', '--force', '-q', '--scene', 'static', '--sensor', 'vlp16', '--scans', '5'];
+execFileSync(`${process.env.DYNAINS_PROGRAM}_simulate`, street, {cwd: folder, stdio: 'inherit'});
 execFileSync(python, ['-B', '-c', `
-import shutil
 import dynains
-shutil.rmtree("street", ignore_errors=True)
-dynains.Simulator("static", "vlp16", scans=5).write("street")
 result = dynains.run("street", "cleaned", force=True)
 page = dynains.view(result, height=333)
 with open("notebook.html", "w") as notebook:

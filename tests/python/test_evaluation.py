@@ -61,31 +61,3 @@ def test_truth_is_flags_or_labels():
 def test_bad_input_is_refused(arguments, settings, error, text):
     with pytest.raises(error, match=text):
         dynains.evaluate(*arguments, **settings)
-
-
-def test_the_simulator_is_a_sequence():
-    simulator = dynains.Simulator("static", "vlp16", scans=3, seed=5)
-    assert len(simulator) == 3
-    assert len(list(simulator)) == 3
-    np.testing.assert_array_equal(simulator[-1].points, simulator[2].points)
-    assert simulator[0].points.shape == (len(simulator[0].labels), 4)
-    with pytest.raises(IndexError):
-        simulator[3]
-    with pytest.raises(dynains.ConfigError, match="urban"):
-        dynains.Simulator("moon")
-    with pytest.raises(dynains.ConfigError, match="unknown parameter"):
-        dynains.Simulator(scan=3)
-
-
-def test_the_simulator_writes_a_recording(tmp_path):
-    simulator = dynains.Simulator("static", "vlp16", scans=3, seed=5)
-    simulator.write(tmp_path / "street")
-    recording = dynains.Recording(tmp_path / "street")
-    assert len(recording) == 3 and recording.has_labels
-    for scan, simulated in zip(recording, simulator):
-        np.testing.assert_array_equal(scan.points, simulated.points)
-        np.testing.assert_array_equal(scan.labels, simulated.labels)
-        np.testing.assert_allclose(scan.T_world_sensor, simulated.T_world_sensor, atol=1e-6)
-    with pytest.raises(dynains.IoError, match="file"):
-        (tmp_path / "file").write_text("")
-        simulator.write(tmp_path / "file")

@@ -15,11 +15,11 @@ from dynains import fleet  # noqa: E402
 
 
 @pytest.fixture(scope="module")
-def drives(tmp_path_factory):
+def drives(simulate, tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
     for seed in range(3):
-        dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(folder / f"drive{seed}")
-    dynains.Simulator("crowd", "vlp16", scans=100, seed=3).write(folder / "drive3")
+        simulate(folder / f"drive{seed}", "--scans", 20, "--seed", seed)
+    simulate(folder / "drive3", "--scene", "crowd", "--scans", 100, "--seed", 3)
     broken = folder / "broken"
     (broken / "velodyne").mkdir(parents=True)
     (broken / "velodyne" / "000000.bin").write_bytes(b"x")
@@ -191,7 +191,6 @@ def test_recordings_of_one_name_are_refused(drives, tmp_path):
         fleet.find_recordings([drives / "drive1", other])
 
 
-@pytest.mark.skipif("DYNAINS_PROGRAM" not in os.environ, reason="the program is not built")
 def test_the_program_starts_a_fleet_and_says_what_it_lacks(drives, tmp_path):
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin" / "python3").symlink_to(sys.executable)

@@ -140,7 +140,3 @@ def test_every_object_says_what_it_holds(street):
     assert repr(remover) == (
         f"<dynains.DynaInsRemover: {remover.map_size} points on the map, dynains.Config(window=6)>"
     )
-    assert repr(street[1]) == f"<dynains.SimulatedScan: {len(street[1].points)} points at 0.1 s>"
-    assert repr(dynains.Simulator("car-park", "vlp16", scans=3, seed=5)) == (
-        "<dynains.Simulator: 3 scans of scene car-park, sensor vlp16, seed 5>"
-    )

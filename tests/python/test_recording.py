@@ -1,5 +1,4 @@
 import os
-import subprocess
 
 import dynains
 import numpy as np
@@ -117,12 +116,9 @@ def test_scans_without_a_pose_are_told(drive, street, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    if "DYNAINS_PROGRAM" not in os.environ:
-        pytest.skip("the program is not built")
+def log(simulate, tmp_path_factory):
     folder = tmp_path_factory.mktemp("log") / "log"
-    words = ["simulate", folder, "--format", "mcap", "--scans", "12"]
-    subprocess.run([os.environ["DYNAINS_PROGRAM"], *words, "--quiet"], check=True)
+    simulate(folder, "--format", "mcap", "--scans", 12, sensor="hdl64")
     return next(folder.glob("*.mcap"))
 
 

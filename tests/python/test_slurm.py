@@ -134,10 +134,10 @@ def final_state(job, environment):
     return "no end"
 
 
-def test_the_script_for_slurm_gives_the_results_of_single_runs(slurm, tmp_path):
+def test_the_script_for_slurm_gives_the_results_of_single_runs(slurm, simulate, tmp_path):
     drives = tmp_path / "drives"
     for seed in range(2):
-        dynains.Simulator("urban", "vlp16", scans=20, seed=seed).write(drives / f"drive{seed}")
+        simulate(drives / f"drive{seed}", "--scans", 20, "--seed", seed)
         dynains.run(drives / f"drive{seed}", tmp_path / "expected" / f"drive{seed}")
     job = [str(SCRIPT), *map(str, sorted(drives.iterdir())), "--out", str(tmp_path / "out")]
     command = ["sbatch", "--parsable", "--nodes=1", "--ntasks-per-node=2", "--output=job.log", *job]

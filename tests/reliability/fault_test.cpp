@@ -40,7 +40,7 @@ const std::vector<Call> kCalls = {{"open", {EMFILE, EACCES, EINTR}},
 /// Description of a problem of the message; empty if there is none.
 std::string problem_of_message(const std::string& message, int error, const std::string& root) {
   const auto has = [&](const std::string& part) { return message.find(part) != std::string::npos; };
-  if (message.rfind("dynains: error: ", 0) != 0) return "no message: " + message;
+  if (message.rfind("dynains", 0) != 0 || !has(": error: ")) return "no message: " + message;
   if (std::count(message.begin(), message.end(), '\n') != 1) return "more than a line: " + message;
   if (!has(root)) return "no path: " + message;
   if (!has(std::strerror(error))) return "no cause: " + message;

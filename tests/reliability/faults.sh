@@ -26,7 +26,7 @@ await() { local i; for ((i = 0; i < 2000; ++i)); do [[ -d $1 ]] && break; sleep 
 complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
 
 seq=$work/seq
-"$program" simulate "$seq" --scans 8 --sensor vlp16 --quiet
+"${program}_simulate" "$seq" --scans 8 --sensor vlp16 --quiet
 begin=$(date +%s%N)
 "$program" run "$seq" --out "$work/expected" --quiet
 span=$((($(date +%s%N) - begin) / 1000))  # us

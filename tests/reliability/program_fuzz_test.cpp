@@ -395,8 +395,8 @@ class RandomStart {
     }
     const bool failed = outcome_.code == 1 || outcome_.code == 2;
     const bool is_check = command() == "check";
-    const std::size_t at = text.find("dynains: error: ");
-    if (failed && !is_check && (at == std::string::npos || text.size() < at + 30)) {
+    const std::size_t at = text.find(": error: ");
+    if (failed && !is_check && (at == std::string::npos || text.size() < at + 23)) {
       return "no message";
     }
     return {};

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::simulation {

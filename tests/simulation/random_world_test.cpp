@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
-#include "dynains/simulation/config.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/config.hpp"
+#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 

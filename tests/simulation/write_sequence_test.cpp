@@ -1,4 +1,4 @@
-#include "dynains/simulation/write_sequence.hpp"
+#include "simulation/write_sequence.hpp"
 
 #include <filesystem>
 

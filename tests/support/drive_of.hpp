@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 
 namespace dynains::test {
 

@@ -9,7 +9,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 
 namespace dynains::test {
 

@@ -10,9 +10,9 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
 #include "io/files.hpp"
+#include "simulation/simulator.hpp"
+#include "simulation/write_sequence.hpp"
 
 namespace dynains::test {
 

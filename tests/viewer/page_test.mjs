@@ -14,7 +14,7 @@ const kPoints = 150000;
 function makePage() {
   mkdirSync(folder, {recursive: true});
   const dynains = (...words) => execFileSync(program, words, {cwd: folder, stdio: 'pipe'}).toString();
-  dynains('simulate', 'street', '--force', '-q');
+  execFileSync(`${program}_simulate`, ['street', '--force', '-q'], {cwd: folder, stdio: 'pipe'});
   const text = dynains('run', 'street', '--out', 'cleaned', '--force', '--view');
   assert.match(text, /page: cleaned\/view\.html\n$/, 'the run ends with the path of the page');
   assert.ok(statSync(`${folder}/cleaned/view.html`).size < 15e6, 'the page has less than 15 MB');

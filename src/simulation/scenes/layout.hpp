@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 #include "simulation/random.hpp"
 #include "simulation/street.hpp"
 

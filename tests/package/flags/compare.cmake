@@ -1,11 +1,11 @@
-# Runs PROGRAMS in WORK_DIR and compares what they print with the file REFERENCE, or with the output
+# Runs PROGRAMS with RECORDING in WORK_DIR and compares what they print with the file REFERENCE, or with the output
 # of the first program, which is written to WORK_DIR/checksums.txt.
 set(expected "")
 if(REFERENCE)
   file(READ ${REFERENCE} expected)
 endif()
 foreach(program IN LISTS PROGRAMS)
-  execute_process(COMMAND ${program} WORKING_DIRECTORY ${WORK_DIR}
+  execute_process(COMMAND ${program} ${RECORDING} WORKING_DIRECTORY ${WORK_DIR}
     OUTPUT_VARIABLE output RESULT_VARIABLE result)
   if(result EQUAL 77)
     message("SKIPPED: not with this processor: ${program}")

@@ -1,5 +1,6 @@
 // Program of a consumer that takes every compiled component, built with many sets of flags. It
-// prints one checksum for each result that crosses the border of a component.
+// prints one checksum for each result that crosses the border of a component. Its argument is a
+// recording.
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -11,8 +12,6 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
 
 namespace {
 
@@ -44,37 +43,16 @@ struct Scan {
   std::vector<std::uint32_t> truth;
 };
 
-dynains::simulation::Config street() {
-  dynains::simulation::Config config;
-  config.sensor = dynains::simulation::Sensor::kVlp16;
-  config.scans = 12;
-  config.seed = 5;
-  config.pose_noise_translation = 0.01;
-  config.pose_noise_rotation = 0.05;
-  return config;
-}
-
-std::vector<std::unique_ptr<Scan>> simulate() {
-  Checksum sum;
+std::vector<std::unique_ptr<Scan>> read(const dynains::Recording& recording) {
   std::vector<std::unique_ptr<Scan>> scans;
-  dynains::simulation::Simulator simulator(street());
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    const dynains::simulation::SimulatedScan made = simulator.scan(i);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
     scans.push_back(std::make_unique<Scan>());
     Scan& scan = *scans.back();
-    scan.time = made.time;
-    scan.T_world_sensor = made.T_world_sensor_noisy;
-    scan.xyzi = made.xyzi;
-    scan.truth = made.labels;
-    sum.add_all(made.xyzi);
-    sum.add_all(made.labels);
-    sum.add(made.T_world_sensor);
-    sum.add(made.T_world_sensor_noisy);
-    for (const dynains::simulation::ObjectState& object : made.objects) {
-      sum.add(object.T_world_object);
-    }
+    scan.time = recording.time(i);
+    scan.T_world_sensor = recording.T_world_sensor(i);
+    scan.xyzi = recording.read_scan(i).xyzi;
+    scan.truth = recording.read_labels(i);
   }
-  sum.print("simulation");
   return scans;
 }
 
@@ -140,11 +118,11 @@ void read_back(const std::vector<std::unique_ptr<Scan>>& scans, const std::files
   sum.add(dynains::interpolate(scans[0]->T_world_sensor, scans[5]->T_world_sensor, 0.3));
 }
 
-void write_and_read(const std::vector<std::unique_ptr<Scan>>& scans) {
+void write_and_read(const std::vector<std::unique_ptr<Scan>>& scans,
+                    const std::filesystem::path& recording) {
   const std::filesystem::path folder = "flags_recording";
   std::filesystem::remove_all(folder);
-  dynains::simulation::Simulator simulator(street());
-  dynains::simulation::write_sequence(simulator, folder);
+  std::filesystem::copy(recording, folder, std::filesystem::copy_options::recursive);
   Checksum sum;
   read_back(scans, folder, sum);
   std::vector<dynains::Pose> poses;
@@ -179,14 +157,15 @@ void score(const std::vector<std::unique_ptr<Scan>>& scans,
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (argc != 2) return 1;
 #if defined(__AVX512F__)
   if (!__builtin_cpu_supports("avx512f")) return 77;
 #elif defined(__AVX2__)
   if (!__builtin_cpu_supports("avx2")) return 77;
 #endif
-  const auto scans = simulate();
-  write_and_read(scans);
+  const auto scans = read(dynains::Recording(argv[1]));
+  write_and_read(scans, argv[1]);
   const auto in_map = remove_movers(scans);
   score(scans, in_map);
   return 0;

@@ -4,14 +4,14 @@
 #include <memory>
 #include <string>
 
-#include "command.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/simulation/simulator.hpp"
-#include "dynains/simulation/write_sequence.hpp"
-#include "parameter_flags.hpp"
-#include "progress.hpp"
+#include "program/parameter_flags.hpp"
+#include "program/program.hpp"
+#include "program/progress.hpp"
 #include "run/interrupt.hpp"
 #include "run/output_folder.hpp"
+#include "simulation/simulator.hpp"
+#include "simulation/write_sequence.hpp"
 
 namespace dynains::program {
 namespace {
@@ -106,24 +106,25 @@ void simulate(const SimulateOptions& options) {
   if (!options.quiet) std::cout << simulator.size() << " scans: " << sequence.string() << std::endl;
 }
 
-}  // namespace
-
-void add_simulate_command(CLI::App& app) {
-  CLI::App& command =
-      *app.add_subcommand("simulate", "Make a labelled sequence of a synthetic place");
-  auto options = std::make_shared<SimulateOptions>();
-  command.add_option("OUT", options->out, "folder for the sequence; created, must be empty")
+int run(int argc, char** argv) {
+  Program app("Makes a labelled sequence of a synthetic place.", "dynains_simulate");
+  SimulateOptions options;
+  app.add_option("OUT", options.out, "folder for the sequence; created, must be empty")
       ->required()
       ->type_name("");
-  command.add_flag("--force", options->force, "replace an earlier simulation in OUT");
-  SettingFlags{command}(Parameter{"format", options->format, Bounds(), "",
-                                  "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap"});
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  add_parameter_flags(command, simulation::Config(), "Parameters", options->flags);
-  command.footer(
+  app.add_flag("--force", options.force, "replace an earlier simulation in OUT");
+  SettingFlags{app}(Parameter{"format", options.format, Bounds(), "",
+                              "a folder as of KITTI, or a log of ROS 2: OUT/drive.mcap"});
+  app.add_flag("-q,--quiet", options.quiet, "print errors only");
+  add_parameter_flags(app, simulation::Config(), "Parameters", options.flags);
+  app.footer(
       "The same flags give the same files. --scene random draws scene, sensor and every parameter "
       "that is not given\nfrom the seed. simulation.json keeps all parameters.");
-  command.callback([options] { simulate(*options); });
+  app.callback([&options] { simulate(options); });
+  return app.run(argc, argv);
 }
 
+}  // namespace
 }  // namespace dynains::program
+
+int main(int argc, char** argv) { return dynains::program::run(argc, argv); }

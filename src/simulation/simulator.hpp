@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dynains/pose.hpp"
-#include "dynains/simulation/config.hpp"
+#include "simulation/config.hpp"
 
 namespace dynains::simulation {
 

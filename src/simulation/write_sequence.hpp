@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "dynains/simulation/simulator.hpp"
+#include "simulation/simulator.hpp"
 
 namespace dynains::simulation {
 
