@@ -170,7 +170,7 @@ TEST_CASE("all kinds of packs give equal bits") {
   }
 }
 
-TEST_CASE("find_changes agrees with a loop over single numbers") {
+TEST_CASE("find_changes and for_each_run agree with a loop over single numbers") {
   Random random(21);
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
@@ -185,6 +185,24 @@ TEST_CASE("find_changes agrees with a loop over single numbers") {
         changes |= std::uint64_t{values[i + 1] != values[i]} << i;
       }
       CHECK(detail::find_changes<Packs>(count, values.data() + 1) == changes);
+    }
+    // More than two words of numbers.
+    for (const std::size_t count : {0U, 1U, 2U, 64U, 65U, 66U, 129U, 200U}) {
+      std::vector<std::uint32_t> values(count);
+      for (std::uint32_t& value : values) {
+        value = static_cast<std::uint32_t>(random.uniform(0.0, 2.5));
+      }
+      std::size_t next = 0;
+      detail::for_each_run<Packs>(
+          count,
+          [&](std::size_t begin, std::size_t end) {
+            CHECK(begin == next);
+            for (std::size_t i = begin; i < end; ++i) CHECK(values[i] == values[begin]);
+            CHECK((end == count || values[end] != values[begin]));
+            next = end;
+          },
+          values.data());
+      CHECK(next == count);
     }
   };
   check(detail::BaselinePacks());

@@ -161,35 +161,23 @@ class ClusterSet {
 
  private:
   void find_runs(Span<const std::uint32_t> scan_begin, Span<const std::uint32_t> cluster_of) {
-    run_count_ = 0;
+    point_runs_.clear();
     first_run_.clear();
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       for (std::size_t k = 0; k < scan_count_; ++k) {
-        first_run_.push_back(run_count_);
-        cut<Packs>(cluster_of.subspan(scan_begin[k], scan_begin[k + 1] - scan_begin[k]));
+        first_run_.push_back(point_runs_.size());
+        const std::uint32_t* const clusters = cluster_of.data() + scan_begin[k];
+        detail::for_each_run<Packs>(
+            scan_begin[k + 1] - scan_begin[k],
+            [&](std::size_t begin, std::size_t end) {
+              point_runs_.push_back({static_cast<std::uint32_t>(begin),
+                                     static_cast<std::uint32_t>(end), clusters[begin]});
+            },
+            clusters);
       }
     });
-    first_run_.push_back(run_count_);
-  }
-
-  // Cuts one scan into runs, 64 points at a time.
-  template <class Packs>
-  void cut(Span<const std::uint32_t> cluster_of) {
-    std::size_t begin = 0;
-    const auto end_at = [&](std::size_t end) {
-      point_runs_[run_count_++] = {static_cast<std::uint32_t>(begin),
-                                   static_cast<std::uint32_t>(end), cluster_of[begin]};
-      begin = end;
-    };
-    for (std::size_t i = 1; i < cluster_of.size(); i += detail::kWordBits) {
-      detail::grow(point_runs_, run_count_ + detail::kWordBits + 1);
-      const std::uint64_t changes = detail::find_changes<Packs>(
-          std::min(detail::kWordBits, cluster_of.size() - i), cluster_of.data() + i);
-      detail::for_each_bit(changes, [&](std::size_t at) { end_at(i + at); });
-    }
-    detail::grow(point_runs_, run_count_ + 1);
-    if (!cluster_of.empty()) end_at(cluster_of.size());
+    first_run_.push_back(point_runs_.size());
   }
 
   // Counts the runs of each slot (cluster, scan), then replaces each count by the number of the
@@ -240,8 +228,7 @@ class ClusterSet {
   Comparison comparison_ = Comparison::kEnds;
   std::size_t scan_count_ = 0;
   std::size_t cluster_count_ = 0;
-  std::size_t run_count_ = 0;
-  std::vector<PointRun> point_runs_;    // the first run_count_ are in use
+  std::vector<PointRun> point_runs_;
   std::vector<std::size_t> first_run_;  // by scan, and the end
   std::vector<std::uint32_t> begin_;    // by slot: number of its first range
   std::vector<std::uint32_t> next_;

@@ -51,16 +51,18 @@ class ConcentricZones {
 
   const Neighbours& neighbours(std::size_t patch) const { return neighbours_[patch]; }
 
-  /// Writes the patch of each point (m, sensor frame), and kPatches for points outside the zones.
-  /// `patch_of` must have room for kPackWidth more numbers.
-  void find_patches(PointsView points, std::int32_t* patch_of) const {
+  /// Writes the patch of each point (m, sensor frame), kPatches for points outside the zones, and
+  /// kPatches + 1 for points below `lowest` (m). `patch_of` must have room for kPackWidth more
+  /// numbers.
+  void find_patches(PointsView points, float lowest, std::int32_t* patch_of) const {
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
       // A local copy: the compiler must assume that a store changes members.
       const Zones zones = zones_;
-      const PackConstant min_range(min_range_), max_range(max_range_), pi(kPi), one(1.0F);
+      const PackConstant min_range(min_range_), max_range(max_range_), bottom(lowest), pi(kPi),
+          one(1.0F);
       const float* const xs = points.x.data();
       const float* const ys = points.y.data();
       std::int32_t* const patches = patch_of;
@@ -87,7 +89,9 @@ class ConcentricZones {
         const Float sector = whole(min(azimuth * here(zones.sectors_per_radian), sectors - one));
         const Float patch = here(zones.first_patch) + ring * sectors + sector;
         const auto inside = (range >= min_range) & (range <= max_range);
-        select(inside, truncate(patch), Int(static_cast<std::int32_t>(kPatches)))
+        const Int outside(static_cast<std::int32_t>(kPatches));
+        select(at.load(points.z.data()) < bottom, outside + Int(1),
+               select(inside, truncate(patch), outside))
             .store(patches + at.begin);
       });
     });

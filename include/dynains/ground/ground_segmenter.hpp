@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +21,7 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
+#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
@@ -46,14 +48,11 @@ struct HalfSpace {
     return x * local[0] + y * local[1] + z * local[2] < offset;
   }
 
-  /// The points of a slice, relative to the origin; then points outside of all half spaces below
-  /// a plane.
-  template <class Slice>
-  auto local(const Slice& at, PointsView points) const {
-    using Float = typename Slice::Float;
-    const Float infinity(std::numeric_limits<float>::infinity());
-    return std::array<Float, 3>{at.load(points.x.data()) - x0, at.load(points.y.data()) - y0,
-                                at.padded(at.load(points.z.data()) - z0, infinity)};
+  /// Eight points from index `i` on, relative to the origin.
+  template <class Float>
+  std::array<Float, 3> local(PointsView points, std::size_t i) const {
+    return {Float::load(&points.x[i]) - x0, Float::load(&points.y[i]) - y0,
+            Float::load(&points.z[i]) - z0};
   }
 
   PackConstant x0, y0, z0;                    // origin
@@ -62,14 +61,15 @@ struct HalfSpace {
 };
 
 /// Moments of the points in a half space, relative to its origin. For use within with_packs.
+/// `points`: ends with infinitely high ones up to a whole pack.
 template <class Packs>
 PlaneMoments moments_within(const HalfSpace& space, PointsView points) {
   static constexpr PackConstant kZero(0.0F), kOne(1.0F);
   using Float = typename Packs::Float;
   Float n = kZero, sx = kZero, sy = kZero, sz = kZero, sxx = kZero, sxy = kZero, sxz = kZero,
         syy = kZero, syz = kZero, szz = kZero;
-  for_slices<Packs>(points.size(), [&](const auto& at) {
-    const std::array<Float, 3> p = space.local(at, points);
+  for (std::size_t i = 0; i < points.size(); i += Packs::kCount) {
+    const std::array<Float, 3> p = space.local<Float>(points, i);
     const auto member = space.contains(p);
     const Float x = keep(member, p[0]);
     const Float y = keep(member, p[1]);
@@ -84,24 +84,45 @@ PlaneMoments moments_within(const HalfSpace& space, PointsView points) {
     syy = syy + y * y;
     syz = syz + y * z;
     szz = szz + z * z;
-  });
+  }
   return {sum(n),   sum(sx),  sum(sy),  sum(sz),  sum(sxx),
           sum(sxy), sum(sxz), sum(syy), sum(syz), sum(szz)};
 }
 
-/// Mean of the `wanted` lowest values that are at least `floor`: of all if there are fewer, and
-/// `floor` if there are none. `kept`: working memory.
-inline float mean_of_lowest(Span<const float> values, std::size_t wanted, float floor,
-                            std::vector<float>& kept) {
-  grow(kept, values.size());
-  const auto last = std::copy_if(values.begin(), values.end(), kept.begin(),
-                                 [floor](float value) { return value >= floor; });
-  const auto count = std::min(static_cast<std::ptrdiff_t>(wanted), last - kept.begin());
-  if (count == 0) return floor;
-  const auto end = kept.begin() + count;
-  std::nth_element(kept.begin(), end, last);
-  std::sort(kept.begin(), end);
-  return std::accumulate(kept.begin(), end, 0.0F) / static_cast<float>(count);
+/// Mean of the `wanted` lowest finite values that are at least `floor`: of all if there are fewer,
+/// and `floor` if there are none. `values`: of whole packs. `kept`: working memory.
+template <class Packs>
+float mean_of_lowest(Span<const float> values, std::size_t wanted, float floor,
+                     std::vector<float>& kept) {
+  using Float = typename Packs::Float;
+  const Float infinity(std::numeric_limits<float>::infinity());
+  const auto load = [&](std::size_t i) {
+    const Float value = Float::load(&values[i]);
+    return select(value >= Float(floor), value, infinity);
+  };
+  // The lowest values of as many parts as are wanted, at least, bound the wanted ones.
+  const std::size_t parts = (wanted + Packs::kCount - 1) / Packs::kCount * Packs::kCount;
+  grow(kept, values.size() + parts);
+  for (std::size_t part = 0; part < parts; part += Packs::kCount) {
+    Float lowest = infinity;
+    for (std::size_t i = part; i < values.size(); i += parts) lowest = min(load(i), lowest);
+    lowest.store(&kept[part]);
+  }
+  const auto begin = kept.begin();
+  const auto end = begin + static_cast<std::ptrdiff_t>(wanted);
+  std::nth_element(begin, end - 1, begin + static_cast<std::ptrdiff_t>(parts));
+  const Float bound(kept[wanted - 1]);
+  auto last = begin;
+  for (std::size_t i = 0; i < values.size(); i += Packs::kCount) {
+    const Float value = load(i);
+    for_each_bit(((value <= bound) & (value < infinity)).bits(),
+                 [&](std::size_t k) { *last++ = values[i + k]; });
+  }
+  if (last == begin) return floor;
+  if (last > end) std::nth_element(begin, end, last);
+  last = std::min(last, end);
+  std::sort(begin, last);
+  return std::accumulate(begin, last, 0.0F) / static_cast<float>(last - begin);
 }
 
 }  // namespace dynains::detail
@@ -140,53 +161,117 @@ class GroundSegmenter {
   /// turned out not to be ground, its ground points follow its others.
   void segment(PointsView scan, Span<const std::uint32_t> input, GroundSplit& split) {
     detail::grow(patch_of_, scan.size() + detail::kPackWidth);
-    zones_.find_patches(scan, patch_of_.data());
-    if (config_.noise_depth > 0.0) find_noise(scan);
-    sort(scan.size());
+    const double depth = config_.noise_depth > 0.0 ? config_.noise_depth * height_ : kInfinity;
+    zones_.find_patches(scan, static_cast<float>(-depth), patch_of_.data());
+    detail::with_packs([&](auto packs) { sort<decltype(packs)>(scan, input); });
     heights_.fill(kNoGround);
-    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(scan, p);
-    if (config_.ground_step > 0.0) take_back_overhangs();
+    for (std::size_t p = 0; p < kPatches; ++p) segment_patch(p);
+    find_overhangs();
     split.resize(scan.size());
-    std::size_t count = 0;
-    const auto write = [&](std::size_t begin, std::size_t end) {
-      for (std::size_t at = begin; at < end; ++at, ++count) {
-        const std::size_t i = order_[at];
-        split.points.x[count] = scan.x[i];
-        split.points.y[count] = scan.y[i];
-        split.points.z[count] = scan.z[i];
-        split.input[count] = input[i];
-      }
-    };
-    for (std::size_t p = 0; p < kPatches; ++p) write(ground_begin_[p], begin_[p + 1]);
-    split.ground_count = count;
-    for (std::size_t p = 0; p < kPatches; ++p) write(begin_[p], ground_begin_[p]);
-    write(begin_[kPatches], begin_[kNoise]);
-    split.count = count;
-    write(begin_[kNoise], scan.size());
+    detail::with_packs([&](auto packs) { write<decltype(packs)>(split); });
   }
 
  private:
   static constexpr std::size_t kPatches = detail::ConcentricZones::kPatches;
-  static constexpr std::size_t kNoise = kPatches + 1;  // points below `noise_depth`
+  static constexpr std::size_t kLists = kPatches + 2;  // of patches, points outside, and noise
   static constexpr float kNoGround = std::numeric_limits<float>::quiet_NaN();
+  static constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-  // Counting sort by patch; the points of a patch keep the order of the scan.
-  void sort(std::size_t count) {
-    detail::grow(order_, count);
-    begin_.fill(0);
-    for (std::size_t i = 0; i < count; ++i) ++begin_[patch(i) + 1];
-    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-    next_ = begin_;
-    for (std::size_t i = 0; i < count; ++i) {
-      order_[next_[patch(i)]++] = static_cast<std::uint32_t>(i);
-    }
+  // Points with their indices in the input of the remover.
+  template <class Coordinate, class Index>
+  struct Columns {
+    Coordinate *x, *y, *z;
+    Index* input;
+  };
+  using ColumnsFrom = Columns<const float, const std::uint32_t>;
+  using ColumnsTo = Columns<float, std::uint32_t>;
+
+  template <class Packs>
+  static void copy_pack(const ColumnsFrom& from, std::size_t i, const ColumnsTo& to,
+                        std::size_t k) {
+    using Float = typename Packs::Float;
+    Float::load(from.x + i).store(to.x + k);
+    Float::load(from.y + i).store(to.y + k);
+    Float::load(from.z + i).store(to.z + k);
+    using Int = typename Packs::Int;
+    Int::load(reinterpret_cast<const std::int32_t*>(from.input + i))
+        .store(reinterpret_cast<std::int32_t*>(to.input + k));
   }
-  std::size_t patch(std::size_t point) const { return static_cast<std::size_t>(patch_of_[point]); }
+  static void copy_point(const ColumnsFrom& from, std::size_t i, const ColumnsTo& to,
+                         std::size_t k) {
+    to.x[k] = from.x[i];
+    to.y[k] = from.y[i];
+    to.z[k] = from.z[i];
+    to.input[k] = from.input[i];
+  }
 
-  void find_noise(PointsView scan) {
-    const auto lowest = static_cast<float>(-config_.noise_depth * height_);
-    for (std::size_t i = 0; i < scan.size(); ++i) {
-      if (scan.z[i] < lowest) patch_of_[i] = static_cast<std::int32_t>(kNoise);
+  // Counting sort by patch; the points of a patch keep the order of the scan. Neighbours in a scan
+  // mostly share a patch, so it moves runs of points. Each list begins with a whole pack and ends
+  // with room for one.
+  template <class Packs>
+  void sort(PointsView scan, Span<const std::uint32_t> input) {
+    const auto for_each_run = [&](auto&& visit) {
+      detail::for_each_run<Packs>(scan.size(), visit, patch_of_.data());
+    };
+    const auto patch = [&](std::size_t i) { return static_cast<std::size_t>(patch_of_[i]); };
+    size_.fill(0);
+    for_each_run([&](std::size_t begin, std::size_t end) { size_[patch(begin)] += end - begin; });
+    std::size_t at = 0;
+    for (std::size_t p = 0; p < kLists; ++p) {
+      begin_[p] = next_[p] = at;
+      at = (at + size_[p]) / Packs::kCount * Packs::kCount + 2 * Packs::kCount;
+    }
+    sorted_.grow(at);
+    detail::grow(sorted_input_, at);
+    is_ground_.assign(at / Packs::kCount, 0);
+    const ColumnsFrom from = {scan.x.data(), scan.y.data(), scan.z.data(), input.data()};
+    const ColumnsTo to = {sorted_.x.data(), sorted_.y.data(), sorted_.z.data(),
+                          sorted_input_.data()};
+    for_each_run([&](std::size_t begin, std::size_t end) {
+      std::size_t& next = next_[patch(begin)];
+      std::size_t k = next;
+      next += end - begin;
+      if (end + Packs::kCount > scan.size()) {
+        for (std::size_t i = begin; i < end; ++i, ++k) copy_point(from, i, to, k);
+        return;
+      }
+      for (std::size_t i = begin; i < end; i += Packs::kCount, k += Packs::kCount) {
+        copy_pack<Packs>(from, i, to, k);
+      }
+    });
+  }
+
+  template <class Packs>
+  void write(GroundSplit& split) const {
+    const ColumnsFrom from = {sorted_.x.data(), sorted_.y.data(), sorted_.z.data(),
+                              sorted_input_.data()};
+    const ColumnsTo to = {split.points.x.data(), split.points.y.data(), split.points.z.data(),
+                          split.input.data()};
+    std::size_t count = 0;
+    // Appends the points of a list that are ground, or those that are not.
+    const auto append = [&](std::size_t list, bool is_ground) {
+      const std::size_t end = begin_[list] + size_[list];
+      for (std::size_t i = begin_[list]; i < end; i += Packs::kCount) {
+        const unsigned all = Packs::kAll >> (Packs::kCount - std::min(Packs::kCount, end - i));
+        const unsigned ground = is_ground_[i / Packs::kCount];
+        const unsigned wanted = is_ground ? ground : ~ground & all;
+        if (wanted == all) {
+          copy_pack<Packs>(from, i, to, count);
+          count += std::min(Packs::kCount, end - i);
+        } else {
+          detail::for_each_bit(wanted,
+                               [&](std::size_t k) { copy_point(from, i + k, to, count++); });
+        }
+      }
+    };
+    for (std::size_t p = 0; p < kPatches; ++p) {
+      if (!overhangs_[p]) append(p, true);
+    }
+    split.ground_count = count;
+    for (std::size_t list = 0; list < kLists; ++list) {
+      if (list == kPatches + 1) split.count = count;
+      append(list, false);
+      if (list < kPatches && overhangs_[list]) append(list, true);
     }
   }
 
@@ -206,57 +291,41 @@ class GroundSegmenter {
 
   // Ground that overhangs is none. Not in the outermost zone, where a slope of a few percent is a
   // step from ring to ring.
-  void take_back_overhangs() {
+  void find_overhangs() {
     using Zones = detail::ConcentricZones;
-    const std::int32_t outermost = Zones::kRings.back() * Zones::kSectors.back();
-    for (std::size_t p = 0; p < kPatches - static_cast<std::size_t>(outermost); ++p) {
-      if (overhangs(p)) ground_begin_[p] = begin_[p + 1];
-    }
+    constexpr auto kOutermost =
+        static_cast<std::size_t>(Zones::kRings.back() * Zones::kSectors.back());
+    overhangs_.reset();
+    if (config_.ground_step <= 0.0) return;
+    for (std::size_t p = 0; p < kPatches - kOutermost; ++p) overhangs_[p] = overhangs(p);
   }
 
-  // Orders the points of a patch: its ground last.
-  void segment_patch(PointsView scan, std::size_t patch) {
-    const std::size_t end = begin_[patch + 1];
-    const std::size_t size = end - begin_[patch];
-    ground_begin_[patch] = end;
-    if (size < static_cast<std::size_t>(config_.ground_min_points)) return;
-    std::uint32_t* const order = order_.data() + begin_[patch];
-    patch_.grow(size);
-    for (std::size_t k = 0; k < size; ++k) {
-      patch_.x[k] = scan.x[order[k]];
-      patch_.y[k] = scan.y[order[k]];
-      patch_.z[k] = scan.z[order[k]];
-    }
-    const PointsView points = PointsView(patch_).subview(0, size);
-    const std::optional<detail::HalfSpace> below = find_ground(patch, points);
-    if (!below) return;
-    detail::grow(ground_, size);
-    std::size_t rest = 0;
-    std::size_t ground = 0;
+  // Finds the ground points of a patch.
+  void segment_patch(std::size_t patch) {
+    if (size_[patch] < static_cast<std::size_t>(config_.ground_min_points)) return;
+    const std::size_t begin = begin_[patch];
+    std::fill_n(&sorted_.z[begin + size_[patch]], detail::kPackWidth, kInfinity);
+    const PointsView points = PointsView(sorted_).subview(begin, size_[patch]);
     detail::with_packs([&](auto packs) {
-      detail::for_slices<decltype(packs)>(size, [&](const auto& at) {
-        const unsigned is_ground = below->contains(below->local(at, points)).bits();
-        for (std::size_t k = 0; k < at.size(); ++k) {
-          const std::uint32_t point = order[at.begin + k];
-          order[rest] = point;
-          ground_[ground] = point;
-          (is_ground >> k & 1U) != 0 ? ++ground : ++rest;
-        }
-      });
+      using Packs = decltype(packs);
+      const std::optional<detail::HalfSpace> below = find_ground<Packs>(patch, points);
+      for (std::size_t i = 0; below && i < points.size(); i += Packs::kCount) {
+        const auto local = below->template local<typename Packs::Float>(points, i);
+        is_ground_[(begin + i) / Packs::kCount] =
+            static_cast<std::uint8_t>(below->contains(local).bits());
+      }
     });
-    std::copy_n(ground_.data(), ground, order + rest);
-    ground_begin_[patch] = end - ground;
   }
 
   // The half space of the ground points of a patch, if it has ground.
+  template <class Packs>
   std::optional<detail::HalfSpace> find_ground(std::size_t patch, PointsView all) {
     const PointsView points = sample_of(all);
-    const float seed_height =
-        detail::mean_of_lowest(points.z, static_cast<std::size_t>(config_.ground_lowest_points),
-                               floor_of(patch), heights_of_points_);
+    const float seed_height = detail::mean_of_lowest<Packs>(
+        points.z, static_cast<std::size_t>(config_.ground_lowest_points), floor_of(patch), lowest_);
     detail::HalfSpace below(points.x[0], points.y[0], seed_height,
                             static_cast<float>(config_.ground_seed_margin));
-    if (!fit_ground(patch, points, seed_height, below)) return std::nullopt;
+    if (!fit_ground<Packs>(patch, points, seed_height, below)) return std::nullopt;
     return below;
   }
 
@@ -281,18 +350,17 @@ class GroundSegmenter {
     const bool is_in_first_zone =
         zones_.ring(patch) < static_cast<std::size_t>(detail::ConcentricZones::kRings.front());
     return is_in_first_zone ? static_cast<float>(-(1.0 + config_.ground_below) * height_)
-                            : -std::numeric_limits<float>::infinity();
+                            : -kInfinity;
   }
 
   // Iterates from the half space below the seed height to the one below the plane. Returns whether
   // its points are ground.
+  template <class Packs>
   bool fit_ground(std::size_t patch, PointsView points, float seed_height,
                   detail::HalfSpace& below) {
     detail::Plane plane;
     for (int i = 0; i < config_.ground_iterations; ++i) {
-      detail::PlaneMoments moments;
-      detail::with_packs(
-          [&](auto packs) { moments = detail::moments_within<decltype(packs)>(below, points); });
+      const detail::PlaneMoments moments = detail::moments_within<Packs>(below, points);
       if (moments.count < 3.0) return false;
       plane = detail::fit_plane(moments);
       below.set_below(plane, config_.ground_distance);
@@ -314,15 +382,16 @@ class GroundSegmenter {
 
   Config config_;
   detail::ConcentricZones zones_;
-  double height_ = 0.0;                                     // m, sensor over the ground
-  std::vector<std::int32_t> patch_of_;                      // by point
-  std::vector<std::uint32_t> order_;                        // the points of a scan, by patch
-  std::array<std::size_t, kPatches + 3> begin_{}, next_{};  // in order_: of each patch
-  std::array<std::size_t, kPatches> ground_begin_{};        // in order_: of the ground of a patch
-  PointBuffer patch_, sample_;                              // of the current patch
-  std::vector<std::uint32_t> ground_;                       // of the current patch
-  std::vector<float> heights_of_points_;                    // m, of the current patch
-  std::array<float, kPatches + 1> heights_{};               // m, ground of each patch; last: none
+  double height_ = 0.0;                                        // m, sensor over the ground
+  std::vector<std::int32_t> patch_of_;                         // list of each point of the scan
+  std::array<std::size_t, kLists> begin_{}, size_{}, next_{};  // of the lists in sorted_
+  PointBuffer sorted_;                                         // by list
+  std::vector<std::uint32_t> sorted_input_;
+  std::vector<std::uint8_t> is_ground_;        // a bit for each point of sorted_
+  std::bitset<kPatches> overhangs_;            // patches
+  PointBuffer sample_;                         // of the current patch
+  std::vector<float> lowest_;                  // m, of the current patch
+  std::array<float, kPatches + 1> heights_{};  // m, ground of each patch; last: none
 };
 
 }  // namespace dynains

@@ -5,9 +5,11 @@
 // passed to or returned from with_avx2, whose callers pass vectors differently.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
+#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack.hpp"
 
 namespace dynains::detail {
@@ -84,6 +86,22 @@ std::uint64_t find_changes(std::size_t count, const Values*... values) {
     changes |= std::uint64_t{(((values[i] ^ *(values + i - 1)) >> kIgnored != 0) || ...)} << i;
   }
   return changes;
+}
+
+/// Calls `visit(begin, end)` for each run of [0, count) in which the arrays do not change, apart
+/// from the lower `kIgnored` bits.
+template <class Packs, int kIgnored = 0, class Visitor, class... Values>
+void for_each_run(std::size_t count, Visitor&& visit, const Values*... values) {
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < count; i += kWordBits) {
+    const std::uint64_t changes =
+        find_changes<Packs, kIgnored>(std::min(kWordBits, count - i), (values + i)...);
+    for_each_bit(changes, [&](std::size_t at) {
+      visit(begin, i + at);
+      begin = i + at;
+    });
+  }
+  if (begin < count) visit(begin, count);
 }
 
 /// The indices [begin, end) of arrays: as many as a pack has numbers, or fewer if `kTail`. Each

@@ -61,15 +61,13 @@ class ShortNumbers {
     const std::uint32_t* const from = numbers.data();
     std::uint16_t* const lower = lower_.data();
     for (std::size_t i = 0; i < count; ++i) lower[i] = static_cast<std::uint16_t>(from[i]);
-    const auto begin_run = [&](std::size_t i) {
-      runs_.push_back({static_cast<std::uint32_t>(i), from[i] >> kHalfBits << kHalfBits});
-    };
-    if (count > 0) begin_run(0);
-    for (std::size_t begin = 1; begin < count; begin += kWordBits) {
-      const std::size_t size = std::min(kWordBits, count - begin);
-      const std::uint64_t begins = find_changes<Packs, kHalfBits>(size, from + begin);
-      for_each_bit(begins, [&](std::size_t i) { begin_run(begin + i); });
-    }
+    for_each_run<Packs, kHalfBits>(
+        count,
+        [&](std::size_t begin, std::size_t) {
+          runs_.push_back(
+              {static_cast<std::uint32_t>(begin), from[begin] >> kHalfBits << kHalfBits});
+        },
+        from);
   }
 
   std::vector<std::uint16_t> lower_;
