@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <deque>
 #include <stdexcept>
 #include <string>
@@ -44,7 +45,7 @@ class BlockTable {
   const std::deque<MapBlock>& blocks() const { return blocks_; }
 
   /// The block of an index; adds a block without points. May throw std::bad_alloc.
-  MapBlock& find_or_add(const BlockIndex& index) {
+  [[gnu::noinline]] MapBlock& find_or_add(const BlockIndex& index) {
     if (2 * blocks_.size() >= numbers_.size()) grow();
     std::uint32_t& number = numbers_[slot_of(index)];
     if (number == kNoIndex) {
@@ -148,7 +149,9 @@ class StaticMapAccumulator {
     for (std::size_t begin = 0; begin < points.size(); begin += kBatch) {
       const std::size_t count = std::min(kBatch, points.size() - begin);
       locate(points, begin, count, to_corner, first, batch);
-      insert(count, keep.empty() ? keep : keep.subspan(begin, count), batch);
+      if (!keep.empty()) drop(keep.subspan(begin, count), batch);
+      choose(count, batch);
+      insert_chosen(batch);
     }
   }
 
@@ -199,11 +202,14 @@ class StaticMapAccumulator {
 
   // Consecutive points of a scan.
   static constexpr std::size_t kBatch = 512;
+  static constexpr std::int32_t kDropped = -1;
   struct Batch {
     alignas(64) float point[3][kBatch];         // m, relative to the corner of the block
     alignas(64) std::int32_t block[3][kBatch];  // indices in the world
-    alignas(64) std::int32_t voxel[kBatch];     // index in the block
+    alignas(64) std::int32_t voxel[kBatch];     // index in the block, or kDropped
     alignas(64) std::int32_t recent[kBatch];    // place of the block in recent_
+    std::uint32_t chosen[kBatch];  // indices of the points to add unless their voxel has one
+    std::size_t chosen_count;
   };
 
   template <int kValue>
@@ -256,26 +262,55 @@ class StaticMapAccumulator {
     });
   }
 
-  // Inserts the points with a `keep` flag.
-  void insert(std::size_t count, Span<const std::uint8_t> keep, const Batch& batch) {
-    for (std::size_t i = 0; i < count; ++i) {
-      __builtin_prefetch(recent_[static_cast<std::size_t>(batch.recent[i])]);
+  // Drops the points without a `keep` flag, which are few.
+  static void drop(Span<const std::uint8_t> keep, Batch& batch) {
+    const std::uint8_t* at = keep.begin();
+    const auto find = [&] { return std::memchr(at, 0, static_cast<std::size_t>(keep.end() - at)); };
+    while ((at = static_cast<const std::uint8_t*>(find())) != nullptr) {
+      batch.voxel[at++ - keep.begin()] = kDropped;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!keep.empty() && keep[i] == 0) continue;
+  }
+
+  // Chooses the first point of each run in one voxel, or all points if the map keeps all.
+  void choose(std::size_t count, Batch& batch) const {
+    detail::with_packs([&](auto packs) {
+      // Local copies: the compiler must assume that a store changes members.
+      const auto* const known = recent_.data();
+      const std::int32_t* const recent = batch.recent;
+      const std::int32_t* const voxel = batch.voxel;
+      std::uint32_t* next = batch.chosen;
+      const auto choose_first = [&](std::size_t begin, std::size_t) {
+        __builtin_prefetch(known[recent[begin]]);
+        *next = static_cast<std::uint32_t>(begin);
+        next += voxel[begin] == kDropped ? 0 : 1;
+      };
+      if (keep_all_) {
+        for (std::size_t i = 0; i < count; ++i) choose_first(i, i + 1);
+      } else {
+        detail::for_each_run<decltype(packs)>(count, choose_first, batch.block[0], batch.block[1],
+                                              batch.block[2], batch.voxel);
+      }
+      batch.chosen_count = static_cast<std::size_t>(next - batch.chosen);
+    });
+  }
+
+  // Most chosen points find their voxel occupied.
+  void insert_chosen(const Batch& batch) {
+    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
+      const std::uint32_t i = batch.chosen[k];
       const BlockIndex index = {batch.block[0][i], batch.block[1][i], batch.block[2][i]};
       detail::MapBlock*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
-      if (known == nullptr || !(known->index == index)) {
-        known = &blocks_.find_or_add(index);
-      }
-      detail::MapBlock& block = *known;
-      const std::uint64_t bit = std::uint64_t{1} << batch.voxel[i];
-      if ((block.occupied & bit) != 0 && !keep_all_) continue;
-      if (points_.size() == kNoIndex) throw std::length_error("2^32 - 1 points are too many");
-      points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
-      block.first = static_cast<std::uint32_t>(points_.size() - 1);
-      block.occupied |= bit;
+      if (known == nullptr || !(known->index == index)) known = &blocks_.find_or_add(index);
+      const bool is_occupied = (known->occupied >> batch.voxel[i] & 1U) != 0;
+      if (!is_occupied || keep_all_) add(batch, i, *known);
     }
+  }
+
+  [[gnu::noinline]] void add(const Batch& batch, std::size_t i, detail::MapBlock& block) {
+    if (points_.size() == kNoIndex) throw std::length_error("2^32 - 1 points are too many");
+    points_.push_back({batch.point[0][i], batch.point[1][i], batch.point[2][i], block.first});
+    block.first = static_cast<std::uint32_t>(points_.size() - 1);
+    block.occupied |= std::uint64_t{1} << batch.voxel[i];
   }
 
   Config config_;
