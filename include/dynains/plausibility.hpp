@@ -32,7 +32,7 @@ enum class Suspicion : std::uint8_t {
   kNone,
   kUnits,  ///< nearly no point can be judged: units, frame or ranges of the points
   kPoses,  ///< scans do not fit to each other under the poses
-  kRays,   ///< scans fit, but beams pass through what stands still: origin of rays, times of points
+  kRays,   ///< scans fit, but beams pass through static objects: origin of rays, times of points
 };
 
 constexpr std::array<const char*, 4> value_names(Suspicion) {

@@ -8,7 +8,7 @@
 
 namespace dynains {
 
-/// Converts a pose of float or double to the type of DynaInsRemover::push().
+/// Converts a pose of float or double, m, to the type of DynaInsRemover::push().
 template <class Scalar, int kOptions>
 Pose to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_sensor) {
   Pose T = Pose::Identity();
@@ -17,7 +17,8 @@ Pose to_isometry(const Sophus::SE3<Scalar, kOptions>& T_world_sensor) {
   return T;
 }
 
-/// Converts a pose, for example that of a ScanVerdict. Throws PoseError if `T` is not rigid.
+/// Converts a pose, m, for example ScanVerdict::T_world_sensor. Throws PoseError if `T` is not
+/// rigid.
 inline Sophus::SE3<double> to_sophus(const Pose& T) {
   validate_pose("T", T);
   return {Eigen::Quaterniond(T.linear()).normalized(), T.translation()};

@@ -10,8 +10,8 @@
 
 namespace dynains {
 
-/// Binary Bayes filter over the observations of one cluster. The heights of OccupancyDescriptor
-/// are its only input.
+/// Binary Bayes filter over the observations of one cluster (Thrun, Burgard and Fox, Probabilistic
+/// Robotics, 2005, Sec. 4.2). The heights of OccupancyDescriptor are its only input.
 class BeliefUpdater {
  public:
   struct Config {
@@ -65,8 +65,9 @@ class BeliefUpdater {
   void reset() { log_odds_ = log_odds(config_.prior); }
 
   /// One step of Eq. 15 with the update term of Eq. 16-18, which compares the heights of one
-  /// observation with those of the cluster. Both have one value per cell, m, not negative. Cells
-  /// that are empty in both are not in R (Eq. 17). If R is empty, the belief does not change.
+  /// observation with the heights of the cluster. Both spans have one value per cell, m, not
+  /// negative, and equal lengths. Cells that are empty in both are not in R (Eq. 17). If R is
+  /// empty, the belief does not change.
   void update(Span<const float> observation, Span<const float> cluster) {
     // The sum of Eq. 17 follows from three counts, which do not depend on the order of cells.
     std::size_t vanished = 0;
@@ -97,10 +98,10 @@ class BeliefUpdater {
   /// Log-odds that the cluster is dynamic.
   double log_odds_value() const { return log_odds_; }
 
-  /// p(m | z) (Eq. 13) from the log-odds of Eq. 15.
+  /// p(m | z) (Eq. 13) from the log-odds of Eq. 15, in (0, 1).
   double posterior() const { return probability(log_odds_); }
 
-  /// Verdict of Eq. 19.
+  /// Verdict of Eq. 19: whether posterior() exceeds tau_p.
   bool is_dynamic() const { return posterior() > config_.tau_p; }
 
  private:

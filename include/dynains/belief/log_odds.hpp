@@ -20,8 +20,8 @@ namespace dynains::detail {
 
 /// Updates the log-odds that a voxel, supervoxel or instance is free (Eq. 15). Each reference scan
 /// adds one of three increments (form of Eq. 18), by the ratio of its free to visible samples. The
-/// sum is never below zero (Page's test for a change, 1954): early hits do not cancel later free
-/// samples.
+/// sum is never below zero (Page, Continuous inspection schemes, Biometrika 41, 1954): early hits
+/// do not cancel later free samples, since an object that moves leaves its place late.
 class FreeSpaceSum {
  public:
   /// Limits of the ratio of free to visible samples in one reference scan: raise() from kFreeRatio
@@ -54,12 +54,14 @@ class FreeSpaceSum {
     return *ratio >= kFreeRatio ? 1 : *ratio <= kHitRatio ? -1 : 0;
   }
 
-  /// Adds the increment once, or twice if nearly all visible samples are free. `free_ratio`: ratio
-  /// of free to visible samples. `weight`: factor of the increment.
+  /// Adds the increment once, or twice if nearly all visible samples are free (the weight 2 of
+  /// Eq. 18). `level`: log-odds, >= 0. `free_ratio`: ratio of free to visible samples, [0, 1].
+  /// `weight`: factor of the increment.
   void raise(float& level, float free_ratio, float weight = 1.0F) const {
     constexpr float kWhollyFree = 0.9F;
     level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * weight * increment_;
   }
+  /// Adds the negative increment of a hit; stops at zero.
   void lower(float& level) const { level = std::max(0.0F, level + decrement_); }
 
  private:

@@ -12,21 +12,20 @@
 
 namespace dynains {
 
-/// Takes scans of a session and registers their points to planes and poles through the points of
-/// the map. Points that move have little weight, so that scans without verdicts can be given.
-/// Points of all sessions of the map count, but in each tile those of its newest three sessions
-/// only. The result depends on the scans, the start and these sessions. Memory: about 100 MB for
-/// kMostScans scans that lie far apart.
+/// Registers scans of a session to planes and poles through the points of the map. Moving points
+/// have little weight (Geman-McClure), so scans need no verdicts. In each tile, the newest three
+/// sessions of the map count. The result depends on the scans, the start and these sessions alone.
+/// Memory: about 100 MB for kMostScans scans that lie far apart.
 class SessionAligner {
  public:
-  /// More scans make the result hardly better.
+  /// More scans hardly improve the result.
   static constexpr std::size_t kMostScans = 40;
   static constexpr double kMostTranslation = 2.0;  ///< m, at the first scan in the map
   static constexpr double kMostRotation = 5.0;     ///< deg
 
   explicit SessionAligner(const City& city) : city_(city) {}
 
-  /// Adds one scan. `points`: m, sensor frame; others than finite ones are left out.
+  /// Adds one scan. `points`: m, sensor frame; points that are not finite are ignored.
   void add(PointsView points, const Pose& T_session_sensor);
 
   /// Refines an estimate that is at most kMostTranslation and kMostRotation away. Throws

@@ -1,4 +1,5 @@
-// One tile of a map of many sessions: which points of which session stand after which session.
+// One tile of a map of many sessions: which points of which session are on the map after which
+// session.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -22,12 +23,11 @@ namespace dynains {
 ///
 /// First the points of all sessions are added, in the order of their time; then, in the same order,
 /// the reference scans of each session test the points of all sessions. Blocks of 2 x 2 x 2 voxels
-/// have a sample in each voxel: the first point there. The part of a session of a block are the
-/// voxels in which it has points. Each part sums its log-odds of being free session by session, by
-/// Eq. 18:
-/// - Sessions before its own tell whether its place was free. Its own session tells whether it
-///   stands there. A part whose place was free, and that its own session hit too seldom, does not
-///   enter the map.
+/// have a sample in each voxel: the first point there. A part is the voxels of a block in which one
+/// session has points. Each part sums its log-odds of being free session by session, by Eq. 18:
+/// - Sessions before its own show whether its place was free, its own session whether it is
+///   occupied. A part whose place was free, and that its own session hit too seldom, does not enter
+///   the map.
 /// - A later session that passes through it removes it.
 /// Touching parts of a session above the ground form components. One that is larger than a vehicle
 /// is cut into cubes of 8 blocks: a tree that was felled beside others leaves alone. A component
@@ -123,7 +123,7 @@ class TileHistory {
       part.level = std::max(part.level, 0.0F);
       if (part.session <= by) continue;
       part.was_free = part.was_free || part.level >= level_;
-      // A few references of the session itself outweigh whatever earlier sessions have seen.
+      // A few references of the session itself outweigh all of the earlier sessions.
       part.level = std::min(part.level, level_);
     }
   }
@@ -188,7 +188,7 @@ class TileHistory {
     return parts_[sessions_[session].part_of[point]];
   }
 
-  // Adds what a reference tells.
+  // Updates a part by one reference.
   void add(bool is_free, Part& part) const {
     const float step = is_free ? free_ : hit_;
     part.level += step;
@@ -274,7 +274,7 @@ class TileHistory {
   float level_ = static_cast<float>(log_odds(0.95));  // from which a part is free (Eq. 19)
   std::vector<Session> sessions_;
   VoxelTile<Block> blocks_;
-  std::vector<Part> parts_;  // those of a session are together
+  std::vector<Part> parts_;  // session by session
   std::uint32_t component_count_ = 0;
   std::uint32_t tested_count_ = 0;  // sessions whose references have tested the points
   TestedCells tested_;

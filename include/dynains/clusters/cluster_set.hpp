@@ -138,6 +138,7 @@ class ClusterSet {
     order_runs(scan_begin);
   }
 
+  /// Number of clusters, and of scans of the window.
   std::size_t size() const { return cluster_count_; }
   std::size_t scan_count() const { return scan_count_; }
   /// Whether the cluster is compared.

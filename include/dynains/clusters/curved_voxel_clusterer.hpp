@@ -109,8 +109,8 @@ class CurvedVoxelClusterer {
     return config_.voxel_azimuth == 0.0 || config_.voxel_elevation == 0.0;
   }
 
-  /// Sets the voxel sizes that depend on the sensor. Before this call, they are those of
-  /// SensorModel::typical().
+  /// Sets the voxel sizes that depend on the sensor. Before this call, SensorModel::typical() gives
+  /// them.
   void adapt(const SensorModel& sensor) {
     resolved_ = config_.resolved(sensor);
     azimuths_ = static_cast<std::int32_t>(std::round(360.0 / resolved_.voxel_azimuth));
@@ -138,6 +138,7 @@ class CurvedVoxelClusterer {
     return {cell_or_cluster_.data(), points.size()};
   }
 
+  /// Number of clusters of the last cluster().
   std::size_t cluster_count() const { return cluster_count_; }
 
  private:

@@ -63,7 +63,7 @@ class OccupancyDescriptor {
       visitor(Parameter{"tau_s", self.tau_s, closed(0, 1), "",
                         "similarity below which a cluster is proposed as dynamic (Eq. 12)"});
       visitor(Parameter{"belief_cells", self.belief_cells, closed(1, 10), "",
-                        "size of the cells of the belief relative to those of the descriptor"});
+                        "size of the cells of the belief relative to the cells of the descriptor"});
       visitor(Parameter{"ignored_low", self.ignored_low, closed(0, 0.9), "",
                         "lowest share of an object of more than 1 m that no descriptor counts"});
       visitor(Parameter{"bounds_of_ends", self.bounds_of_ends, Bounds(), "",
@@ -169,7 +169,7 @@ class OccupancyDescriptor {
     return std::min(1.0, dot_sum / std::sqrt(aa_sum * bb_sum));
   }
 
-  /// Whether the cluster is an initial dynamic proposal (Eq. 12).
+  /// Whether the cluster is an initial dynamic proposal: similarity() < tau_s (Eq. 12).
   bool proposes_dynamic() const { return similarity() < config_.tau_s; }
 
  private:

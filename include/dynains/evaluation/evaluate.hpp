@@ -21,10 +21,10 @@ struct MapEstimate {
 /// Scores of one estimate, map or reference.
 struct EvaluationRow {
   std::string name;
-  Score voxels;                     ///< ERASOR (Lim et al., RA-L 2021): voxel points of the raw map
+  Score voxels;                     ///< ERASOR (Lim et al., RA-L 2021): voxels of the raw map
   Score points;                     ///< KTH (Zhang et al., ITSC 2023): measured points
-  std::optional<Score> objects;     ///< static ones without people; not of maps
-  std::vector<ClassScore> classes;  ///< of estimates only; static ones first, by id
+  std::optional<Score> objects;     ///< static objects without people; empty for maps
+  std::vector<ClassScore> classes;  ///< of estimates only; static classes first, by id
   /// Maps only: number of points without a measured point nearby,
   /// and number of all points.
   std::optional<std::uint64_t> foreign_points;

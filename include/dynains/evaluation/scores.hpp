@@ -18,13 +18,14 @@ inline double percent(std::uint64_t part, std::uint64_t whole) {
 /// Harmonic mean; 0 if both are 0, NaN if one is NaN.
 inline double harmonic_mean(double a, double b) { return a + b == 0 ? 0 : 2 * a * b / (a + b); }
 
-/// Numbers of things that stand and of things that move, and of right verdicts on them.
+/// Numbers of static and of dynamic voxels, points or objects, and of right verdicts on them.
 struct Score {
   std::uint64_t static_total = 0;
   std::uint64_t static_kept = 0;
   std::uint64_t dynamic_total = 0;
   std::uint64_t dynamic_removed = 0;
 
+  /// Adds `total` voxels, points or objects with this truth, of which `kept` are in the map.
   void add(Truth truth, std::uint64_t total, std::uint64_t kept) {
     if (truth == Truth::kDynamic) {
       dynamic_total += total;
@@ -37,7 +38,7 @@ struct Score {
 
   double kept() const { return percent(static_kept, static_total); }          ///< PR or SA, %
   double removed() const { return percent(dynamic_removed, dynamic_total); }  ///< RR or DA, %
-  /// F1, in [0, 1]; NaN if nothing stands or nothing moves.
+  /// F1, in [0, 1]; NaN without static or without dynamic ones.
   double f1() const { return harmonic() / 100; }
   double associated() const { return std::sqrt(kept() * removed()); }   ///< AA, %
   double harmonic() const { return harmonic_mean(kept(), removed()); }  ///< HA, %

@@ -29,6 +29,7 @@ class PointFileWriter {
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
                            const Pose& viewpoint = Pose::Identity());
 
+  /// Adds one point. commit() reports failures.
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
   /// Puts the file in place. Throws IoError unless it was written completely.
@@ -46,7 +47,7 @@ class PointFileWriter {
   AtomicFile file_;
 };
 
-/// Whether the extension is .ply or .pcd, those of PointFileWriter.
+/// Whether PointFileWriter writes files with this extension: .ply or .pcd.
 bool is_point_file(const std::filesystem::path& path);
 
 /// For a known format that is not read (.laz, .e57, .pcap, a dump of GLIM): its name and the way to
@@ -54,7 +55,8 @@ bool is_point_file(const std::filesystem::path& path);
 std::optional<std::string> conversion_of(const std::filesystem::path& path);
 
 /// Content of a point file. Each column has one value per position, or is empty if the file lacks
-/// it. The accepted column names are listed; their case is ignored. Units are those of the file.
+/// it. The accepted column names are listed; their case is ignored. Values keep the units of the
+/// file.
 struct PointFile {
   std::vector<Eigen::Vector3d> positions;  ///< x y z
   std::vector<float> intensity;            ///< intensity, i, reflectivity, scalar_intensity

@@ -11,8 +11,8 @@
 
 namespace dynains {
 
-/// One point to write. Members without a column in the file are ignored. Units are those of the
-/// caller.
+/// One point to write. Members without a column in the file are ignored; values are written as they
+/// are.
 struct FilePoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   float intensity = 0.0F;

@@ -110,8 +110,8 @@ struct ScanAddress;
 ///   in names by value.
 /// - Folder of .bin files in the format of KITTI, or with RecordingOptions::bin_layout.
 /// - nuScenes: a folder with samples/, sweeps/ and v1.0-*/, or the folder of its tables. Scans are
-///   the .pcd.bin files of one scene; poses and times are those of sample_data.json, ego_pose.json
-///   and calibrated_sensor.json.
+///   the .pcd.bin files of one scene; poses and times come from sample_data.json, ego_pose.json and
+///   calibrated_sensor.json.
 /// - ROS log: .mcap, .db3 or .bag, or a folder of such files: with metadata.yaml, or one file, or
 ///   parts NAME_0, NAME_1, ... The constructor reads the log once; points stay in the file. Scans
 ///   are the clouds of one topic, named by their number, with the times of their stamps.
@@ -136,7 +136,7 @@ struct ScanAddress;
 /// KITTI-360, if scans have no times.
 ///
 /// calib.txt is in the folder or beside the file of poses. An unreadable calib.txt is an error only
-/// if the poses are those of a camera. Rows without times are assigned to scans by order, or by the
+/// if the poses are poses of a camera. Rows without times are assigned to scans by order, or by the
 /// number of the scan. Rows with times are interpolated at the times of the scans plus
 /// `options.time_offset`. Scans without a pose are excluded and listed in `notes()`; more than half
 /// of them without a pose are an error.
@@ -147,8 +147,7 @@ struct ScanAddress;
 /// clouds; without such transforms, the poses are used as poses of the sensor. If the clouds are in
 /// the fixed frame of the poses, PointFrame is kWorld.
 ///
-/// With a sensor origin, points and poses are those of a frame at the sensor, with the axes of the
-/// clouds.
+/// With a sensor origin, points and poses are in a frame at the sensor with the axes of the clouds.
 ///
 /// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans
 /// with VIEWPOINT whose intensities are 0 and 1 alone, as in DynamicMap_Benchmark, 1 means moving.

@@ -19,7 +19,7 @@ constexpr std::array<const char*, 3> value_names(QuaternionOrder) {
   return {"auto", "xyzw", "wxyz"};
 }
 
-/// Rows of a trajectory file. Frame, direction and unit of translation are those of the file.
+/// Rows of a trajectory file, in the frame, direction and unit of the file.
 struct Trajectory {
   std::vector<Pose> poses;
   std::vector<double> times;  ///< s, strictly increasing; empty if the file has none

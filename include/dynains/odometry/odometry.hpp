@@ -1,5 +1,5 @@
-// A LiDAR odometry: registration of scans to a map of what stands, and removal of what moves, in
-// one loop. No IMU.
+// LiDAR odometry without an IMU: registers scans to a static map and removes moving points, in one
+// loop.
 #pragma once
 
 #include <array>
@@ -27,14 +27,14 @@ struct OdometryConfig {
                       "nearer points are the robot's own and not registered"});
     visitor(Parameter{"farthest", self.farthest, half_open_below(0, 1000), "m",
                       "farther points are not registered, and farther parts of the map forgotten"});
-    visitor(Parameter{"remove", self.remove, Bounds(), "", "keep what moves out of the map"});
+    visitor(Parameter{"remove", self.remove, Bounds(), "", "keep moving points out of the map"});
   }
 
   /// Throws ConfigError for a field out of bounds, or nearest >= farthest.
   void validate() const;
 };
 
-/// Why the odometry does not know where a scan is.
+/// Why the pose of a scan is unknown.
 enum class OdometryLoss : unsigned char {
   kNone,
   kFewPoints,  ///< too few points for a registration
@@ -47,7 +47,7 @@ constexpr std::array<const char*, 4> value_names(OdometryLoss) {
           "too long after the scan before"};
 }
 
-/// The answer to one scan.
+/// Result of one push.
 struct OdometryResult {
   /// At the stamp, in the frame of the first scan at its stamp, or of the poses of another
   /// odometry, whose first pose stays. After a loss: the predicted pose.
@@ -57,7 +57,7 @@ struct OdometryResult {
   /// Number of directions of motion, of six, that the surfaces do not determine, as along a
   /// corridor. Along them the motion is the predicted one.
   int free_directions = 0;
-  /// That of the remover, with the labels of the points as they were pushed; empty without
+  /// Result of the remover, with one label per pushed point; empty without
   /// `OdometryConfig::remove`, and for a scan that does not enter the map.
   FrameResult frame;
 };
@@ -66,8 +66,8 @@ struct OdometryResult {
 /// its points if they have times, and registered point to plane (poles: point to line) to a map of
 /// cells (Chen and Medioni 1992; Geman-McClure weights; degenerate directions as in Zhang, Kaess
 /// and Singh 2016). Then the remover judges the scan, and only points that do not move enter the
-/// map. The first motion is searched for up to 6 m along the direction that surfaces determine
-/// worst, by plants, posts and signs. Same scans, same bits.
+/// map. The first motion is searched for up to 6 m along the direction that the surfaces determine
+/// worst, by vegetation, poles and signs. Results are deterministic.
 class Odometry {
  public:
   using Config = OdometryConfig;

@@ -30,12 +30,12 @@ constexpr std::array<const char*, 6> value_names(PoseVerdict) {
   return {"agree", "inexact", "no motion", "otherwise", "disagree", "unknown"};
 }
 
-/// Traits of wrong poses that no option heals.
+/// Faults of poses that no option corrects.
 struct PoseFlaws {
   bool has_equal_orientations = false;  ///< all orientations are equal, though the way bends
-  double step = 0.0;  ///< m, coordinates of the poses are multiples of it; 0: of nothing coarse
-  /// Scans so many apart agree clearly better than neighbours, as those of several sensors in turn,
-  /// or of parts of a turn; 0: none do.
+  double step = 0.0;  ///< m, the coordinates of the poses are multiples of it; 0: no coarse step
+  /// Scans this many apart agree clearly better than neighbours, because several sensors, or parts
+  /// of a revolution, take turns; 0: no such period.
   std::size_t period = 0;
 };
 
@@ -70,9 +70,10 @@ struct Diagnosis {
   }
 };
 
-/// Compares and registers a sample of scans, in two threads. The time, a second, does not depend on
-/// the length of the recording; if scans do not agree, the recording may be opened again, with
-/// other options. `pairs`: of neighbours that suffice if nearly all are exact. Throws IoError.
+/// Compares and registers a sample of scans, in two threads. It takes about a second for a
+/// recording of any length. If scans do not agree, the recording may be opened again with other
+/// options. `pairs`: number of registered pairs of neighbours after which it stops if nearly all
+/// are exact. Throws IoError.
 Diagnosis diagnose(const Recording& recording, std::size_t pairs = 6);
 
 }  // namespace dynains

@@ -1,4 +1,4 @@
-// Where data of a recording waits that is not needed at the moment.
+// Storage outside of memory for data of a recording.
 #pragma once
 
 #include <cstddef>
@@ -19,9 +19,9 @@ void add_bytes(const Value* values, std::size_t count, std::vector<std::uint8_t>
   bytes.insert(bytes.end(), begin, begin + count * sizeof(Value));
 }
 
-/// Bytes that are added once and read later, in any order. They are in a file that no folder lists:
-/// it ends with this object or with the process, however that ends. Errors throw IoError and name
-/// the folder.
+/// Bytes that are added once and read later, in any order. They are in an unlinked file, which the
+/// operating system removes with this object or at the end of the process, also after a crash.
+/// Errors throw IoError and name the folder.
 class ByteStore {
  public:
   /// Makes the file on the file system of `folder`.

@@ -1,4 +1,4 @@
-// Samples of a cell, which stand for all of its points in tests of free space.
+// Samples that represent the points of a cell in tests of free space.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,8 +45,8 @@ struct CellSamples {
 /// The samples of cells, for tests by references.
 class TestedCells {
  public:
-  /// Takes cells with all of their samples, unless it has. Once it has, none may be added. `edge`:
-  /// theirs, m. `samples_of(i)`: CellSamples of cell number i.
+  /// Takes cells with all of their samples at the first call; none may be added afterwards. `edge`:
+  /// of the cells, m. `samples_of(i)`: CellSamples of cell number i.
   template <class SamplesOf>
   void take(const std::vector<VoxelKey>& cells, double edge, SamplesOf&& samples_of) {
     if (size() == cells.size()) return;
@@ -72,12 +72,12 @@ class TestedCells {
   std::size_t size() const { return begin_.size() - 1; }
   std::size_t memory_bytes() const { return 4 * (begin_.capacity() + 3 * points_.size()); }
 
-  /// Calls `tell(i, bits)` for the cells in range of a sensor (m, frame of the cells) of which a
-  /// reference tells something: detail::Visibility::Bits of their samples.
+  /// Calls `visit(i, bits)` for each cell within range of a sensor (m, frame of the cells) of which
+  /// some sample is free or hit. `bits`: detail::Visibility::Bits of its samples.
   /// `test_visibility(points, count, origin)`: see detail::test_visibility(); points relative to
   /// `origin`, m, with the axes of the cells.
-  template <class TestVisibility, class Tell>
-  void test(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility, Tell&& tell) const {
+  template <class TestVisibility, class Visit>
+  void test(const Eigen::Vector3d& sensor, TestVisibility&& test_visibility, Visit&& visit) const {
     if (size() == 0) return;
     const detail::Visibility& visibility =
         test_visibility(points_, std::size_t{begin_.back()}, origin_);
@@ -86,7 +86,7 @@ class TestedCells {
       const Eigen::Vector2f first(points_.x[begin_[i]], points_.y[begin_[i]]);
       if ((first - at).squaredNorm() > static_cast<float>(kLookRange * kLookRange)) continue;
       const detail::Visibility::Bits seen = visibility.bits(begin_[i], begin_[i + 1]);
-      if ((seen.free | seen.hit) != 0) tell(i, seen);
+      if ((seen.free | seen.hit) != 0) visit(i, seen);
     }
   }
 

@@ -47,7 +47,7 @@ struct RowChanges {
     add_bytes(&values[1], changes, bytes);
     values[0] = latest;
   }
-  /// Takes what pack() added. Returns whether it is valid.
+  /// Reads the bytes of pack() from `at`, which advances. Returns false if they are not valid.
   bool unpack(const std::uint8_t*& at, const std::uint8_t* end) {
     if (at == end) return false;
     const std::size_t changes = *at++;
@@ -66,8 +66,8 @@ struct RowChanges {
 }  // namespace detail
 
 /// Adds a range image to `bytes`, row by row. A part of a row has 64 columns, the last part fewer.
-/// Each part has the changes of Cell::nearest, then those of Cell::around. A cell changes if its
-/// value differs from that of the cell before it; the value before the first cell of a row is 0. A
+/// Each part has the changes of Cell::nearest, then the changes of Cell::around. A cell changes if
+/// its value differs from the value of the cell before; before the first cell of a row it is 0. A
 /// byte counts the changes of the part. If there are any, 64 bits mark the cells that change, the
 /// lowest bit for the first column, and the new values follow as int16.
 inline void pack_image(const RangeImage& image, std::vector<std::uint8_t>& bytes) {
@@ -126,8 +126,8 @@ class RecordingReferences {
   const RangeImageGrid& grid() const { return grid_; }
 
   /// The reference of a scan, or null if the scan is not one; valid until the next call. `points`:
-  /// m, sensor frame. `verdicts`: final verdict by point. The directions of dynamic points are
-  /// unknown: if their verdicts are wrong, nothing else is removed by them.
+  /// m, sensor frame. `verdicts`: final verdict by point. Directions of dynamic points are unknown
+  /// in the image, so that a wrong verdict on them removes nothing else.
   const RecordingReference* add(PointsView points, Span<const PointLabel> verdicts,
                                 const Pose& T_world_sensor, std::uint32_t scan) {
     constexpr double kWay = 1.0;  // m

@@ -6,10 +6,10 @@
 
 namespace dynains {
 
-/// Which objects that stood for a part of the recording are static.
+/// Whether objects that were static for a part of the recording stay on the map.
 enum class StaticPolicy : std::uint8_t {
-  kAlways,  ///< nothing that came or went
-  kLast     ///< what stands at the last look, in the scans since it stands
+  kAlways,  ///< none that came or left
+  kLast     ///< those there at the end, in the scans since they came
 };
 
 /// Names as in options.

@@ -24,7 +24,7 @@ struct VerdictArrays {
     if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
   }
 
-  /// A verdict with these arrays, which outlive it.
+  /// Verdict whose spans refer to these arrays; valid as long as they are unchanged.
   ScanVerdict verdict(std::uint64_t scan, double time, const Pose& T_world_sensor) const {
     return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
   }

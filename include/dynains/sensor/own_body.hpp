@@ -115,7 +115,7 @@ struct SteadyReturn {
 
 /// `returns`: the nearest returns of a direction in `scans` scans. `height`: of a point above the
 /// ground, m. `ground`: distance of the nearest ground in this azimuth, m. `steady` is 0 for
-/// returns that cannot be those of the own body, which hides the ground below it.
+/// returns that cannot come from the body, which hides the ground below it.
 template <class Height>
 SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::size_t scans,
                            Height&& height, double ground) {
@@ -177,8 +177,8 @@ inline double reach_of_body(std::vector<SteadyReturn> candidates) {
 
 /// Finds the returns of the own body: near ones that keep their place in the sensor frame while the
 /// sensor moves. `scans`: m, sensor frame, finite points; at least 8 scans of a drive of several
-/// metres, with turns if possible. Things that keep their place while the sensor stands belong to
-/// the body, too. The body is assumed to end 4.5 m from the sensor, to be 0.4 m above the
+/// metres, with turns if possible. While the sensor stands still, everything near it is taken for
+/// the body. The body is assumed to end 4.5 m from the sensor, to be 0.4 m above the
 /// ground, and to hide the ground below it. The result is not known for fewer scans. Allocates
 /// memory and takes some tens of milliseconds, so call it once, before the first push: a stream
 /// cannot know it at its first scan.
