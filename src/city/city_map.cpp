@@ -150,7 +150,7 @@ void City::revise(TileHistory& history, const TileIndex& tile, const SessionInfo
   const Eigen::Vector3d corner = tile_corner(grid_, tile);
   const Eigen::Vector3d middle = corner + Eigen::Vector3d(0.5 * edge, 0.5 * edge, 0.0);
   // Beyond this distance, no point of the tile is in range.
-  const double reach = kLookRange + std::sqrt(0.5) * edge;
+  const double reach = kTestRange + std::sqrt(0.5) * edge;
   for (const SessionReference& which : session.references) {
     if ((which.sensor - middle).head<2>().norm() > reach) continue;
     read_reference(session, which, reference);

@@ -30,7 +30,7 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session, Mode mode)
       session_(std::move(session)),
       mode_(mode),
       store_(city.folder()),
-      points_(city.grid(), kLookRange, store_),
+      points_(city.grid(), kTestRange, store_),
       references_(/*most_scans=*/10, session_.evidence.lateral_margin) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +

@@ -40,7 +40,7 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
   for (std::size_t i = 0; i < points.size(); i += stride) {
     const float x = points.x[i], y = points.y[i], z = points.z[i];
     if (!is_static(verdicts[i])) continue;
-    if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > static_cast<float>(kLookRange))
+    if (std::max({std::abs(x), std::abs(y), std::abs(z)}) > static_cast<float>(kTestRange))
       continue;
     kept_.points.push_back(x, y, z);
     const auto steps = [](float metres) {
@@ -139,7 +139,7 @@ void Returns::choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor) {
   near_.clear();
   for (const KeyScan& key : keys_) {
     const bool is_old = key.scan + compared_ < scans_;
-    if (key.visit == visit && is_old && distance(&key) < kLookRange) near_.push_back(&key);
+    if (key.visit == visit && is_old && distance(&key) < kTestRange) near_.push_back(&key);
   }
   std::stable_sort(near_.begin(), near_.end(),
                    [&](const KeyScan* a, const KeyScan* b) { return distance(a) < distance(b); });

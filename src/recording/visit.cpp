@@ -23,7 +23,7 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPos
   const std::uint32_t number = scans();
   if (number == 0) {
     first_ = static_cast<std::uint32_t>(verdict.scan);
-    // Which way is up is told by the ground of the first scan, not by the world.
+    // The ground of the first scan determines which way is up, because worlds may be tilted.
     T_level_world_.linear() = estimate_mounting(points).R_level_sensor();
     T_level_world_ = orthonormalized(T_level_world_ * compared.T_world_sensor.inverse());
   }
@@ -101,7 +101,7 @@ bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and
-// no look passed it. Ground that left with the instance above it stays removed: it holds wheels and
+// no observation of its place is free. Ground that left with the instance above it stays removed: it holds wheels and
 // undersides.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {

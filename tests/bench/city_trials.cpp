@@ -45,7 +45,7 @@ PointBuffer points_of(const simulation::SimulatedScan& scan) {
 class MeasuredObjects {
  public:
   void add(const simulation::SimulatedScan& scan) {
-    constexpr float kRange = static_cast<float>(kLookRange);
+    constexpr float kRange = static_cast<float>(kTestRange);
     std::set<std::uint32_t> measured;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
       const Eigen::Map<const Eigen::Vector3f> point(&scan.xyzi[4 * i]);
@@ -203,7 +203,7 @@ Result try_days(const fs::path& folder, int days, simulation::Config config) {
   for (config.day = 1; config.day <= days; ++config.day) {
     constexpr double kAnyDistance = 300.0;  // m
     auto store = std::make_unique<ByteStore>(fs::temp_directory_path());
-    SessionPoints near(city.grid(), kLookRange, *store);
+    SessionPoints near(city.grid(), kTestRange, *store);
     SessionPoints all(city.grid(), kAnyDistance, *store);
     measured.push_back({std::move(store), std::move(near), std::move(all)});
     add_day(city, config, measured.back());

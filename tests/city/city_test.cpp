@@ -322,7 +322,7 @@ TEST_CASE("a city: the file of a session has the points of the session, tile by 
   info.name = "monday";
   SessionWriter writer(city, info);
   ByteStore store(std::filesystem::temp_directory_path());
-  SessionPoints all(grid, kLookRange, store);
+  SessionPoints all(grid, kTestRange, store);
   // Away, back, and over the same places again, at other heights within their voxels.
   for (std::uint32_t number = 0; number < 60; ++number) {
     const double way = 8.0 * (number < 40 ? number : 80 - number);

@@ -22,7 +22,7 @@ using Beam = std::function<BeamResult(const Eigen::Vector3d& position)>;
 /// reference each second follows, from epoch 2 on.
 class Recorder {
  public:
-  Recorder() { looks_.next(sensor, -1.0); }
+  Recorder() { epochs_.next(sensor, -1.0); }
   /// Measures `count` places in a row along y, from place `first` on, at x = `x` m.
   void measure(int count, int first = 0, float x = 10.1F, PointLabel label = PointLabel::kStatic) {
     measure(1, count, first, x, label);
@@ -31,13 +31,13 @@ class Recorder {
   void judge(int epoch, const std::vector<PointLabel>& verdicts) {
     for (const PointLabel verdict : verdicts) measure(epoch++, 6, 0, 10.1F, verdict);
   }
-  void look(BeamResult seen, int times = 1) {
+  void observe(BeamResult seen, int times = 1) {
     look_by([seen](const Eigen::Vector3d&) { return seen; }, times);
   }
   void look_by(const Beam& beam, int times = 1) {
     for (int i = 0; i < times; ++i, time_ += step) {
       places.test(
-          looks_.next(sensor, time_), sensor,
+          epochs_.next(sensor, time_), sensor,
           [&](const PointBuffer& points, std::size_t size,
               const Eigen::Vector3d& origin) -> const auto& {
             visibility_ = test::visibility_by(beam, points, size, origin);
@@ -79,57 +79,57 @@ class Recorder {
     places.add(points, labels, causes, Pose::Identity(), static_cast<std::uint16_t>(epoch));
   }
 
-  Epochs looks_;
+  Epochs epochs_;
   double time_ = 0.0;  // s
   detail::Visibility visibility_;
 };
 
-constexpr int kEnough = RecordingPlace::kFreeLooks;
+constexpr int kEnough = RecordingPlace::kFreeObservations;
 constexpr int kObject = 6;  // places
 
-TEST_CASE("a place that enough looks in a row passed has changed") {
+TEST_CASE("a place that enough observations in a row passed has changed") {
   Recorder left;
   left.measure(kObject);
-  left.look(BeamResult::kHit, 60);  // however long it stood
-  left.look(BeamResult::kFree, kEnough);
+  left.observe(BeamResult::kHit, 60);  // however long it stood
+  left.observe(BeamResult::kFree, kEnough);
   CHECK(left.changed() == 6);
 
   Recorder came;
   came.measure(kObject);
-  came.look(BeamResult::kFree, kEnough);
-  came.look(BeamResult::kHit, 60);
+  came.observe(BeamResult::kFree, kEnough);
+  came.observe(BeamResult::kHit, 60);
   CHECK(came.changed() == 6);
 
   Recorder few;
   few.measure(kObject);
-  few.look(BeamResult::kHit, 60);
-  few.look(BeamResult::kFree, kEnough - 1);
+  few.observe(BeamResult::kHit, 60);
+  few.observe(BeamResult::kFree, kEnough - 1);
   CHECK(few.changed() == 0);
 }
 
-TEST_CASE("a hit between free looks begins a new row of them") {
+TEST_CASE("a hit between free observations begins a new row of them") {
   Recorder fence;
   fence.measure(kObject);
   for (int i = 0; i < 20; ++i) {
-    fence.look(BeamResult::kFree, kEnough - 1);
-    fence.look(BeamResult::kHit);
+    fence.observe(BeamResult::kFree, kEnough - 1);
+    fence.observe(BeamResult::kHit);
   }
   CHECK(fence.changed() == 0);
 
   Recorder hidden;
   hidden.measure(kObject);
   for (int i = 0; i < kEnough; ++i) {
-    hidden.look(BeamResult::kFree);
-    hidden.look(BeamResult::kUnknown);
+    hidden.observe(BeamResult::kFree);
+    hidden.observe(BeamResult::kUnknown);
   }
   CHECK(hidden.changed() == 6);
 }
 
-TEST_CASE("references near each other in time and place are one look") {
+TEST_CASE("references near each other in time and place are one observation") {
   Recorder repeated;
   repeated.measure(kObject);
   repeated.step = 0.05;
-  repeated.look(BeamResult::kFree, 20);  // 0.95 s from first to last
+  repeated.observe(BeamResult::kFree, 20);  // 0.95 s from first to last
   CHECK(repeated.changed() == 0);
 
   Recorder moving;
@@ -137,7 +137,7 @@ TEST_CASE("references near each other in time and place are one look") {
   moving.step = 0.05;
   moving.sensor.y() = -4.5;
   for (int i = 0; i < 4; ++i) {
-    moving.look(BeamResult::kFree);
+    moving.observe(BeamResult::kFree);
     moving.sensor.y() += Epochs::kWay;
   }
   CHECK(moving.changed() == 6);
@@ -147,8 +147,8 @@ TEST_CASE("an object needs enough places") {
   for (const int places : {kObject - 1, kObject}) {
     Recorder recorder;
     recorder.measure(places);
-    recorder.look(BeamResult::kHit, 5);
-    recorder.look(BeamResult::kFree, 10);
+    recorder.observe(BeamResult::kHit, 5);
+    recorder.observe(BeamResult::kFree, 10);
     CHECK(recorder.changed() == (places < kObject ? 0U : static_cast<std::size_t>(places)));
   }
 }
@@ -159,7 +159,7 @@ TEST_CASE("a part of something that stays stays") {
     recorder.measure(kObject);                 // these leave
     recorder.measure(kObject + 2, -1, 10.5F);  // beside them
     recorder.measure(more, 0, 9.7F);           // and before them
-    recorder.look(BeamResult::kHit, 5);
+    recorder.observe(BeamResult::kHit, 5);
     recorder.look_by(
         [](const Eigen::Vector3d& at) {
           return at.x() < 10.0 || at.x() > 10.4 ? BeamResult::kHit : BeamResult::kFree;
@@ -174,21 +174,21 @@ TEST_CASE("an object across the border of tiles has changed as a whole") {
   const int border = 1 << kTileShift;  // places
   recorder.measure(6, border - 3);
   recorder.sensor.y() = 25.0;
-  recorder.look(BeamResult::kHit, 5);
-  recorder.look(BeamResult::kFree, 10);
+  recorder.observe(BeamResult::kHit, 5);
+  recorder.observe(BeamResult::kFree, 10);
   CHECK(recorder.changed() == 6);
 }
 
 constexpr PointLabel kKept = PointLabel::kStatic, kRemoved = PointLabel::kDynamic;
 
-TEST_CASE("what the first pass saw coming has changed, if looks passed its place before") {
+TEST_CASE("what the first pass saw coming has changed, if observations passed its place before") {
   for (const bool was_empty : {false, true}) {
     for (const PointLabel first : {kKept, kRemoved}) {
       Recorder recorder;
       recorder.judge(3, {first, kKept, kKept});
-      recorder.look(was_empty ? BeamResult::kFree : BeamResult::kUnknown);
-      recorder.look(BeamResult::kUnknown);
-      recorder.look(BeamResult::kHit, 20);
+      recorder.observe(was_empty ? BeamResult::kFree : BeamResult::kUnknown);
+      recorder.observe(BeamResult::kUnknown);
+      recorder.observe(BeamResult::kHit, 20);
       CHECK(recorder.changed() == (was_empty && first == kRemoved ? 6U : 0U));
     }
   }
@@ -198,16 +198,16 @@ TEST_CASE("what beams pass while others hit it is porous, and stays") {
   for (const bool is_kept_in_between : {false, true}) {
     Recorder recorder;
     recorder.judge(is_kept_in_between ? 4 : 21, {kKept, kKept, kKept});
-    recorder.look(BeamResult::kFree, 8);
+    recorder.observe(BeamResult::kFree, 8);
     CHECK(recorder.changed() == (is_kept_in_between ? 0U : 6U));
   }
 }
 
-TEST_CASE("what came stands since the last look that passed its place") {
+TEST_CASE("what came stands since the last observation that passed its place") {
   Recorder recorder;
   recorder.judge(7, {kKept, kKept, kKept});
-  recorder.look(BeamResult::kFree, 5);
-  recorder.look(BeamResult::kHit, 3);
+  recorder.observe(BeamResult::kFree, 5);
+  recorder.observe(BeamResult::kHit, 3);
   CHECK(recorder.changed() == 6);
   recorder.for_each_changed([](const ChangedPlace& place) {
     CHECK_FALSE(place.stands_since(6));
@@ -215,18 +215,19 @@ TEST_CASE("what came stands since the last look that passed its place") {
   });
   Recorder left;
   left.judge(1, {kKept, kKept, kKept});
-  left.look(BeamResult::kHit, 3);
-  left.look(BeamResult::kFree, 5);
+  left.observe(BeamResult::kHit, 3);
+  left.observe(BeamResult::kFree, 5);
   CHECK(left.changed() == 6);
   left.for_each_changed([](const ChangedPlace& place) { CHECK_FALSE(place.stands_since(9)); });
 }
 
-TEST_CASE("what the first pass saw leaving has changed, if looks passed its place afterwards") {
+TEST_CASE(
+    "what the first pass saw leaving has changed, if observations passed its place afterwards") {
   for (const BeamResult after : {BeamResult::kFree, BeamResult::kUnknown, BeamResult::kHit}) {
     Recorder recorder;
     recorder.judge(1, {kKept, kKept, kRemoved});
-    recorder.look(BeamResult::kHit, 3);
-    recorder.look(after);
+    recorder.observe(BeamResult::kHit, 3);
+    recorder.observe(after);
     CHECK(recorder.changed() == (after == BeamResult::kFree ? 6U : 0U));
   }
 }

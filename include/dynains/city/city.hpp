@@ -47,11 +47,12 @@ class City {
 
   const std::filesystem::path& folder() const { return folder_; }
   const SessionGrid& grid() const { return grid_; }
+  /// Path of the file of a session, whether or not it exists.
   std::filesystem::path session_file(const std::string& name) const {
     return folder_ / (name + ".session");
   }
 
-  /// Reads which sessions there are. Links are none.
+  /// Lists the sessions in the folder. Symbolic links are ignored.
   void reload();
   /// All sessions as of the latest reload(), in the order of their time.
   const std::vector<SessionInfo>& sessions() const { return sessions_; }
@@ -60,7 +61,7 @@ class City {
 
   /// Points of one tile of a session; empty if the session has none there.
   std::vector<SessionPoint> read_tile(const SessionInfo& session, const TileIndex& tile) const;
-  /// Reads one of the references of a session into `reference`, whose memory is used again.
+  /// Reads one of the references of a session into `reference`, whose memory is reused.
   void read_reference(const SessionInfo& session, const SessionReference& which,
                       RecordingReference& reference) const;
 
@@ -71,7 +72,7 @@ class City {
   /// find_changes(). Throws ConfigError unless `a` is before `b`.
   CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
 
-  /// Removes one session: the map is as if it had never come.
+  /// Removes one session. The map then has the bytes of a map without it.
   void drop(const std::string& name);
 
   /// Reads everything. Returns one message, with path and position, for each defect.

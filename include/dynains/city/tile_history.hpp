@@ -39,6 +39,7 @@ class TileHistory {
   /// Throws ConfigError.
   explicit TileHistory(const SessionGrid& grid) : grid_((grid.validate(), grid)) {}
 
+  /// Points of a session in this tile, in the order of their scans.
   const std::vector<SessionPoint>& points(std::size_t session) const {
     return sessions_[session].points;
   }

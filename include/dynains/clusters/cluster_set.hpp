@@ -36,6 +36,7 @@ class PolarBuffer {
  public:
   std::size_t size() const { return size_; }
   void clear() { size_ = 0; }
+  /// Sets the number of points; new ones are not initialized.
   void resize(std::size_t size) {
     size_ = size;
     const std::size_t padded = size + detail::kPackWidth;
@@ -89,6 +90,7 @@ struct ClusterView {
   /// By scan, plus the end: number of the first range. `ranges` begins at number first_range[0].
   Span<const std::uint32_t> first_range;
 
+  /// Number of scans of the window, K of Eq. 3 or less.
   std::size_t scan_count() const { return first_range.size() - 1; }
   /// The first scan with points of the cluster, which has points.
   std::size_t oldest() const {

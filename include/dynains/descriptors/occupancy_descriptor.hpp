@@ -128,7 +128,7 @@ class OccupancyDescriptor {
   std::size_t radial_cells() const { return radial_cells_; }    ///< N_r (Eq. 6)
   std::size_t azimuth_cells() const { return azimuth_cells_; }  ///< N_theta (Eq. 7)
   std::size_t cell_count() const { return radial_cells_ * azimuth_cells_; }
-  std::size_t scan_count() const { return cluster_.scan_count(); }
+  std::size_t scan_count() const { return cluster_.scan_count(); }  ///< K of Eq. 3, or less
   /// The first scan with an observation.
   std::size_t oldest() const { return oldest_; }
 

@@ -39,7 +39,9 @@ void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);
 /// `poses`: the poses P of poses.txt, equal to T_world_sensor without calib.txt.
 void write_poses(const std::filesystem::path& file, Span<const Pose> poses);
+/// `times`: s, one per scan.
 void write_times(const std::filesystem::path& file, Span<const double> times);
+/// `Tr`: m, from the sensor to the frame of the poses P.
 void write_calib(const std::filesystem::path& file, const Pose& Tr);
 
 }  // namespace dynains

@@ -39,7 +39,7 @@ class LasWriter {
  public:
   explicit LasWriter(const std::filesystem::path& path, const LasOptions& options = {});
 
-  /// Throws IoError for a position that is not finite or out of range.
+  /// Adds one point. Throws IoError for a position that is not finite or out of range.
   void add(const LasPoint& point);
   std::size_t size() const { return size_; }
   /// Puts the file in place, unless it was not written completely.

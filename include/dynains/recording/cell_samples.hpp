@@ -84,7 +84,7 @@ class TestedCells {
     const Eigen::Vector2f at = (sensor - origin_).head<2>().cast<float>();
     for (std::size_t i = 0; i < size(); ++i) {
       const Eigen::Vector2f first(points_.x[begin_[i]], points_.y[begin_[i]]);
-      if ((first - at).squaredNorm() > static_cast<float>(kLookRange * kLookRange)) continue;
+      if ((first - at).squaredNorm() > static_cast<float>(kTestRange * kTestRange)) continue;
       const detail::Visibility::Bits seen = visibility.bits(begin_[i], begin_[i + 1]);
       if ((seen.free | seen.hit) != 0) visit(i, seen);
     }

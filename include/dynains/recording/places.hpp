@@ -22,8 +22,8 @@
 
 namespace dynains {
 
-/// Numbers the epochs of a visit: scans that are near each other in time and in the place of the
-/// sensor, which repeat the same error, and count once.
+/// Numbers the epochs of a visit. The scans of an epoch are near each other in time and in the
+/// place of the sensor, so they repeat the same errors and count as one observation.
 class Epochs {
  public:
   static constexpr double kWay = 3.0;   ///< m, of the sensor
@@ -94,34 +94,37 @@ struct FirstVerdicts {
 
 /// A cube of 0.4 m. It fills a cache line.
 struct alignas(64) RecordingPlace {
-  static constexpr int kFreeLooks = 4;  ///< in a row, after which it has changed
+  static constexpr int kFreeObservations = 4;  ///< in a row, after which it has changed
 
   FirstVerdicts first;
   Presence kept;  ///< points by the first pass
   CellSamples samples;
 
-  enum class Look : std::uint8_t { kNone, kFree, kHit } look = Look::kNone;  ///< the open one
-  std::uint16_t run_begin = 0;                      ///< first epoch of the row of free looks
+  /// Result of the references of one epoch together.
+  enum class Observation : std::uint8_t { kNone, kFree, kHit };
+  Observation observation = Observation::kNone;     ///< by the current epoch
+  std::uint16_t run_begin = 0;                      ///< first epoch of the row of free ones
   std::uint16_t passed_first = 0, passed_last = 0;  ///< epochs of the longest row
-  std::uint16_t last_free = 0;                      ///< last epoch whose look passed it
-  std::uint8_t run = 0, longest = 0;                ///< free looks in a row
-  bool was_hit = false;                             ///< by any look
+  std::uint16_t last_free = 0;                      ///< last epoch that saw it free
+  std::uint8_t run = 0, longest = 0;                ///< free observations in a row
+  bool was_hit = false;                             ///< in any observation
   bool free_before = false, free_after = false;     ///< before, after any epoch measured it
 
-  /// Whether looks tell that what was measured in it came or went. It came if looks passed the
-  /// place before any epoch measured it, and the first epoch removed its points. It left if looks
-  /// passed the place after all epochs, and the last epoch removed its points. It also came or went
-  /// if kFreeLooks looks in a row passed the place, and the first pass kept no points of that time:
-  /// points that stay where beams pass are those of something porous.
+  /// Whether an object came to this place or left it. It came if the place was free before any
+  /// epoch measured points in it, and the first pass removed the points of the first such epoch. It
+  /// left if the place was free after all of these epochs, and the first pass removed the points of
+  /// the last one. It also came or left if kFreeObservations observations in a row are free, and
+  /// the first pass kept no points of that time: kept points where beams pass belong to porous
+  /// objects.
   bool has_changed() const {
     const bool came = first.removed_first && free_before;
     const bool left = first.removed_last && free_after;
     return (first.any_kept && (came || left)) ||
-           (longest >= kFreeLooks && !kept.any_within(passed_first, passed_last));
+           (longest >= kFreeObservations && !kept.any_within(passed_first, passed_last));
   }
-  /// Adds the open look, which is of an epoch, to the state.
-  void end_look(std::uint16_t epoch) {
-    if (look == Look::kHit) {
+  /// Adds the observation of the current epoch, `epoch`, to the state.
+  void end_observation(std::uint16_t epoch) {
+    if (observation == Observation::kHit) {
       was_hit = true;
       free_after = false;
       run = 0;
@@ -137,17 +140,17 @@ struct alignas(64) RecordingPlace {
         passed_last = epoch;
       }
     }
-    look = Look::kNone;
+    observation = Observation::kNone;
   }
 };
 
 /// A place of an object that came or went.
 struct ChangedPlace {
   bool removed_last = false;    ///< the last epoch of first verdicts removed its points
-  std::uint16_t last_free = 0;  ///< last epoch whose look passed it
+  std::uint16_t last_free = 0;  ///< last epoch that saw it free
 
-  /// Whether what an epoch measured in it is there in the end of the recording: no later look
-  /// passed it.
+  /// Whether the points that an epoch measured in it are there until the end of the recording: no
+  /// later epoch saw it free.
   bool stands_since(std::uint16_t epoch) const { return !removed_last && epoch > last_free; }
 };
 
@@ -195,18 +198,19 @@ struct RecordingTile {
 
 /// Places are cells of 0.4 m with points above the ground. The verdicts of the first pass on them
 /// are kept by epochs. Then reference scans test the points of each place, in the order of their
-/// times. Those of an epoch are one look. A look is free if beams passed the place and none hit it.
-/// A place has changed by its state over time, not by the sum of its looks.
-/// The height of the ground is the mean of all scans: single scans have noise and hidden ground.
+/// times. The references of an epoch make one observation, which is free if beams passed the place
+/// and none hit it. The order of the observations in time, not their sum, decides whether a place
+/// has changed. The height of the ground is the mean of all scans, because single scans are noisy
+/// and miss occluded ground.
 class RecordingPlaces {
  public:
-  /// `budget`: bytes in memory, if the places around the sensor take less; the others wait in the
-  /// store, which outlives this, and what it throws comes out of all functions. Neither changes a
-  /// result.
+  /// `budget`: bytes in memory, unless the places around the sensor take more; the others wait in
+  /// `store`, which outlives this. All functions throw the exceptions of the store. Neither changes
+  /// a result.
   RecordingPlaces(ByteStore& store, std::size_t budget) : tiles_(store, budget) {}
 
-  /// Adds the points of a scan (m, sensor frame): places of those above the ground, and the ground.
-  /// Epochs ascend.
+  /// Adds the points of a scan (m, sensor frame): places of points above the ground, and the
+  /// ground. Epochs ascend.
   void add(PointsView points, Span<const PointLabel> verdicts, Span<const Cause> causes,
            const Pose& T_world_sensor, std::uint16_t epoch) {
     std::array<Added, 128> batch;
@@ -236,10 +240,10 @@ class RecordingPlaces {
     free_far(T_world_sensor.translation());
   }
 
-  /// Keeps to the budget, while points around a sensor (m, world frame) are asked for. Places of
-  /// the open look stay in memory.
+  /// Moves tiles far from a sensor (m, world frame) to the store as long as the budget is exceeded.
+  /// Places of the current observation stay in memory.
   void free_far(const Eigen::Vector3d& sensor) {
-    tiles_.free_far(sensor, kLookRange + Epochs::kWay);
+    tiles_.free_far(sensor, kTestRange + Epochs::kWay);
   }
 
   /// Height of a point (m, world frame) above the ground, m, if there is ground in its column.
@@ -270,32 +274,33 @@ class RecordingPlaces {
   /// ascend. `test_visibility`: see TestedCells::test().
   template <class TestVisibility>
   void test(std::uint16_t epoch, const Eigen::Vector3d& sensor, TestVisibility&& test_visibility) {
-    if (epoch != look_) end_look();
-    look_ = epoch;
+    if (epoch != epoch_) end_observation();
+    epoch_ = epoch;
     free_far(sensor);
     tiles_.for_each_index([&](const TileIndex& index) {
-      if (tiles_.distance(index, sensor) > kLookRange) return;
+      if (tiles_.distance(index, sensor) > kTestRange) return;
       Tile& tile = tiles_.at(index);
-      const auto tell = [&](std::size_t i, const detail::Visibility::Bits& seen) {
+      const auto visit = [&](std::size_t i, const detail::Visibility::Bits& seen) {
         Place& place = tile.places.values[i];
         const auto [free, hit] = seen.count();
         const int verdict = detail::FreeSpaceSum::judge(
             free, hit, detail::count_ones(std::uint64_t{place.samples.octants}));
         if (verdict == 0) return;
-        using Look = Place::Look;
-        if (place.look == Look::kNone) touched_.push_back(&place);
-        place.look = std::max(place.look, verdict > 0 ? Look::kFree : Look::kHit);
+        using Observation = Place::Observation;
+        if (place.observation == Observation::kNone) touched_.push_back(&place);
+        place.observation =
+            std::max(place.observation, verdict > 0 ? Observation::kFree : Observation::kHit);
       };
-      tile.tested().test(sensor, test_visibility, tell);
+      tile.tested().test(sensor, test_visibility, visit);
     });
   }
 
-  /// Ends the last look, and decides on all places and objects: components of touching changed
-  /// places that are large enough, and no part of something that stays. Nothing is tested then.
+  /// Ends the last observation and decides on all places and objects: components of touching
+  /// changed places that are large enough and not part of a static object. No test may follow.
   void decide() {
     constexpr std::size_t kFewest = 6;    // places
-    constexpr double kMostContact = 1.5;  // places that stay and touch it, ratio to its own places
-    end_look();
+    constexpr double kMostContact = 1.5;  // unchanged places that touch it, ratio to its own places
+    end_observation();
     VoxelTile<Place> found;
     tiles_.for_each_index([&](const TileIndex& index) {
       const VoxelTile<Place>& tile = tiles_.find(index)->places;
@@ -362,9 +367,9 @@ class RecordingPlaces {
       const std::size_t i = added.i;
       const bool is_removed = verdicts[i] == PointLabel::kDynamic;
       if (!is_removed) place.kept.add(epoch);
-      // The first verdicts on points that are too far for looks say little of their place.
+      // The first verdicts on points beyond the range of tests are little evidence.
       const float squared = points.x[i] * points.x[i] + points.y[i] * points.y[i];
-      const bool is_near = squared <= static_cast<float>(kLookRange * kLookRange);
+      const bool is_near = squared <= static_cast<float>(kTestRange * kTestRange);
       if (is_near) place.first.add(is_removed, epoch);
       if (place.samples.has(added.octant)) continue;
       const Eigen::Vector3d point = world_point(points, i, T_world_sensor);
@@ -372,9 +377,9 @@ class RecordingPlaces {
     }
   }
 
-  // Adds the open look to the states of the places that it saw.
-  void end_look() {
-    for (Place* const place : touched_) place->end_look(look_);
+  // Adds the observation of the current epoch to the states of the places that it saw.
+  void end_observation() {
+    for (Place* const place : touched_) place->end_observation(epoch_);
     touched_.clear();
   }
 
@@ -394,7 +399,7 @@ class RecordingPlaces {
   PagedTiles<Tile> tiles_;
   VoxelTile<ChangedPlace> changed_;
 
-  std::uint16_t look_ = 0;       // epoch of the open one
+  std::uint16_t epoch_ = 0;      // the current one
   std::vector<Place*> touched_;  // by it
 };
 

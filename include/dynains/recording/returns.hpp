@@ -1,4 +1,4 @@
-// Visits of a recording: parts whose scans are known to fit to each other.
+// Visits of a recording: parts whose scans fit to each other.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,31 +18,34 @@
 
 namespace dynains {
 
-/// A scan near earlier ones of a visit, and what an alignment with their planes tells.
+/// A return to a place: a scan near earlier scans of a visit, aligned with their planes.
 struct ReturnToPlace {
-  std::uint32_t earlier, later;             ///< numbers of scans, the nearest earlier one
+  std::uint32_t earlier, later;             ///< numbers of scans; `earlier` is the nearest
   Pose T_earlier_later = Pose::Identity();  ///< as the surfaces fit
   /// Covariance of the translation (m) and the rotation (rad) of T_earlier_later, along the axes of
   /// the later sensor, row by row.
   std::array<double, 36> covariance = {};
   double distance = 0.0;  ///< m, between the two sensors
   double inliers = 1.0;   ///< share of the points in voxels with a plane
-  double movement = 0.0;  ///< m, of points 10 m away to where they fit best
-  /// m, of that movement along its least certain direction; infinity: no surface is in both
+  double movement = 0.0;  ///< m, by which the alignment moves points 10 m away
+  /// Standard deviation of that movement along its least certain direction, m; infinity: no surface
+  /// is in both
   double deviation = std::numeric_limits<double>::infinity();
 
-  /// Whether the scans are known to fit: better than the margins of the evidence ask for.
+  /// Whether the scans fit well enough for the margins of the evidence: movement and deviation are
+  /// small, and most points are inliers.
   bool fits() const;
-  /// Whether they seem not to fit. If neither, the surfaces do not tell.
+  /// Whether they do not fit. If neither, the surfaces do not determine it.
   bool is_wrong() const;
   /// Whether T_earlier_later is certain.
   bool is_known() const;
 };
 
-/// Divides a recording into visits. Key scans, one each 2 m of way, are aligned with those of each
-/// visit that are within 60 m and too old for the first pass to have compared them. A key scan
-/// joins a visit that it is known to fit, before all its own one. Else it begins a visit if it
-/// begins an epoch, seems not to fit its own visit, or is not known to fit it within 8 m.
+/// Divides a recording into visits. Key scans, one per 2 m of way, are aligned with the key scans
+/// of each visit that are within 60 m and too old for the first pass to have compared them. A key
+/// scan joins a visit that it fits, preferably its current one. Otherwise it begins a visit if it
+/// begins an epoch, if it does not fit its current visit, or if it is within 8 m of that visit and
+/// the surfaces do not determine whether it fits.
 class Returns {
  public:
   /// Points of the scans wait in `store`, which outlives this. `evidence`: of the first pass.
@@ -55,7 +58,7 @@ class Returns {
   /// from 0; a new one has the next number. Throws what the store throws.
   std::uint32_t add(PointsView points, Span<const PointLabel> verdicts, const ComparedPose& pose);
 
-  /// Scans that the first pass compares with each other.
+  /// Number of consecutive scans that the first pass compares with each other.
   std::uint32_t compared() const { return compared_; }
   /// All alignments.
   const std::vector<ReturnToPlace>& found() const { return found_; }

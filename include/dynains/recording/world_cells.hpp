@@ -22,7 +22,7 @@ inline constexpr double kWorldCell = 0.4;  ///< m, a cube
 inline constexpr int kTileShift = 6;       ///< a tile has 64 x 64 columns
 inline constexpr double kTileEdge = kWorldCell * static_cast<double>(1 << kTileShift);  ///< m
 
-inline constexpr double kLookRange = 60.0;  ///< m, horizontal, from the sensor to what it tests
+inline constexpr double kTestRange = 60.0;  ///< m, horizontal, from the sensor to what it tests
 
 /// The tile of a cell.
 inline TileIndex tile_of(VoxelKey cell) {
