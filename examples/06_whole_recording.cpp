@@ -85,19 +85,17 @@ int main() {
   std::vector<dynains::VerdictArrays> verdicts;  // by scan
   dynains::ByteStore store(std::filesystem::temp_directory_path());
   dynains::SecondPass pass(store);
-  dynains::ComparedPoses compared;
 
   dynains::DynaInsRemover::Config config;
   config.build_map = false;
   dynains::DynaInsRemover remover(config);
   const auto take = [&](const dynains::ScanVerdict& verdict) {
-    pass.add(scans[verdict.scan].points, verdict, compared[verdict.scan]);
+    pass.add(scans[verdict.scan].points, verdict);
     verdicts.emplace_back().take(verdict, /*with_beliefs=*/true);
   };
   for (const Scan& scan : scans) {
     const dynains::FrameResult frame =
         remover.push(dynains::PointsView(scan.points), scan.T_world_sensor, scan.time);
-    compared.add(frame);
     if (frame.finished) take(*frame.finished);
   }
   remover.flush(take);

@@ -50,14 +50,23 @@ constexpr bool is_dynamic(Cause cause) {
   return (kDynamic >> static_cast<unsigned>(cause) & 1U) != 0;
 }
 
+/// How a scan is compared with others.
+struct ComparedPose {
+  /// As pushed, or corrected by the motion stage (FreeSpaceConfig::pose_tolerance).
+  Pose T_world_sensor = Pose::Identity();
+  std::uint64_t epoch = 0;                 ///< only scans of one epoch are compared
+  Suspicion suspicion = Suspicion::kNone;  ///< see Plausibility
+};
+
 /// Time per stage of one call, ms.
 struct StageTimes {
   double ingest = 0.0;    ///< copy of the cloud, labels of invalid points
   double ground = 0.0;    ///< ground segmentation
   double window = 0.0;    ///< Eq. 3
   double cluster = 0.0;   ///< curved voxels
+  double motion = 0.0;    ///< alignment with the planes of earlier scans
   double evidence = 0.0;  ///< Eq. 4-19 of the window, or the free-space evidence of the newest scan
-  double judge = 0.0;     ///< verdicts by free space on instances; images of references
+  double judge = 0.0;     ///< verdicts by free space on instances; images and planes of references
   double verdict = 0.0;   ///< verdicts on ground and points; FrameResult::newest is not included
   double map = 0.0;       ///< Eq. 1
 
@@ -67,6 +76,7 @@ struct StageTimes {
     visitor("ground", self.ground);
     visitor("window", self.window);
     visitor("cluster", self.cluster);
+    visitor("motion", self.motion);
     visitor("evidence", self.evidence);
     visitor("judge", self.judge);
     visitor("verdict", self.verdict);
@@ -86,14 +96,15 @@ struct ScanVerdict {
   std::uint64_t scan = 0;  ///< number of the push, from 0
   double time = 0.0;       ///< s, as pushed
   Pose T_world_sensor = Pose::Identity();
-  Span<const PointLabel> labels;
-  Span<const std::uint32_t> instances;  ///< kNoInstance for ground and points without a cluster
+  Span<const PointLabel> labels = {};
+  Span<const std::uint32_t> instances = {};  ///< kNoInstance for ground and points without a cluster
   /// Probability of being dynamic, [0, 1]. It is 0 for points without a belief: static ground,
   /// points without a cluster and, for decision = window, points that were not proposed. For
   /// decision = free_space, all other points have at least 0.5, even if they are occupied or
   /// without evidence.
-  Span<const float> beliefs;
-  Span<const Cause> causes;
+  Span<const float> beliefs = {};
+  Span<const Cause> causes = {};
+  ComparedPose compared = {};
 };
 
 namespace detail {
@@ -148,19 +159,21 @@ struct NewestVerdict {
         labels(made.labels),
         instances(made.instances),
         beliefs(made.beliefs),
-        causes(made.causes) {}
+        causes(made.causes),
+        compared(made.compared) {}
   NewestVerdict(std::uint64_t number, double time_of_scan, const Pose& T,
-                detail::NewestVerdictMaker& maker)
+                const ComparedPose& compared_pose, detail::NewestVerdictMaker& maker)
       : scan(number),
         time(time_of_scan),
         T_world_sensor(T),
         labels(maker, &ScanVerdict::labels),
         instances(maker, &ScanVerdict::instances),
         beliefs(maker, &ScanVerdict::beliefs),
-        causes(maker, &ScanVerdict::causes) {}
+        causes(maker, &ScanVerdict::causes),
+        compared(compared_pose) {}
 
   operator ScanVerdict() const {
-    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+    return {scan, time, T_world_sensor, labels, instances, beliefs, causes, compared};
   }
 
   std::uint64_t scan = 0;
@@ -170,6 +183,7 @@ struct NewestVerdict {
   Values<std::uint32_t> instances;
   Values<float> beliefs;
   Values<Cause> causes;
+  ComparedPose compared;
 };
 
 /// Alignment of a scan with the static surfaces of earlier scans: the error of the pushed motion of

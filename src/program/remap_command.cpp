@@ -108,7 +108,7 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
     copy_points(scan, points);
     files.read(original.name(i), scan, arrays);
     const ScanVerdict verdict =
-        arrays.verdict(i, original.time(i), orthonormalized(corrected.T_world_sensor(i)));
+        arrays.verdict({i, original.time(i), orthonormalized(corrected.T_world_sensor(i))});
     const std::vector<std::uint8_t> keep =
         static_points(points, arrays.labels, folder / "labels" / (original.name(i) + ".label"));
     map.insert(points, keep, verdict.T_world_sensor);

@@ -166,7 +166,8 @@ void Returns::choose_visit(const Pose& T_world_sensor) {
 std::uint32_t Returns::add(PointsView points, Span<const PointLabel> verdicts,
                            const ComparedPose& pose) {
   ++scans_;
-  const bool begins = keys_.empty() || pose.begins_epoch;
+  const bool begins = keys_.empty() || pose.epoch != epoch_;
+  epoch_ = pose.epoch;
   if (!is_key(pose.T_world_sensor.translation(), begins)) return visit_;
   keep(points, verdicts);
   KeyScan key = {scans_ - 1, 0, pose.T_world_sensor, store_.append(bytes_), bytes_.size()};

@@ -21,19 +21,19 @@ SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
       store_(store),
       returns_(store, config.evidence) {}
 
-void SecondPass::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
+void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
   if (verdict.scan != scans_.size() || is_decided_) {
     throw UsageError(
         "SecondPass::add: scan " + std::to_string(verdict.scan) +
         (is_decided_ ? " comes after test()" : ", expected scan " + std::to_string(scans_.size())));
   }
   check_sizes(points, verdict.labels.size(), verdict.causes.size(), verdict.instances.size());
-  const std::uint32_t visit = returns_.add(points, verdict.labels, compared);
+  const std::uint32_t visit = returns_.add(points, verdict.labels, verdict.compared);
   if (visit == visits_.size()) visits_.push_back(std::make_unique<Visit>(store_, config_));
   if (visit != latest_) visits_[latest_]->rest();
   latest_ = visit;
   scans_.push_back({visit, visits_[visit]->scans()});
-  visits_[visit]->add(points, verdict, compared);
+  visits_[visit]->add(points, verdict);
 }
 
 void SecondPass::test(const std::function<bool()>& keep_going) {

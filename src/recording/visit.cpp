@@ -19,7 +19,8 @@ Visit::Visit(ByteStore& store, const SecondPassConfig& config)
       places_(store, config.memory),
       references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
 
-void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared) {
+void Visit::add(PointsView points, const ScanVerdict& verdict) {
+  const ComparedPose& compared = verdict.compared;
   const std::uint32_t number = scans();
   if (number == 0) {
     first_ = static_cast<std::uint32_t>(verdict.scan);
@@ -28,7 +29,7 @@ void Visit::add(PointsView points, const ScanVerdict& verdict, const ComparedPos
     T_level_world_ = orthonormalized(T_level_world_ * compared.T_world_sensor.inverse());
   }
   const Pose T = orthonormalized(T_level_world_ * compared.T_world_sensor);
-  is_suspicious_ = is_suspicious_ || compared.is_suspicious;
+  is_suspicious_ = is_suspicious_ || compared.suspicion != Suspicion::kNone;
   scans_.push_back({T, epochs_.next(T.translation(), verdict.time)});
   last_ = static_cast<std::uint32_t>(verdict.scan);
   if (is_suspicious_) return;  // first verdicts stay

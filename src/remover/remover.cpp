@@ -5,4 +5,6 @@
 
 template std::unique_ptr<dynains::detail::ScanDecision> dynains::detail::make_free_space_decision(
     const FreeSpaceConfig&, Background*);
+template std::unique_ptr<dynains::detail::MotionStage> dynains::detail::make_pose_correction(
+    const FreeSpaceConfig&);
 template class dynains::BasicDynaInsRemover<>;

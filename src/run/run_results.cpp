@@ -126,7 +126,6 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 
 void RunResults::take_newest(const FrameResult& frame) {
   const NewestVerdict& verdict = frame.newest;
-  compared_.add(frame);
   if (!online_labels_) return;
   writing_online_.wait();
   online_labels_->take(verdict);
@@ -137,8 +136,7 @@ void RunResults::take_newest(const FrameResult& frame) {
 void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   finish();
   judged_.arrays.take(verdict, needs_beliefs_);
-  judged_.verdict = judged_.arrays.verdict(verdict.scan, verdict.time, verdict.T_world_sensor);
-  judged_.compared = compared_[verdict.scan];
+  judged_.verdict = judged_.arrays.verdict(verdict);
   if (scan != nullptr) std::swap(judged_.scan, *scan);
   writing_.begin([this, reads = scan == nullptr] {
     if (reads) recording_.read_scan(range_.first + judged_.verdict.scan, judged_.scan);
@@ -154,9 +152,9 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   final_labels_.write(recording_.name(range_.first + verdict.scan));
   copy_points(scan, judged_.points);
   if (second_pass_ != nullptr) {
-    second_pass_->add(judged_.points, verdict, judged_.compared);
+    second_pass_->add(judged_.points, verdict);
   } else {
-    if (returns_ != nullptr) returns_->add(judged_.points, verdict.labels, judged_.compared);
+    if (returns_ != nullptr) returns_->add(judged_.points, verdict.labels, verdict.compared);
     complete_scan(scan, verdict);
   }
 }
@@ -177,8 +175,8 @@ void RunResults::revise(const StaticMapAccumulator::Config& map,
         second_pass_->revise(judged.points, static_cast<std::uint32_t>(i), judged.arrays);
     finish();
     std::swap(judged_, judged);
-    judged_.verdict = judged_.arrays.verdict(i, recording_.time(index),
-                                             orthonormalized(recording_.T_world_sensor(index)));
+    judged_.verdict = judged_.arrays.verdict(
+        {i, recording_.time(index), orthonormalized(recording_.T_world_sensor(index))});
     writing_.begin([this, is_revised] { write_revised(is_revised); });
     progress(i + 1);
   }

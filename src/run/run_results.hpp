@@ -17,7 +17,6 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
-#include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
@@ -79,7 +78,6 @@ std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recor
 struct JudgedScan {
   RecordedScan scan;
   PointBuffer points;  ///< of the scan
-  ComparedPose compared;
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
 };
@@ -142,7 +140,6 @@ class RunResults {
   SessionWriter* session_ = nullptr;
   SecondPass* second_pass_ = nullptr;
   Returns* returns_ = nullptr;
-  ComparedPoses compared_;
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;

@@ -54,7 +54,7 @@ class Watch {
     evidence_.observe(splits_.size(), epoch, Eigen::Isometry3d::Identity(), split, instance_of,
                       instance.size() > 0 ? 1 : 0);
     evidence_.judge(splits_.size(), false);
-    evidence_.make_reference(split);
+    if (evidence_.is_reference()) evidence_.make_reference(split);
     splits_.push_back(split);
     sizes_.push_back(instance.size());
     return *this;

@@ -57,7 +57,7 @@ PoseCorrection after_all_but_last(const std::vector<SimulatedScan>& scans) {
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
     const GroundSplit split = split_of(scans[i]);
-    correction.insert(correction.correct(scans[i].T_world_sensor, split), split, {});
+    correction.insert(correction.correct(scans[i].T_world_sensor, split, {}, {}), split, {});
   }
   return correction;
 }
@@ -83,7 +83,7 @@ std::vector<PoseResidual> residuals_of_exact(PoseCorrection correction,
   for (const SimulatedScan& scan : scans) {
     GroundSplit split = split_of(scan);
     spoil(split);
-    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split);
+    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split, {}, {});
     CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
     correction.insert(T, split, {});
     if (correction.residual()) residuals.push_back(*correction.residual());
@@ -172,7 +172,7 @@ TEST_CASE("a perturbed pose is found and corrected") {
                                                         {{-0.3, 0.4, 0.05}, {0.1, -0.1, 0.3}}}));
   const Eigen::Isometry3d T_wrong = T_truth * perturbation(metres, turn);
   PoseCorrection correction = after_all_but_last(scans);
-  const Eigen::Isometry3d T = correction.correct(T_wrong, split);
+  const Eigen::Isometry3d T = correction.correct(T_wrong, split, {}, {});
   INFO(metres.transpose() << " m, " << turn.transpose() << " deg");
   REQUIRE(correction.residual());
   CHECK_FALSE(correction.misfit());
@@ -209,7 +209,7 @@ TEST_CASE("the covariance of the best fit explains its errors") {
     };
     PoseCorrection correction = after_all_but_last(scans);
     const Eigen::Vector3d metres = draw(0.1), turn = draw(0.2);
-    correction.correct(scans.back().T_world_sensor * perturbation(metres, turn), split);
+    correction.correct(scans.back().T_world_sensor * perturbation(metres, turn), split, {}, {});
     REQUIRE(correction.residual());
     const PoseResidual& residual = *correction.residual();
     const Eigen::Isometry3d T_error =
@@ -266,7 +266,7 @@ TEST_CASE("a lasting offset is one residual, and later poses are corrected by it
     const GroundSplit split = split_of(scans[i]);
     const Pose T_pushed =
         is_moved ? T_moved_world * scans[i].T_world_sensor : scans[i].T_world_sensor;
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
     correction.insert(T, split, {});
     INFO("scan " << i);
     CHECK((T.translation() - scans[i].T_world_sensor.translation()).norm() < 0.03);
@@ -309,7 +309,7 @@ TEST_CASE("between two long walls, errors across them are corrected, those along
     const Eigen::Isometry3d T_pushed =
         Eigen::Translation3d(pushed_x, 0.03 * scan, 0.0) *
         Eigen::Isometry3d(Eigen::AngleAxisd(0.2 * kDegrees * scan, Eigen::Vector3d::UnitZ()));
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
     INFO("scan " << scan);
     CHECK(T.translation().x() == Approx(pushed_x).margin(0.02));
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
@@ -333,7 +333,7 @@ TEST_CASE("one object alone does not decide about a direction") {
     const GroundSplit split = corridor(40 + static_cast<std::uint64_t>(scan), x, true);
     const Eigen::Isometry3d T_pushed(
         Eigen::Translation3d(static_cast<double>(x), scan < 5 ? 0.0 : 0.1, 0.0));
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split);
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
     INFO("scan " << scan);
     CHECK(T.translation().x() == Approx(static_cast<double>(x)).margin(0.01));
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
@@ -365,7 +365,7 @@ double correction_by_traffic(double longest_object, double highest_object) {
       }
       instance_of.resize(split.count, instance++);
     }
-    const Pose T = correction.correct(T_exact, split, {instance_of, instance});
+    const Pose T = correction.correct(T_exact, split, {instance_of, instance}, {});
     largest = std::max(largest, std::abs(T.translation().x()));
     correction.insert(T, split, {});
   }
@@ -384,12 +384,12 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
   PoseCorrection correction = after_all_but_last(scans);
   const Eigen::Isometry3d tilted =
       scans.back().T_world_sensor * perturbation({0.0, 0.0, 0.4}, {6.0, 5.0, 30.0});
-  correction.correct(tilted, split_of(others.front()));
+  correction.correct(tilted, split_of(others.front()), {}, {});
   CHECK(correction.misfit() == EpochReason::kMisfit);
   CHECK_FALSE(correction.residual());
 
   PoseCorrection next = after_all_but_last(scans);
-  const Eigen::Isometry3d T = next.correct(scans.back().T_world_sensor, GroundSplit());
+  const Eigen::Isometry3d T = next.correct(scans.back().T_world_sensor, GroundSplit(), {}, {});
   CHECK_FALSE(next.misfit());
   CHECK_FALSE(next.residual());
   CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);

@@ -31,7 +31,7 @@ struct Drives {
       const BoxScan scan = scan_boxes(boxes, x, 0.0);
       T_given.push_back(i < 20 ? Pose(scan.T_world_sensor) : Pose(T_error * scan.T_world_sensor));
       T_true.push_back(scan.T_world_sensor);
-      visits.push_back(returns.add(scan.points, scan.verdicts, {T_given.back(), i == 0}));
+      visits.push_back(returns.add(scan.points, scan.verdicts, {T_given.back()}));
     }
     found = returns.found();
   }

@@ -97,13 +97,13 @@ std::vector<Counts> count(const Recorded& recording, std::uint32_t label, bool t
     ScanVerdict verdict;
     verdict.scan = i;
     verdict.time = 0.5 * static_cast<double>(i);
-    ComparedPose compared{recording.scans[i].T_world_sensor, i == 0, false};
-    changes(i, compared);
-    verdict.T_world_sensor = compared.T_world_sensor;
+    verdict.compared.T_world_sensor = recording.scans[i].T_world_sensor;
+    changes(i, verdict.compared);
+    verdict.T_world_sensor = verdict.compared.T_world_sensor;
     verdict.labels = arrays.labels;
     verdict.causes = arrays.causes;
     verdict.instances = arrays.instances;
-    pass.add(recording.scans[i].points, verdict, compared);
+    pass.add(recording.scans[i].points, verdict);
   }
   pass.test([tests] { return tests; });
   CHECK(pass.is_decided() == tests);
@@ -223,7 +223,7 @@ TEST_CASE("an epoch judges another one if it fits there, and no scan that was co
   const std::size_t turn = recording.scans.size() / 2;
   const auto removed_after = [&](double jump) {
     const auto jumps = [&](std::size_t scan, ComparedPose& pose) {
-      pose.begins_epoch = scan == 0 || scan == turn;
+      pose.epoch = scan < turn ? 0 : 1;
       if (scan >= turn) pose.T_world_sensor.translation().x() += jump;
     };
     return sum(count(recording, kCar, true, removes_nothing, short_first_pass(), jumps)).removed;
@@ -234,7 +234,9 @@ TEST_CASE("an epoch judges another one if it fits there, and no scan that was co
 }
 
 TEST_CASE("poses that the first pass doubts judge nothing") {
-  const auto doubts = [](std::size_t scan, ComparedPose& pose) { pose.is_suspicious = scan == 20; };
+  const auto doubts = [](std::size_t scan, ComparedPose& pose) {
+    if (scan == 20) pose.suspicion = Suspicion::kPoses;
+  };
   const Recorded recording = with_parked_car();
   CHECK(sum(count(recording, kCar, true, removes_nothing, short_first_pass(), doubts)).removed ==
         0);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -23,7 +22,6 @@
 #include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/registration/pose_correction.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/short_numbers.hpp"
 #include "dynains/threads/background.hpp"
@@ -47,7 +45,6 @@ class FreeSpaceEvidence {
                  static_cast<std::uint32_t>(config.supervoxel_samples)),
         ground_sampler_(config),
         references_(config),
-        pose_correction_(config.pose_tolerance, config.track_length, config.track_height),
         updater_(config),
         linker_(config.track_cell, config.track_length, config.track_height, config.track_overlap),
         judge_(config),
@@ -70,27 +67,19 @@ class FreeSpaceEvidence {
   /// same. Null: none.
   void share_work(Background* other) { other_ = other; }
 
-  /// Sets the time (s) of the next scan. Without times, scans are taken at equal distances.
-  void set_time(double time) { time_ = time; }
-
   /// Adds a scan. `scan`: its number, consecutive from 0; 0 discards all earlier scans. `epoch`:
-  /// only scans of one epoch are compared. `T_world_sensor`: rigid, pose of the frame of `split`.
-  /// An inexact pose is corrected for the comparisons. If the static surfaces of the scan do not
-  /// fit to those of earlier scans, it is not compared with them. `instance_of`: by non-ground
-  /// point of `split`, instance below `instance_count`, or kNoCluster.
+  /// only scans of one epoch, whose numbers follow each other, are compared. `T_world_sensor`:
+  /// rigid, pose of the frame of `split`. `instance_of`: by non-ground point of `split`, instance
+  /// below `instance_count`, or kNoCluster.
   void observe(std::uint64_t scan, std::uint64_t epoch, const Pose& T_world_sensor,
                const GroundSplit& split, Span<const std::uint32_t> instance_of,
                std::size_t instance_count) {
     if (scan == 0) forget_scans();
-    if (scan == 0 || pushed_epoch_ != epoch) {
-      begin_epoch(scan, T_world_sensor);
-      pose_correction_.begin_epoch(T_world_sensor);
-    }
-    pushed_epoch_ = epoch;
+    if (scan == 0 || epoch_ != epoch) begin_epoch(scan, epoch, T_world_sensor);
     newest_ = scan;
     Record& record = record_of(scan);
-    record.T_world_sensor = correct(scan, T_world_sensor, split, {instance_of, instance_count});
-    record.epoch = epoch_;
+    record.T_world_sensor = T_world_sensor;
+    record.epoch = epoch;
     record.since_begin = scan - epoch_begin_;
     const std::uint64_t phase = phase_of(record);
     run_both(
@@ -132,35 +121,33 @@ class FreeSpaceEvidence {
             moved_ground_.find(split.ground(), record.ground)};
   }
 
-  /// Makes the range image of the newest scan, if it is a reference, without what surely moves.
-  /// Call it once for each scan, after its first judge(). `split`: points of the scan.
-  void make_reference(const GroundSplit& split) {
-    const Record& record = record_of(newest_);
-    if (phase_of(record) != 0) return;
-    const detail::InstanceEvidence& evidence = record.evidence;
-    mark_points(
-        evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
+  /// Whether the newest scan is a reference for others.
+  bool is_reference() const { return phase_of(records_[newest_ % records_.size()]) == 0; }
+
+  /// By non-ground point of the newest scan, after its first judge(): 1 if it may move, else 0.
+  /// Valid until the next observe().
+  Span<const std::uint8_t> may_move() {
+    const detail::InstanceEvidence& evidence = record_of(newest_).evidence;
     mark_points(
         evidence.samples,
         [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
         may_move_);
-    run_both(
-        other_,
-        [&] {
-          references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
-                          is_moving_);
-        },
-        [&] { pose_correction_.insert(record.T_world_sensor, split, may_move_); });
+    return may_move_;
+  }
+
+  /// Makes the range image of the newest scan, which is a reference, without what surely moves.
+  /// Call it after the first judge() of the scan. `split`: points of the scan.
+  void make_reference(const GroundSplit& split) {
+    const Record& record = record_of(newest_);
+    const detail::InstanceEvidence& evidence = record.evidence;
+    mark_points(
+        evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
+    references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
+                    is_moving_);
     if (delay_of(0) != 0) return;
     test_older_scans(0);
     sum_along_tracks(newest_);
   }
-
-  /// Alignment of the newest scan with earlier scans, in the frame of its pose.
-  const std::optional<PoseResidual>& pose_residual() const { return pose_correction_.residual(); }
-
-  /// Why the newest scan is not compared with earlier scans of its pushed epoch; empty if it is.
-  const std::optional<EpochReason>& misfit() const { return pose_correction_.misfit(); }
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
   detail::SurfaceCounts surfaces() const {
@@ -202,21 +189,11 @@ class FreeSpaceEvidence {
     for (Record& record : records_) record.epoch = detail::ReferenceScan::kNoEpoch;
   }
 
-  void begin_epoch(std::uint64_t scan, const Pose& T_world_sensor) {
+  void begin_epoch(std::uint64_t scan, std::uint64_t epoch, const Pose& T_world_sensor) {
     T_origin_world_ = detail::inverted(T_world_sensor);
-    ++epoch_;
+    epoch_ = epoch;
     epoch_begin_ = scan;
     dynamic_grid_.clear();
-  }
-
-  // The pose of a scan for comparisons. Begins an epoch if the scan does not fit to earlier ones.
-  Pose correct(std::uint64_t scan, const Pose& T_world_sensor, const GroundSplit& split,
-               const detail::ScanInstances& instances) {
-    const Pose T_corrected = pose_correction_.correct(T_world_sensor, split, instances, time_);
-    if (!pose_correction_.misfit()) return T_corrected;
-    begin_epoch(scan, T_world_sensor);
-    pose_correction_.begin_planes(T_world_sensor);
-    return T_world_sensor;
   }
 
   Record& record_of(std::uint64_t scan) { return records_[scan % records_.size()]; }
@@ -361,8 +338,6 @@ class FreeSpaceEvidence {
   detail::InstanceSampler sampler_;
   detail::GroundSampler ground_sampler_;
   detail::ReferenceScans references_;
-  detail::PoseCorrection pose_correction_;
-  std::optional<double> time_;  // of the newest scan, s
   detail::InstanceBeliefUpdater updater_;
   detail::Visibility newest_visibility_, older_visibility_;
   Background* other_ = nullptr;
@@ -373,9 +348,8 @@ class FreeSpaceEvidence {
   // The origin frame is the sensor frame of the first scan of the epoch. It is the frame of the
   // cells of tracks and of the dynamic occupancy grid, which thus do not depend on the world frame.
   Pose T_origin_world_ = Pose::Identity();
-  std::uint64_t pushed_epoch_ = 0;  // epoch of the newest scan, as given to observe()
-  std::uint64_t epoch_ = 0;         // number of the begun epochs
-  std::uint64_t epoch_begin_ = 0;   // first scan of the epoch of the newest scan
+  std::uint64_t epoch_ = 0;        // of the newest scan
+  std::uint64_t epoch_begin_ = 0;  // its first scan
   std::uint64_t newest_ = 0;
   std::vector<Record> records_;  // ring buffer, by scan number
   Judged provisional_, final_;

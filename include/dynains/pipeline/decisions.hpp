@@ -21,6 +21,7 @@
 #include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/motion_stage.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
@@ -104,7 +105,7 @@ class ScanWindow {
   void gather(ScanRing& scans, std::size_t length) {
     const ScanSlot& newest = scans.newest();
     first_scan_ = scans.pushed() - std::min<std::uint64_t>(scans.pushed(), length);
-    while (scans[first_scan_].epoch != newest.epoch) ++first_scan_;
+    while (scans[first_scan_].compared.epoch != newest.compared.epoch) ++first_scan_;
     points_.clear();
     scan_begin_.assign(1, 0);
     const Pose T_newest_world = inverted(newest.T_world_level);
@@ -174,11 +175,10 @@ class ScanDecision {
   /// older scan may come before that on the newest one. The spans are valid until the next call.
   virtual EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) = 0;
 
-  /// Alignment of the newest scan with earlier scans, in the level frame.
-  virtual std::optional<PoseResidual> pose_residual() const { return std::nullopt; }
-
-  /// Why the newest scan is not compared with earlier scans, although its pose and time allow it.
-  virtual std::optional<EpochReason> misfit() const { return std::nullopt; }
+  /// Which non-ground points of the newest scan may move: 1, else 0. Empty unless it is a reference
+  /// for others. Call it, and then make_reference() unless it is empty, after the first judge().
+  virtual std::optional<Span<const std::uint8_t>> may_move() { return std::nullopt; }
+  virtual void make_reference(const ScanSlot&) {}
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
   virtual SurfaceCounts surfaces() const { return {}; }
@@ -364,6 +364,17 @@ class WindowDecision final : public ScanDecision {
 /// dynains::remover contains it. `other`: see make_decision().
 template <class Config>
 std::unique_ptr<ScanDecision> make_free_space_decision(const Config& config, Background* other);
+
+/// Creates the motion stage of the decision by free space; free_space_decision.hpp defines it.
+template <class Config>
+std::unique_ptr<MotionStage> make_pose_correction(const Config& config);
+
+/// The motion stage of a configuration; null if scans are compared by their pushed poses.
+inline std::unique_ptr<MotionStage> make_motion(const RemoverConfig& config,
+                                                const FreeSpaceConfig& evidence) {
+  if (config.decision == Decision::kWindow || evidence.pose_tolerance == 0.0) return nullptr;
+  return make_pose_correction(evidence);
+}
 
 /// Creates the implementation of `config.decision`. `other`: its second thread, which outlives it;
 /// null for none.

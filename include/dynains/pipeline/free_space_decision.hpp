@@ -1,4 +1,4 @@
-// Decision by free space, one of the implementations of Config::decision.
+// Decision by free space, one of the implementations of Config::decision, and its motion stage.
 #pragma once
 
 #include <cstddef>
@@ -11,6 +11,8 @@
 #include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
+#include "dynains/registration/motion_stage.hpp"
+#include "dynains/registration/pose_correction.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
@@ -33,22 +35,21 @@ class FreeSpaceDecision final : public ScanDecision {
 
   void observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
-    evidence_.set_time(newest.time);
-    evidence_.observe(newest.scan, newest.epoch, newest.T_world_level, newest.split,
+    evidence_.observe(newest.scan, newest.compared.epoch, newest.T_world_compared, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
     propagate_ids(scans);
   }
 
-  void judge(const ScanSlot& scan, bool is_final) override {
-    evidence_.judge(scan.scan, is_final);
-    if (!is_final) evidence_.make_reference(scan.split);
+  void judge(const ScanSlot& scan, bool is_final) override { evidence_.judge(scan.scan, is_final); }
+  std::optional<Span<const std::uint8_t>> may_move() override {
+    if (!evidence_.is_reference()) return std::nullopt;
+    return evidence_.may_move();
   }
+  void make_reference(const ScanSlot& newest) override { evidence_.make_reference(newest.split); }
   EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) override {
     return evidence_.verdict(is_final, scan.split);
   }
 
-  std::optional<PoseResidual> pose_residual() const override { return evidence_.pose_residual(); }
-  std::optional<EpochReason> misfit() const override { return evidence_.misfit(); }
   SurfaceCounts surfaces() const override { return evidence_.surfaces(); }
 
  private:
@@ -57,7 +58,7 @@ class FreeSpaceDecision final : public ScanDecision {
     Span<const std::uint32_t> old_ids;
     if (newest.scan > 0) {
       const ScanSlot& before = scans[newest.scan - 1];
-      if (before.epoch == newest.epoch) old_ids = before.ids;
+      if (before.compared.epoch == newest.compared.epoch) old_ids = before.ids;
     }
     instance_ids_.propagate(evidence_.predecessors(), old_ids, newest.ids);
   }
@@ -69,6 +70,12 @@ class FreeSpaceDecision final : public ScanDecision {
 template <class Config>
 std::unique_ptr<ScanDecision> make_free_space_decision(const Config& config, Background* other) {
   return std::make_unique<FreeSpaceDecision>(config, other);
+}
+
+template <class Config>
+std::unique_ptr<MotionStage> make_pose_correction(const Config& config) {
+  return std::make_unique<PoseCorrection>(config.pose_tolerance, config.track_length,
+                                          config.track_height);
 }
 
 }  // namespace dynains::detail

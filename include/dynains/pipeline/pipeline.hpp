@@ -26,6 +26,7 @@
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/motion_stage.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/threads/background.hpp"
@@ -80,6 +81,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
         frame_(config.level, config.mounting_pitch, config.mounting_roll),
         ground_(config.ground),
         clusterer_(config.clusterer),
+        motion_(make_motion(config, config.evidence)),
         decision_(make_decision<Stages>(config, other_.get())),
         finishes_later_(other_ && decision_->latency() > 0),
         map_(config.map),
@@ -116,8 +118,12 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     } else {
       cluster();
     }
+    timed(times.motion, [&] { align(newest); });
     timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
-    timed(times.judge, [&] { decision_->judge(newest, false); });         // Eq. 19
+    timed(times.judge, [&] {
+      decision_->judge(newest, false);  // Eq. 19
+      if (const auto movers = decision_->may_move()) make_reference(newest, *movers);
+    });
     timed(times.verdict, [&] {
       split_input_ = std::move(newest.split.input);
       split_input_.resize(ingest_.points().size());
@@ -128,6 +134,9 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
       newest.input.assign(split_input_);
     });
     transaction.commit();
+    const std::optional<PoseResidual> residual = pose_residual();
+    const Plausibility shares = plausibility(newest, residual);
+    newest.compared.suspicion = shares.suspicion;
     if (!finishes_later_) finish_due(times);
     const std::optional<ScanVerdict> finished = take_finished();
     if (finished && finished->scan == newest.scan) {
@@ -135,15 +144,13 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     } else {
       unwritten_ = &newest;
     }
-    FrameResult result = {{newest.scan, newest.time, newest.T_world_sensor, *this},
-                          finished,
-                          times,
-                          pose_residual(),
-                          time_doubt(),
-                          newest.began_epoch ? newest.began_epoch : decision_->misfit(),
-                          Plausibility()};
-    result.plausibility = plausibility(newest, result);
-    return result;
+    return {{newest.scan, newest.time, newest.T_world_sensor, newest.compared, *this},
+            finished,
+            times,
+            residual,
+            time_doubt(),
+            newest.began_epoch,
+            shares};
   }
 
   std::optional<ScanVerdict> finish_oldest() override {
@@ -210,10 +217,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   // SensorModel::typical() until a scan has enough points.
   void find_sensor(ScanSlot& newest) {
     frame_.estimate(ingest_.points(), newest.split.points);
-    if (sensor().known() && newest.scan > 0) {
-      newest.epoch = scans_.start_epoch();
-      newest.began_epoch = EpochReason::kSensor;
-    }
+    if (sensor().known() && newest.scan > 0) scans_.begin_epoch(newest, EpochReason::kSensor);
     const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
     try {
       adapt_stage(ground_, model);
@@ -231,6 +235,28 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     const Eigen::Matrix3d R_level_sensor = sensor().R_level_sensor();
     scan.T_world_level = rotated(scan.T_world_level, R_level_sensor);
     return R_level_sensor;
+  }
+
+  // The pose by which the newest scan is compared. Begins an epoch if it does not fit earlier ones.
+  void align(ScanSlot& newest) {
+    newest.T_world_compared = newest.T_world_level;
+    newest.compared.T_world_sensor = newest.T_world_sensor;
+    if (motion_ == nullptr) return;
+    if (newest.began_epoch) motion_->begin_epoch(newest.T_world_level);
+    newest.T_world_compared =
+        motion_->correct(newest.T_world_level, newest.split,
+                         {window_.newest_cluster_of(), window_.cluster_count()}, newest.time);
+    newest.compared.T_world_sensor = motion_->corrected(newest.T_world_sensor);
+    if (motion_->misfit()) scans_.begin_epoch(newest, *motion_->misfit());
+  }
+
+  // The newest scan is a reference for the evidence and, without what may move, for the motion.
+  void make_reference(const ScanSlot& newest, Span<const std::uint8_t> movers) {
+    run_both(
+        other_.get(), [&] { decision_->make_reference(newest); },
+        [&] {
+          if (motion_) motion_->insert(newest.T_world_compared, newest.split, movers);
+        });
   }
 
   const ScanVerdict& newest_verdict() override {
@@ -275,7 +301,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
 
   // The residual of the newest scan, with its motion in the frame of the pushed cloud.
   std::optional<PoseResidual> pose_residual() {
-    std::optional<PoseResidual> residual = decision_->pose_residual();
+    std::optional<PoseResidual> residual;
+    if (motion_) residual = motion_->residual();
     if (residual) {
       residual->previous_scan = scans_.newest().scan - 1;
       residual->previous_time = scans_[residual->previous_scan].time;
@@ -302,15 +329,15 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   }
 
   // Adds the newest scan to the running window.
-  Plausibility plausibility(const ScanSlot& newest, const FrameResult& result) {
+  Plausibility plausibility(const ScanSlot& newest, const std::optional<PoseResidual>& residual) {
     PlausibilityCheck::Scan scan;
     scan.scan = newest.scan;
     scan.points = newest.input.size();
     scan.judged = newest.split.count;
     scan.surfaces = decision_->surfaces();
-    if (result.pose_residual) scan.residual = result.pose_residual->translation;
+    if (residual) scan.residual = residual->translation;
     scan.is_misfit =
-        result.began_epoch == EpochReason::kJump || result.began_epoch == EpochReason::kMisfit;
+        newest.began_epoch == EpochReason::kJump || newest.began_epoch == EpochReason::kMisfit;
     return plausibility_.add(scan);
   }
 
@@ -334,6 +361,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   Ground ground_;
   ScanWindow window_;
   Clusterer clusterer_;
+  std::unique_ptr<MotionStage> motion_;  // null: scans are compared by their pushed poses
   std::unique_ptr<ScanDecision> decision_;
   bool finishes_later_;  // the next push finishes a scan, beside its first stages
   VerdictWriter newest_writer_;

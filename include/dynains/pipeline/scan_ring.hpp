@@ -23,12 +23,13 @@ namespace dynains::detail {
 
 /// One scan and the evidence of the windows on it. Slots are reused.
 struct ScanSlot {
-  std::uint64_t scan = 0;   ///< number of the push, from 0
-  std::uint64_t epoch = 0;  ///< only scans of one epoch are compared
+  std::uint64_t scan = 0;  ///< number of the push, from 0
+  double time = 0.0;       ///< s
   std::optional<EpochReason> began_epoch;
-  double time = 0.0;  ///< s
   Pose T_world_sensor = Pose::Identity();
-  Pose T_world_level = Pose::Identity();  ///< frame of split.points
+  Pose T_world_level = Pose::Identity();     ///< frame of split.points, as pushed
+  Pose T_world_compared = Pose::Identity();  ///< the same, by the motion stage
+  ComparedPose compared;                     ///< T_world_compared, of the pushed cloud
 
   GroundSplit split;
   /// Indices in the input: of the points of the split, then of those with the label kOutOfRange,
@@ -66,10 +67,10 @@ class ScanRing {
     validate_time(time);
     ScanSlot& next = (*this)[pushed_];
     next.scan = pushed_;
-    next.epoch = epoch_;
-    next.began_epoch = reason_to_begin(T_world_sensor, time, config);
-    if (next.began_epoch && *next.began_epoch != EpochReason::kStart) ++next.epoch;
     next.time = time;
+    next.compared.epoch = is_start_ ? 0 : newest().compared.epoch;
+    next.began_epoch = reason_to_begin(T_world_sensor, time, config);
+    if (next.began_epoch) begin_epoch(next, *next.began_epoch);
     next.T_world_sensor = orthonormalized(T_world_sensor);
     next.T_world_level = next.T_world_sensor;
     next.T_world_level.translation() = next.T_world_sensor * config.sensor_origin();
@@ -79,8 +80,14 @@ class ScanRing {
   /// Marks the oldest open scan as final and returns its slot. A scan must be open.
   ScanSlot& finish_oldest() { return (*this)[finished_++]; }
 
-  /// Begins an epoch with the next scan. Returns the number of the epoch.
-  std::uint64_t start_epoch() { return ++epoch_; }
+  /// Begins an epoch with a scan that is prepared or the newest one.
+  void begin_epoch(ScanSlot& scan, EpochReason reason) {
+    scan.compared.epoch = ++epoch_;
+    scan.began_epoch = reason;
+  }
+
+  /// The next scan begins an epoch.
+  void start_epoch() { is_start_ = true; }
 
   void clear() {
     pushed_ = 0;
@@ -93,7 +100,7 @@ class ScanRing {
 
   std::optional<EpochReason> reason_to_begin(const Pose& T_world_sensor, double time,
                                              const RemoverConfig& config) {
-    if (pushed_ == 0 || newest().epoch != epoch_) return EpochReason::kStart;
+    if (is_start_) return EpochReason::kStart;
     const double pause = time - last_time_;
     if (!config.starts_epoch(pause, distance(T_world_sensor, newest().T_world_sensor))) return {};
     return pause > config.max_gap ? EpochReason::kPause : EpochReason::kJump;
@@ -109,8 +116,9 @@ class ScanRing {
   std::vector<ScanSlot> slots_;
   std::uint64_t pushed_ = 0;
   std::uint64_t finished_ = 0;
-  std::uint64_t epoch_ = 0;
-  double last_time_ = 0.0;  // s, of the newest scan
+  std::uint64_t epoch_ = 0;  // number of the begun epochs
+  bool is_start_ = true;     // of an epoch: the next scan
+  double last_time_ = 0.0;   // s, of the newest scan
 };
 
 /// Adds a prepared scan to the ring. Without commit(), the destructor removes it again and begins
@@ -120,7 +128,7 @@ class PushTransaction {
   PushTransaction(ScanRing& ring, const ScanSlot& prepared)
       : ring_(ring), time_before_(ring.last_time_) {
     ++ring_.pushed_;
-    ring_.epoch_ = prepared.epoch;
+    ring_.is_start_ = false;
     ring_.last_time_ = prepared.time;
   }
   PushTransaction(const PushTransaction&) = delete;

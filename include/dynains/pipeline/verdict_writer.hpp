@@ -59,7 +59,8 @@ class VerdictWriter {
       groups_.emplace_back(ground.verdict);
     }
     expand_groups(count);
-    return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_, beliefs_, causes_};
+    return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_,
+            beliefs_,  causes_,   scan.compared};
   }
 
   /// Writes the keep flags of the verdict of the last write().

@@ -12,9 +12,9 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
-#include "dynains/recording/compared_poses.hpp"
 #include "dynains/registration/plane_aligner.hpp"
 #include "dynains/registration/voxel_planes.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains {
 
@@ -84,6 +84,7 @@ class Returns {
   std::uint32_t compared_;
   std::uint32_t scans_ = 0, visits_ = 0;
   std::uint32_t visit_ = 0;                           // of the newest scan
+  std::uint64_t epoch_ = 0;                           // of the newest scan, see ComparedPose
   double way_ = 0.0;                                  // m, since the latest key scan
   Eigen::Vector3d latest_ = Eigen::Vector3d::Zero();  // m, sensor of the latest scan
   std::vector<KeyScan> keys_;

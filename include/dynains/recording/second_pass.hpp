@@ -9,7 +9,6 @@
 
 #include "dynains/points.hpp"
 #include "dynains/recording/byte_store.hpp"
-#include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/returns.hpp"
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/recording/visit.hpp"
@@ -32,9 +31,9 @@ class SecondPass {
   explicit SecondPass(ByteStore& store, const SecondPassConfig& config = {});
 
   /// Takes the first verdict on a scan, in the order of the scans: FrameResult::finished. `points`:
-  /// m, sensor frame, all of the scan. `compared`: of this scan. Throws UsageError if the sizes
-  /// differ, if the scan is not the next one, or after test().
-  void add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared);
+  /// m, sensor frame, all of the scan. Throws UsageError if the sizes differ, if the scan is not
+  /// the next one, or after test().
+  void add(PointsView points, const ScanVerdict& verdict);
   /// Tests all places. Ends without a result if `keep_going()` returns false; then revise() changes
   /// nothing.
   void test(const std::function<bool()>& keep_going = [] { return true; });

@@ -24,9 +24,13 @@ struct VerdictArrays {
     if (with_beliefs) beliefs.assign(verdict.beliefs.begin(), verdict.beliefs.end());
   }
 
-  /// Verdict whose spans refer to these arrays; valid as long as they are unchanged.
-  ScanVerdict verdict(std::uint64_t scan, double time, const Pose& T_world_sensor) const {
-    return {scan, time, T_world_sensor, labels, instances, beliefs, causes};
+  /// The verdict on a scan whose spans refer to these arrays; valid as long as they are unchanged.
+  ScanVerdict verdict(ScanVerdict scan) const {
+    scan.labels = labels;
+    scan.instances = instances;
+    scan.beliefs = beliefs;
+    scan.causes = causes;
+    return scan;
   }
 };
 

@@ -11,7 +11,6 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
-#include "dynains/recording/compared_poses.hpp"
 #include "dynains/recording/places.hpp"
 #include "dynains/recording/references.hpp"
 #include "dynains/recording/static_policy.hpp"
@@ -44,7 +43,7 @@ class Visit {
   Visit(ByteStore& store, const SecondPassConfig& config);
 
   /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.
-  void add(PointsView points, const ScanVerdict& verdict, const ComparedPose& compared);
+  void add(PointsView points, const ScanVerdict& verdict);
   /// Puts all that waits into the store.
   void rest();
   /// Tests all places. Returns false, without a result, if `keep_going()` does.

@@ -11,15 +11,10 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 
 namespace dynains::detail {
-
-/// Instances of the non-ground points of a scan. Without: no point is on an instance.
-struct ScanInstances {
-  Span<const std::uint32_t> of_point;  ///< below `count`, or kNoCluster
-  std::size_t count = 0;
-};
 
 /// Calls `visit(index, x, y, z)` for at most `wanted` points of a scan, 3 to 50 m from the sensor.
 /// They are spread evenly over its order, at pseudo-random distances, since beams repeat at regular

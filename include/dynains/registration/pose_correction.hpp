@@ -11,6 +11,7 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/plane_aligner.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 #include "dynains/verdict.hpp"
@@ -85,41 +86,22 @@ class MotionPrediction {
 /// Directions in which the planes do not support the correction stay as they were pushed. What two
 /// scans in a row agree on is a lasting offset and applies to later poses, too. Exact poses stay as
 /// they are, bit by bit.
-class PoseCorrection {
+class PoseCorrection final : public MotionStage {
  public:
-  /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays;
-  /// 0: all poses stay, and there are no residuals.
+  /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays.
   /// `longest_object`, `highest_object`: see AlignmentPoints.
   PoseCorrection(double tolerance, double longest_object, double highest_object)
       : tolerance_(tolerance), selected_(longest_object, highest_object) {}
 
-  /// Forgets all scans and the motion. `T_world_sensor`: pose of the first scan of the next epoch.
-  void begin_epoch(const Pose& T_world_sensor) {
+  void begin_epoch(const Pose& T_world_level) override {
     motion_.clear();
     aligner_.clear();
     is_exact_ = true;
-    begin_planes(T_world_sensor);
+    begin_planes(T_world_level);
   }
 
-  /// As begin_epoch(), after a scan that does not fit to earlier ones: the motion goes on.
-  void begin_planes(const Pose& T_world_sensor) {
-    planes_.clear();
-    has_planes_ = false;
-    T_world_origin_ = T_world_sensor;
-    T_origin_world_ = inverted(T_world_sensor);
-    T_origin_newest_ = Pose::Identity();
-    T_origin_pushed_ = Pose::Identity();
-    correction_.reset();
-    offset_.reset();
-    open_ = {};
-    residual_.reset();
-  }
-
-  /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
-  /// points, m. `time`: s, if known. Updates residual() and misfit().
-  Pose correct(const Pose& T_world_level, const GroundSplit& split,
-               const ScanInstances& instances = {}, const std::optional<double>& time = {}) {
-    if (!is_active()) return T_world_level;
+  Pose correct(const Pose& T_world_level, const GroundSplit& split, const ScanInstances& instances,
+               const std::optional<double>& time) override {
     residual_.reset();
     misfit_.reset();
     const Pose T_pushed = composed(T_origin_world_, T_world_level);
@@ -132,23 +114,23 @@ class PoseCorrection {
       align(T_pushed, T_guess, T_newest);
       check_motion(T_newest);
     }
+    if (misfit_) {
+      begin_planes(T_world_level);
+      return T_world_level;
+    }
     T_origin_newest_ = T_newest;
     T_origin_pushed_ = T_pushed;
     return corrected(T_world_level);
   }
 
-  /// The pose `T_world_frame` with the newest correction.
-  Pose corrected(const Pose& T_world_frame) const {
+  Pose corrected(const Pose& T_world_frame) const override {
     if (!correction_) return T_world_frame;
     return composed(T_world_origin_,
                     composed(*correction_, composed(T_origin_world_, T_world_frame)));
   }
 
-  /// Adds the static points of a scan to the planes. `T_world_level`: result of correct().
-  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
   void insert(const Pose& T_world_level, const GroundSplit& split,
-              Span<const std::uint8_t> moving) {
-    if (!is_active()) return;
+              Span<const std::uint8_t> moving) override {
     const Pose T = composed(T_origin_world_, T_world_level);
     has_planes_ = true;
     planes_.begin_scan(T);
@@ -161,19 +143,27 @@ class PoseCorrection {
     planes_.add(block);
   }
 
-  /// Result of the last correct(), in the frame of its pose; empty without enough common planes.
-  const std::optional<PoseResidual>& residual() const { return residual_; }
-
-  /// Why the static world of the last scan does not fit to that of the scans before it, so that
-  /// motion and errors of poses cannot be told apart; empty if it fits.
-  const std::optional<EpochReason>& misfit() const { return misfit_; }
+  const std::optional<PoseResidual>& residual() const override { return residual_; }
+  const std::optional<EpochReason>& misfit() const override { return misfit_; }
 
  private:
   static constexpr std::size_t kInserted = 12000;  // points of a scan
   static constexpr std::size_t kFewestMatches = 100;
   static constexpr double kLeastInliers = 0.5;  // ratio to the matches
 
-  bool is_active() const { return tolerance_ > 0.0; }
+  // Begins with a scan without planes. The motion goes on.
+  void begin_planes(const Pose& T_world_level) {
+    planes_.clear();
+    has_planes_ = false;
+    T_world_origin_ = T_world_level;
+    T_origin_world_ = inverted(T_world_level);
+    T_origin_newest_ = Pose::Identity();
+    T_origin_pushed_ = Pose::Identity();
+    correction_.reset();
+    offset_.reset();
+    open_ = {};
+    residual_.reset();
+  }
 
   // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
   void align(const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {

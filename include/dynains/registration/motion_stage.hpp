@@ -1,0 +1,50 @@
+// The stage that finds the pose by which a scan is compared with earlier scans.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "dynains/points.hpp"
+#include "dynains/pose.hpp"
+#include "dynains/verdict.hpp"
+
+namespace dynains::detail {
+
+/// Instances of the non-ground points of a scan. Without: no point is on an instance.
+struct ScanInstances {
+  Span<const std::uint32_t> of_point;  ///< below `count`, or kNoCluster
+  std::size_t count = 0;
+};
+
+/// Registers each scan with the static surfaces of earlier scans of its epoch.
+class MotionStage {
+ public:
+  virtual ~MotionStage() = default;
+
+  /// Forgets all scans and the motion. `T_world_level`: pose of the first scan of the next epoch.
+  virtual void begin_epoch(const Pose& T_world_level) = 0;
+
+  /// Pose of a scan for comparisons with other scans. `T_world_level`, `split`: pushed pose and
+  /// points, m. `time`: s, if known. Updates residual() and misfit(). After a misfit the scan is
+  /// the first one of an epoch, and its pose stays.
+  virtual Pose correct(const Pose& T_world_level, const GroundSplit& split,
+                       const ScanInstances& instances, const std::optional<double>& time) = 0;
+
+  /// The pose `T_world_frame` with the correction of the last correct().
+  virtual Pose corrected(const Pose& T_world_frame) const = 0;
+
+  /// Adds the static points of a scan to the surfaces. `T_world_level`: result of correct().
+  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
+  virtual void insert(const Pose& T_world_level, const GroundSplit& split,
+                      Span<const std::uint8_t> moving) = 0;
+
+  /// Result of the last correct(), in the frame of its pose; empty without enough common surfaces.
+  virtual const std::optional<PoseResidual>& residual() const = 0;
+
+  /// Why the static world of the last scan does not fit to that of the scans before it, so that
+  /// motion and errors of poses cannot be told apart; empty if it fits.
+  virtual const std::optional<EpochReason>& misfit() const = 0;
+};
+
+}  // namespace dynains::detail
