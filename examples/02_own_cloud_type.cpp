@@ -37,7 +37,7 @@ int main() {
   const dynains::FrameResult frame = remover.push(scan, Eigen::Isometry3d::Identity(), 0.0);
 
   int count[5] = {};
-  for (const dynains::PointLabel label : frame.newest.labels) ++count[static_cast<int>(label)];
+  for (const dynains::PointLabel label : frame.newest().labels) ++count[static_cast<int>(label)];
   std::printf("invalid %d, out of range %d, ground %d, static %d, dynamic %d\n", count[0], count[1],
               count[2], count[3], count[4]);
   return count[0] == 1 && count[4] == 0 ? 0 : 1;

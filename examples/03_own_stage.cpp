@@ -53,7 +53,7 @@ int main() {
   dynains::BasicDynaInsRemover<HallStages> remover(config);
 
   const std::vector<Eigen::Vector3d> scan = {{5, 0, -1}, {5, 1, -1}, {5, 0, 0}, {5, 0, 1}};
-  const auto labels = remover.push(scan, Eigen::Isometry3d::Identity()).newest.labels;
+  const auto labels = remover.push(scan, Eigen::Isometry3d::Identity()).newest().labels;
   const auto floor = std::count(labels.begin(), labels.end(), dynains::PointLabel::kGround);
   std::printf("%d of %zu points are floor\n", static_cast<int>(floor), scan.size());
   return floor == 2 ? 0 : 1;

@@ -51,7 +51,7 @@ int main() {
     // kInvalid marks points that are no measurement (NaN, no return).
     Cloud still;
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      const PointLabel label = result.frame.newest.labels[k];
+      const PointLabel label = result.frame.newest().labels[k];
       if (label != PointLabel::kDynamic && label != PointLabel::kInvalid) still.push_back(scan[k]);
     }
     removed += scan.size() - still.size();

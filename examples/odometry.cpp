@@ -57,10 +57,10 @@ int main(int argc, char** argv) {
     const Eigen::Isometry3d T_first_sensor = T_first_world * recording.T_world_sensor(i);
     const Eigen::Isometry3d T_odometry = odometry.register_scan(cloud);
     const auto result = corrector.push(cloud, {}, recording.time(i), T_odometry);
-    for (const dynains::PointLabel label : result.frame.newest.labels) {
+    for (const dynains::PointLabel label : result.frame.newest().labels) {
       dynamic += label == dynains::PointLabel::kDynamic ? 1 : 0;
     }
-    points += result.frame.newest.labels.size();
+    points += result.frame.newest().labels.size();
     of_odometry.add(T_odometry, T_first_sensor);
     refined.add(result.T_world_sensor, T_first_sensor);
   }

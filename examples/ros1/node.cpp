@@ -117,8 +117,8 @@ class RemoverNode {
 
   void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
     newest_ = cloud.header.stamp;
-    static_.publish(dynains::static_points(cloud, frame.newest.labels));
-    dynamic_.publish(dynains::dynamic_points(cloud, frame.newest.labels));
+    static_.publish(dynains::static_points(cloud, frame.newest().labels));
+    dynamic_.publish(dynains::dynamic_points(cloud, frame.newest().labels));
     if (frame.pose_residual) {
       residual_.publish(residual_message<Residual>(*frame.pose_residual, cloud.header));
     }

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <atomic>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -23,50 +22,10 @@
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains::detail {
-
-/// Admits one call at a time. A concurrent or nested call throws before it changes any state. The
-/// end of a call synchronizes with the begin of the next one (release and acquire).
-class ReentrancyGuard {
- public:
-  ReentrancyGuard() = default;
-  ~ReentrancyGuard() = default;
-  // The flag is not moved: an object must not be moved during a call.
-  ReentrancyGuard(ReentrancyGuard&&) noexcept {}
-  ReentrancyGuard& operator=(ReentrancyGuard&&) noexcept { return *this; }
-
-  /// Scope of one call. Throws UsageError during another call.
-  class Guard {
-   public:
-    explicit Guard(ReentrancyGuard& owner) : owner_(owner) {
-      if (owner_.is_busy_.exchange(true, std::memory_order_acquire)) {
-        throw UsageError(
-            "DynaInsRemover: no call may begin while another one is at work; take one object for "
-            "each thread, or a lock");
-      }
-    }
-    ~Guard() { owner_.is_busy_.store(false, std::memory_order_release); }
-    Guard(const Guard&) = delete;
-    Guard& operator=(const Guard&) = delete;
-
-   private:
-    ReentrancyGuard& owner_;
-  };
-
- private:
-  std::atomic<bool> is_busy_{false};
-};
-
-}  // namespace dynains::detail
-
 namespace dynains {
 
 /// Types of the pipeline's stages. To replace a stage, derive from this struct and redefine its
-/// alias. A stage has a Config, with visit() and validate(), and a constructor that takes it; the
-/// members of the classes below that it needs are segment(); cluster() and cluster_count();
-/// describe(), describe_rest(), heights(), cluster_heights() and proposes_dynamic(); reset(),
-/// update(), posterior() and is_dynamic(); insert() and clear(). It may have needs_sensor() and
-/// adapt().
+/// alias. pipeline/stage_interfaces.hpp lists the members that a stage needs.
 struct DefaultStages {
   using Ground = GroundSegmenter;
   using Clusterer = CurvedVoxelClusterer;
@@ -111,7 +70,7 @@ class BasicDynaInsRemover {
   template <class Cloud>
   void reserve_like(const Cloud& example,
                     std::size_t scans = std::numeric_limits<std::size_t>::max()) {
-    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    const detail::ReentrancyGuard::Guard guard(pipeline().guard());
     pipeline().reserve_like(detail::CloudView(example), scans);
   }
 
@@ -133,7 +92,7 @@ class BasicDynaInsRemover {
   template <class Cloud, class PoseLike>
   FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor,
                    std::optional<double> time = std::nullopt) {
-    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    const detail::ReentrancyGuard::Guard guard(pipeline().guard());
     return pipeline().push(detail::CloudView(cloud), to_pose(T_world_sensor), time);
   }
 
@@ -141,20 +100,20 @@ class BasicDynaInsRemover {
   /// for each. The next push starts a new epoch.
   template <class Sink>
   void flush(Sink&& sink) {
-    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    const detail::ReentrancyGuard::Guard guard(pipeline().guard());
     while (const std::optional<ScanVerdict> verdict = pipeline().finish_oldest()) sink(*verdict);
     pipeline().start_epoch();
   }
 
   /// The next scan is not compared with the scans before it, as after a correction of the poses.
   void start_epoch() {
-    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    const detail::ReentrancyGuard::Guard guard(pipeline().guard());
     pipeline().start_epoch();
   }
 
   /// Restores the state after construction and clears the map; buffers keep their capacity.
   void reset() {
-    const detail::ReentrancyGuard::Guard guard(reentrancy_guard_);
+    const detail::ReentrancyGuard::Guard guard(pipeline().guard());
     pipeline().reset();
   }
 
@@ -165,7 +124,6 @@ class BasicDynaInsRemover {
   }
 
   std::unique_ptr<detail::RemoverPipeline<Stages>> pipeline_;
-  detail::ReentrancyGuard reentrancy_guard_;
 };
 
 using DynaInsRemover = BasicDynaInsRemover<>;

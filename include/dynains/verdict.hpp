@@ -67,7 +67,7 @@ struct StageTimes {
   double motion = 0.0;    ///< alignment with the planes of earlier scans
   double evidence = 0.0;  ///< Eq. 4-19 of the window, or the free-space evidence of the newest scan
   double judge = 0.0;     ///< verdicts by free space on instances; images and planes of references
-  double verdict = 0.0;   ///< verdicts on ground and points; FrameResult::newest is not included
+  double verdict = 0.0;   ///< verdicts on ground and points; FrameResult::newest() is not included
   double map = 0.0;       ///< Eq. 1
 
   template <class Self, class Visitor>
@@ -97,7 +97,8 @@ struct ScanVerdict {
   double time = 0.0;       ///< s, as pushed
   Pose T_world_sensor = Pose::Identity();
   Span<const PointLabel> labels = {};
-  Span<const std::uint32_t> instances = {};  ///< kNoInstance for ground and points without a cluster
+  Span<const std::uint32_t> instances =
+      {};  ///< kNoInstance for ground and points without a cluster
   /// Probability of being dynamic, [0, 1]. It is 0 for points without a belief: static ground,
   /// points without a cluster and, for decision = window, points that were not proposed. For
   /// decision = free_space, all other points have at least 0.5, even if they are occupied or
@@ -111,79 +112,35 @@ namespace detail {
 /// Makes the verdict on the newest scan.
 class NewestVerdictMaker {
  public:
-  virtual const ScanVerdict& newest_verdict() = 0;
+  /// Throws UsageError during another call, and unless `scan` is the newest one.
+  virtual const ScanVerdict& newest_verdict(std::uint64_t scan) = 0;
 
  protected:
   ~NewestVerdictMaker() = default;
 };
 }  // namespace detail
 
-/// A ScanVerdict whose arrays are made when one of them is first read, so that they cost nothing
-/// where nobody reads them. The first reading is a call of the remover: not by two threads at a
-/// time, and before the next push. It may throw std::bad_alloc.
-struct NewestVerdict {
-  /// One value per input point, as a Span.
-  template <class T>
-  class Values {
-   public:
-    Values() = default;
-    Values(Span<const T> values) : values_(values) {}
-    Values(detail::NewestVerdictMaker& maker, Span<const T> ScanVerdict::*array)
-        : maker_(&maker), array_(array) {}
-
-    const T* data() const { return made().data(); }
-    std::size_t size() const { return made().size(); }
-    bool empty() const { return made().empty(); }
-    const T* begin() const { return made().begin(); }
-    const T* end() const { return made().end(); }
-    const T& operator[](std::size_t i) const { return made()[i]; }
-    operator Span<const T>() const&& { return made(); }
-
-   private:
-    const Span<const T>& made() const {
-      if (maker_ != nullptr) values_ = maker_->newest_verdict().*array_;
-      maker_ = nullptr;
-      return values_;
-    }
-
-    mutable detail::NewestVerdictMaker* maker_ = nullptr;  // null: made
-    Span<const T> ScanVerdict::*array_ = nullptr;
-    mutable Span<const T> values_;
-  };
-
+/// The verdict on a pushed scan by it and earlier scans. It is made when it is first asked for, so
+/// that it costs nothing where nobody does.
+class NewestVerdict {
+ public:
   NewestVerdict() = default;
-  NewestVerdict(const ScanVerdict& made)
-      : scan(made.scan),
-        time(made.time),
-        T_world_sensor(made.T_world_sensor),
-        labels(made.labels),
-        instances(made.instances),
-        beliefs(made.beliefs),
-        causes(made.causes),
-        compared(made.compared) {}
-  NewestVerdict(std::uint64_t number, double time_of_scan, const Pose& T,
-                const ComparedPose& compared_pose, detail::NewestVerdictMaker& maker)
-      : scan(number),
-        time(time_of_scan),
-        T_world_sensor(T),
-        labels(maker, &ScanVerdict::labels),
-        instances(maker, &ScanVerdict::instances),
-        beliefs(maker, &ScanVerdict::beliefs),
-        causes(maker, &ScanVerdict::causes),
-        compared(compared_pose) {}
-
-  operator ScanVerdict() const {
-    return {scan, time, T_world_sensor, labels, instances, beliefs, causes, compared};
+  NewestVerdict(const ScanVerdict& made) : verdict_(made) {}
+  NewestVerdict(detail::NewestVerdictMaker& maker, std::uint64_t scan) : maker_(&maker) {
+    verdict_.scan = scan;
   }
 
-  std::uint64_t scan = 0;
-  double time = 0.0;
-  Pose T_world_sensor = Pose::Identity();
-  Values<PointLabel> labels;
-  Values<std::uint32_t> instances;
-  Values<float> beliefs;
-  Values<Cause> causes;
-  ComparedPose compared;
+  /// The first call is one of the remover: it throws UsageError during another one and after the
+  /// next one, or std::bad_alloc. The spans are valid until the next call of the remover.
+  const ScanVerdict& operator()() const {
+    if (maker_ != nullptr) verdict_ = maker_->newest_verdict(verdict_.scan);
+    maker_ = nullptr;
+    return verdict_;
+  }
+
+ private:
+  mutable detail::NewestVerdictMaker* maker_ = nullptr;  // null: the verdict is made
+  mutable ScanVerdict verdict_;
 };
 
 /// Alignment of a scan with the static surfaces of earlier scans: the error of the pushed motion of
@@ -236,7 +193,7 @@ constexpr std::array<const char*, 5> value_names(EpochReason) {
 
 /// Result of one push.
 struct FrameResult {
-  NewestVerdict newest;  ///< by the pushed scan and earlier scans; final if latency() is 0
+  NewestVerdict newest;  ///< newest(): by the pushed scan and earlier ones; final if latency() is 0
   std::optional<ScanVerdict> finished;  ///< final verdict on the scan latency() pushes ago
   StageTimes times;
   /// Empty for the first scan of an epoch, without enough common surfaces, and if free space is not

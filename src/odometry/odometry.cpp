@@ -174,7 +174,7 @@ class Odometry::Loop {
     if (scan_count_ == 0) {
       first_ = scan_;
     } else {
-      add_to_map(result.frame.newest.labels);
+      add_to_map(result.frame.newest().labels);
       first_.reset();
       T_last_newest_ = T_last_newest;
       period_ = period;

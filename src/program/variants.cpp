@@ -41,7 +41,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
                                 scan.T_world_sensor, sequence.sequence().time(sequence.index(i)));
       });
       if (answer == Answer::kNewest) {
-        take(v, frame.newest);
+        take(v, frame.newest());
       } else if (frame.finished) {
         take(v, *frame.finished);
       }

@@ -33,7 +33,8 @@ py::array_t<To> to_array_of(Span<const From> values) {
 struct Verdict {
   std::uint64_t scan;
   double time;
-  py::array_t<double> T_world_sensor;
+  py::array_t<double> T_world_sensor, T_world_compared;
+  std::uint64_t epoch;
   py::array_t<std::uint8_t> labels;
   py::array_t<std::uint32_t> instances;
   py::array_t<float> beliefs;
@@ -43,6 +44,8 @@ struct Verdict {
       : scan(verdict.scan),
         time(verdict.time),
         T_world_sensor(to_array(verdict.T_world_sensor)),
+        T_world_compared(to_array(verdict.compared.T_world_sensor)),
+        epoch(verdict.compared.epoch),
         labels(to_array_of<std::uint8_t>(verdict.labels)),
         instances(to_array_of<std::uint32_t>(verdict.instances)),
         beliefs(to_array_of<float>(verdict.beliefs)),
@@ -84,7 +87,7 @@ class Remover {
       const std::lock_guard<std::mutex> lock(mutex_);
       const FrameResult result =
           time ? remover_.push(cloud, T_world_sensor, *time) : remover_.push(cloud, T_world_sensor);
-      const ScanVerdict newest = result.newest;  // is made here
+      const ScanVerdict newest = result.newest();
       // Whoever holds the interpreter's lock releases it to wait for the mutex.
       const py::gil_scoped_acquire acquire;
       frame.newest = py::cast(Verdict(newest));
@@ -213,6 +216,9 @@ void bind_remover(py::module_& module) {
       .def_readonly("scan", &Verdict::scan, "Number of the push, from 0.")
       .def_readonly("time", &Verdict::time, "s, as pushed.")
       .def_readonly("T_world_sensor", &Verdict::T_world_sensor, "(4, 4) float64, as pushed.")
+      .def_readonly("T_world_compared", &Verdict::T_world_compared,
+                    "(4, 4) float64, by which the scan is compared: as pushed, or corrected.")
+      .def_readonly("epoch", &Verdict::epoch, "Only scans of one epoch are compared.")
       .def_readonly("labels", &Verdict::labels, "(N,) uint8, see Label.")
       .def_readonly("instances", &Verdict::instances, "(N,) uint32; 0 belongs to no instance.")
       .def_readonly("beliefs", &Verdict::beliefs,

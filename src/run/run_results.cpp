@@ -125,8 +125,8 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
 }
 
 void RunResults::take_newest(const FrameResult& frame) {
-  const NewestVerdict& verdict = frame.newest;
   if (!online_labels_) return;
+  const ScanVerdict& verdict = frame.newest();
   writing_online_.wait();
   online_labels_->take(verdict);
   writing_online_.begin(

@@ -47,7 +47,7 @@ TEST_CASE("NaN points of an organized PCL cloud are labelled, not dropped") {
   cloud(1, 1) = {0, 0, 0};
   cloud.is_dense = false;
   DynaInsRemover remover;
-  const auto labels = remover.push(cloud, Eigen::Isometry3d::Identity(), 0.0).newest.labels;
+  const auto labels = remover.push(cloud, Eigen::Isometry3d::Identity(), 0.0).newest().labels;
   REQUIRE(labels.size() == 4);
   CHECK(labels[0] != PointLabel::kInvalid);
   CHECK(labels[1] == PointLabel::kInvalid);

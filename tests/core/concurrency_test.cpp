@@ -75,7 +75,7 @@ TEST_CASE("an object may go from thread to thread") {
   DynaInsRemover remover(config);
   std::vector<Verdict> newest;
   for (const Scan& scan : scans) {
-    std::thread([&] { newest.emplace_back(push(remover, scan).newest); }).join();
+    std::thread([&] { newest.emplace_back(push(remover, scan).newest()); }).join();
   }
   CHECK((newest == expected.newest));
 }
@@ -115,7 +115,7 @@ TEST_CASE("a call during another call is refused and changes nothing") {
   CHECK(refused == calls);
   CHECK((final == expected.final));
   remover.reset();  // at rest again
-  CHECK((Verdict(push(remover, scans[0]).newest) == expected.newest[0]));
+  CHECK((Verdict(push(remover, scans[0]).newest()) == expected.newest[0]));
 }
 
 TEST_CASE("threads that push into one object at once get answers or UsageError, no data race") {

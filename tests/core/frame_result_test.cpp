@@ -45,12 +45,50 @@ TEST_CASE("a residual names the scan that its motion begins with, also after a r
   CHECK_THROWS_AS(push(scans[2], 0.05), PoseError);
   const FrameResult frame = push(scans[3], 0.3);
   REQUIRE(frame.pose_residual);
-  CHECK(frame.newest.scan == 2);
+  CHECK(frame.newest().scan == 2);
   CHECK(frame.pose_residual->previous_scan == 1);
   CHECK(frame.pose_residual->previous_time == 0.1);
   const Eigen::Vector3d motion =
       (scans[1].T_world_sensor.inverse() * scans[3].T_world_sensor).translation();
   CHECK((frame.pose_residual->T_previous_newest.translation() - motion).norm() < 0.02);
+}
+
+TEST_CASE("a verdict has the pose by which its scan was compared, and its epoch") {
+  const std::vector<Scan> scans = drive(yard(), 6, 5.0);
+  DynaInsRemover remover;
+  std::vector<ComparedPose> compared;
+  bool is_corrected = false;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    if (i == 4) remover.start_epoch();
+    Pose T_pushed = scans[i].T_world_sensor;
+    if (i == 2) T_pushed.translation().y() += 0.2;
+    const FrameResult frame = remover.push(scans[i].points, T_pushed);
+    compared.push_back(frame.newest().compared);
+    CHECK((i == 0 || compared[i].epoch != compared[i - 1].epoch) == frame.began_epoch.has_value());
+    const Pose& T_compared = compared[i].T_world_sensor;
+    is_corrected = is_corrected || !T_compared.isApprox(T_pushed, 1e-6);
+    if (!frame.pose_residual) {
+      CHECK(T_compared.isApprox(T_pushed, 1e-12));
+      continue;
+    }
+    const Pose T_motion = compared[i - 1].T_world_sensor.inverse() * T_compared;
+    CHECK(T_motion.isApprox(frame.pose_residual->T_previous_newest, 1e-6));
+  }
+  CHECK(is_corrected);
+  std::size_t final = 0;
+  remover.flush([&](const ScanVerdict& verdict) {
+    CHECK(verdict.compared.epoch == compared[final].epoch);
+    CHECK(verdict.compared.T_world_sensor.isApprox(compared[final++].T_world_sensor, 0.0));
+  });
+}
+
+TEST_CASE("the verdict on the newest scan is asked for before the next push, or refused") {
+  const std::vector<Scan> scans = drive(yard(), 2, 5.0);
+  DynaInsRemover remover;
+  const FrameResult first = remover.push(scans[0].points, scans[0].T_world_sensor);
+  const FrameResult second = remover.push(scans[1].points, scans[1].T_world_sensor);
+  CHECK_THROWS_AS(first.newest(), UsageError);
+  CHECK(second.newest().labels.size() == scans[1].points.size());
 }
 
 TEST_CASE("times in another unit than seconds are doubted from the fourth scan on") {

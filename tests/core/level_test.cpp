@@ -62,7 +62,7 @@ TEST_CASE("poses and map stay in the user's frames") {
   };
   for (const Scan& scan : scans) {
     const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-    check(frame.newest);
+    check(frame.newest());
   }
   remover.flush(check);
   CHECK_FALSE(remover.sensor().is_level());

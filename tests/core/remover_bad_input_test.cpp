@@ -47,7 +47,7 @@ std::vector<PointLabel> labels_of(const Config& config,
                                   const std::vector<Eigen::Vector3f>& points) {
   DynaInsRemover remover(config);
   const FrameResult frame = remover.push(points, Eigen::Isometry3d::Identity());
-  return {frame.newest.labels.begin(), frame.newest.labels.end()};
+  return {frame.newest().labels.begin(), frame.newest().labels.end()};
 }
 
 Eigen::Isometry3d broken(const std::function<void(Eigen::Matrix4d&)>& damage) {
@@ -94,7 +94,7 @@ TEST_CASE("an invalid pose or time is refused with its reason, and the state doe
                         StartsWith("time = ") && ContainsSubstring("greater than"));
     }
     const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
-    REQUIRE((Verdict(frame.newest) == expected.newest[s]));
+    REQUIRE((Verdict(frame.newest()) == expected.newest[s]));
   }
   remover.flush([&](const ScanVerdict& verdict) {
     REQUIRE((Verdict(verdict) == expected.final.at(verdict.scan)));
@@ -109,11 +109,12 @@ TEST_CASE("a push without a time is 0.1 s later than the one before, however lat
     remover.push(scans[0].points, scans[0].T_world_sensor, time);
     for (int i = 1; i < 3; ++i) {
       const auto frame = remover.push(scans[1].points, scans[1].T_world_sensor);
-      if (std::abs(time) < 1e15) CHECK(frame.newest.time == Approx(time + 0.1 * i).epsilon(1e-12));
+      if (std::abs(time) < 1e15)
+        CHECK(frame.newest().time == Approx(time + 0.1 * i).epsilon(1e-12));
     }
   }
   const std::vector<Eigen::Vector3f> cloud = {{10.0F, 0.0F, 1.0F}};
-  CHECK(DynaInsRemover().push(cloud, Eigen::Isometry3d::Identity()).newest.time == 0.0);
+  CHECK(DynaInsRemover().push(cloud, Eigen::Isometry3d::Identity()).newest().time == 0.0);
 }
 
 TEST_CASE("a view that would read memory outside the points is refused") {
@@ -129,8 +130,8 @@ TEST_CASE("a view that would read memory outside the points is refused") {
   CHECK_THROWS_AS(remover.push(RawPoints<float>{nullptr, 4, 3}, pose), CloudError);
   CHECK_THROWS_AS(remover.push(PointsView{floats, {floats.data(), 11}, floats}, pose), CloudError);
   CHECK_THROWS_AS(remover.push(PointsView{floats, floats, {}}, pose), CloudError);
-  CHECK(remover.push(RawPoints<float>{nullptr, 0, 3}, pose).newest.scan == 0);
-  CHECK(remover.push(RawPoints<float>{floats.data(), 4, 3}, pose).newest.labels.size() == 4);
+  CHECK(remover.push(RawPoints<float>{nullptr, 0, 3}, pose).newest().scan == 0);
+  CHECK(remover.push(RawPoints<float>{floats.data(), 4, 3}, pose).newest().labels.size() == 4);
 }
 
 TEST_CASE("a rotation with the few digits of a text file is accepted") {
@@ -138,7 +139,7 @@ TEST_CASE("a rotation with the few digits of a text file is accepted") {
   T.linear() = (T.linear() * 1e4).array().round() / 1e4;
   DynaInsRemover remover(any_preset());
   const FrameResult frame = remover.push(good_scans()[0].points, T);
-  const Eigen::Matrix3d R = frame.newest.T_world_sensor.linear();
+  const Eigen::Matrix3d R = frame.newest().T_world_sensor.linear();
   CHECK((R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-12);
 }
 
@@ -253,15 +254,15 @@ TEST_CASE("any cloud can come between good ones") {
     // Invalid clouds first, enough to fill a window, then good ones after a pause.
     for (int i = 0; i < 5; ++i) {
       const FrameResult frame = remover.push(c.points, sensor_at(0.0), -100.0 + 0.1 * i);
-      REQUIRE(frame.newest.labels.size() == c.points.size());
+      REQUIRE(frame.newest().labels.size() == c.points.size());
     }
     for (std::size_t s = 0; s < scans.size(); ++s) {
       const FrameResult frame =
           remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
       // The default preset would derive the sensor model from the cloud of many points.
       if (config.decision == Decision::kFreeSpace && c.points.size() == 500000) continue;
-      REQUIRE((std::vector<PointLabel>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
-               expected.newest[s].labels));
+      REQUIRE((std::vector<PointLabel>(frame.newest().labels.begin(),
+                                       frame.newest().labels.end()) == expected.newest[s].labels));
     }
   }
 }
@@ -276,7 +277,7 @@ TEST_CASE("a cloud that throws is not taken, and the state does not change") {
     CHECK_THROWS_WITH(remover.push(BrokenCloud{scan.points}, scan.T_world_sensor, scan.time),
                       "lost");
     const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-    result.newest.emplace_back(frame.newest);
+    result.newest.emplace_back(frame.newest());
     if (frame.finished) result.final.emplace_back(*frame.finished);
   }
   remover.flush([&](const ScanVerdict& verdict) { result.final.emplace_back(verdict); });
@@ -321,9 +322,9 @@ TEST_CASE("a moved-from remover throws, and can be assigned to") {
   DynaInsRemover second = std::move(first);
   CHECK_THROWS_AS(first.push(scans[1].points, scans[1].T_world_sensor), UsageError);
   CHECK_THROWS_AS(first.flush([](const ScanVerdict&) {}), UsageError);
-  CHECK(second.push(scans[1].points, scans[1].T_world_sensor).newest.scan == 1);
+  CHECK(second.push(scans[1].points, scans[1].T_world_sensor).newest().scan == 1);
   first = std::move(second);
-  CHECK(first.push(scans[2].points, scans[2].T_world_sensor).newest.scan == 2);
+  CHECK(first.push(scans[2].points, scans[2].T_world_sensor).newest().scan == 2);
 }
 
 }  // namespace

@@ -287,11 +287,11 @@ TEST_CASE("verdicts on newest scans are the same whether or not those before wer
   for (std::size_t s = 0; s < scans.size(); ++s) {
     const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
     if (frame.finished) take(*frame.finished);
-    CHECK(frame.newest.time == scans[s].time);
-    if (s % 3 == 0) CHECK((Verdict(frame.newest) == all.newest[s]));
+    CHECK(frame.newest().time == scans[s].time);
+    if (s % 3 == 0) CHECK((Verdict(frame.newest()) == all.newest[s]));
     if (s + 1 == scans.size()) {
       remover.flush(take);
-      CHECK((Verdict(frame.newest) == all.newest[s]));
+      CHECK((Verdict(frame.newest()) == all.newest[s]));
     }
   }
   CHECK((finals == all.final));
@@ -436,7 +436,7 @@ TEST_CASE("both sides of min_range and max_range, horizontally") {
                                                {0.0F, 0.0F, 5.0F},   {2.0F, 2.3F, 40.0F}};
   const FrameResult frame = remover.push(points, Eigen::Isometry3d::Identity());
   using L = PointLabel;
-  CHECK((std::vector<L>(frame.newest.labels.begin(), frame.newest.labels.end()) ==
+  CHECK((std::vector<L>(frame.newest().labels.begin(), frame.newest().labels.end()) ==
          std::vector<L>{L::kOutOfRange, L::kStatic, L::kStatic, L::kOutOfRange, L::kOutOfRange,
                         L::kStatic}));
 }
@@ -497,7 +497,7 @@ TEST_CASE("the corrected motion is that of the pushed frame, wherever the sensor
     for (std::size_t i = 0; i < scans.size(); ++i) {
       const Scan& scan = scans[i];
       const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-      CHECK((frame.newest.T_world_sensor.matrix() - scan.T_world_sensor.matrix()).norm() < 1e-9);
+      CHECK((frame.newest().T_world_sensor.matrix() - scan.T_world_sensor.matrix()).norm() < 1e-9);
       if (!frame.pose_residual) continue;
       ++count;
       // A turn of the body also moves the sensor, here by 0.15 m.

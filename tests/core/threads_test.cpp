@@ -86,7 +86,7 @@ Answers answers(FaintingConfig config, int threads, const std::vector<Scan>& sca
     try {
       ++pushes;
       const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-      result.verdicts.newest.emplace_back(frame.newest);
+      result.verdicts.newest.emplace_back(frame.newest());
       result.epochs += frame.began_epoch ? 1 : 0;
       if (frame.pose_residual) result.residuals.push_back(frame.pose_residual->translation);
       if (frame.finished) take(*frame.finished);

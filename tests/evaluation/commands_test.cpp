@@ -389,7 +389,7 @@ TEST_CASE("Variants label every point once, each with its own configuration") {
                                            scan.T_world_sensor, 0.1 * static_cast<double>(i));
     REQUIRE(newest[i].size() == scan.size());
     for (std::size_t p = 0; p < scan.size(); ++p) {
-      REQUIRE((newest[i][p] != 0) == is_static(frame.newest.labels[p]));
+      REQUIRE((newest[i][p] != 0) == is_static(frame.newest().labels[p]));
     }
     differs = differs || newest[i] != both[i];
   }

@@ -204,8 +204,8 @@ class Witness {
     Open scan{std::vector<std::uint8_t>(points.size()), time};
     std::transform(points.begin(), points.end(), scan.is_invalid.begin(), is_invalid);
     open_.push_back(std::move(scan));
-    if (pushed_ % 3 != 0) check(frame.newest, open_.back(), pushed_);  // others are not read
-    require(frame.newest.time == time, "the time is that of the push");
+    if (pushed_ % 3 != 0) check(frame.newest(), open_.back(), pushed_);  // others are not read
+    require(frame.newest().time == time, "the time is that of the push");
     ++pushed_;
     require(frame.finished.has_value() == (open_.size() > remover_.latency()),
             "a scan is final after the latency");

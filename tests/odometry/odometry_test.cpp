@@ -164,7 +164,7 @@ TEST_CASE("Behind another odometry, its wrong motions are corrected, and its fir
     Pose T_wrong = scan.T_world_sensor;
     T_wrong.translation().y() += 0.05 * static_cast<double>(i);
     const OdometryResult found = odometry.push(points_of(scan), {}, scan.time, T_wrong);
-    CHECK(found.frame.newest.labels.size() == points_of(scan).count);
+    CHECK(found.frame.newest().labels.size() == points_of(scan).count);
     const double error =
         (found.T_world_sensor.translation() - scan.T_world_sensor.translation()).norm();
     CHECK(error < (i == 0 ? 1e-9 : 0.1));
@@ -186,7 +186,7 @@ TEST_CASE("Behind another odometry, a scan that does not fit keeps its motion") 
   const OdometryResult lost = push(street.scan(4), 9.0, 0.4);
   CHECK(lost.loss == OdometryLoss::kNoOverlap);
   CHECK(lost.T_world_sensor.translation().x() == Approx(x + 2.0));
-  CHECK(lost.frame.newest.labels.size() == points_of(street.scan(4)).count);
+  CHECK(lost.frame.newest().labels.size() == points_of(street.scan(4)).count);
   const std::vector<Eigen::Vector3f> empty;
   const Pose T_empty(Eigen::Translation3d(9.1, 0, 0));
   CHECK(odometry.push(empty, {}, 0.45, T_empty).loss == OdometryLoss::kFewPoints);

@@ -92,8 +92,8 @@ TEST_CASE("a long run needs constant memory and time, and old scans have no infl
   DynaInsRemover fresh(config);
   const std::size_t reach = paper ? static_cast<std::size_t>(config.window) : 200;
   for (std::size_t i = count - std::min(count, reach); i + 1 < count; ++i) push(fresh, i);
-  const Verdict expected(push(fresh, count - 1).newest);
-  const Verdict newest(push(remover, count - 1).newest);
+  const Verdict expected(push(fresh, count - 1).newest());
+  const Verdict newest(push(remover, count - 1).newest());
   if (paper) {
     CHECK((newest.labels == expected.labels));
   } else {

@@ -45,7 +45,7 @@ struct Node {
           return PoseAnswer{T_world_sensor, true, ""};
         },
         [&](const Cloud&, const dynains::FrameResult& frame) {
-          labels.emplace_back(frame.newest.labels.begin(), frame.newest.labels.end());
+          labels.emplace_back(frame.newest().labels.begin(), frame.newest().labels.end());
         });
   }
 };
@@ -64,8 +64,8 @@ TEST_CASE("a loop gives the labels of the remover") {
     CHECK_FALSE(node.loop.is_waiting());
     CHECK_FALSE(node.clean(scan.T_world_sensor));
     const auto frame = remover.push(scan.points, scan.T_world_sensor, stamp);
-    CHECK(node.labels.back() ==
-          std::vector<dynains::PointLabel>(frame.newest.labels.begin(), frame.newest.labels.end()));
+    CHECK(node.labels.back() == std::vector<dynains::PointLabel>(frame.newest().labels.begin(),
+                                                                 frame.newest().labels.end()));
   }
   const Diagnosis diagnosis = node.loop.report(1.0);
   CHECK(diagnosis.message == "clouds are cleaned");

@@ -170,7 +170,7 @@ std::pair<Counts, Counts> expected_counts(const std::vector<Scan>& scans, double
     const auto frame = remover.push(scan.points, scan.T_world_sensor, stamp);
     auto& still = result.first[nanoseconds(stamp)];
     auto& moving = result.second[nanoseconds(stamp)];
-    for (const dynains::PointLabel label : frame.newest.labels) {
+    for (const dynains::PointLabel label : frame.newest().labels) {
       still += dynains::is_static(label) ? 1 : 0;
       moving += label == dynains::PointLabel::kDynamic ? 1 : 0;
     }

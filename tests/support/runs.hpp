@@ -46,7 +46,7 @@ Run run(BasicDynaInsRemover<Stages>& remover, const std::vector<Scan>& scans, Co
   for (const Scan& scan : scans) {
     const auto& cloud = convert(scan.points);  // outlives the call of push
     const FrameResult frame = remover.push(cloud, scan.T_world_sensor, scan.time);
-    result.newest.emplace_back(frame.newest);
+    result.newest.emplace_back(frame.newest());
     if (frame.finished) result.final.emplace_back(*frame.finished);
   }
   remover.flush([&](const ScanVerdict& verdict) { result.final.emplace_back(verdict); });

@@ -41,7 +41,7 @@ inline StaticByVerdict static_points(
   for (const simulation::SimulatedScan& scan : scans) {
     const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
     const FrameResult frame = remover.push(points, T_moved_world * scan.T_world_sensor, scan.time);
-    keep(frame.newest, result.newest);
+    keep(frame.newest(), result.newest);
     if (frame.finished) keep(*frame.finished, result.final);
   }
   remover.flush([&](const ScanVerdict& verdict) { keep(verdict, result.final); });

@@ -182,11 +182,12 @@ class RemoverNode::Work {
   void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
     newest_ = cloud.header.stamp;
     if (has_readers(*static_)) {
-      static_->publish(std::make_unique<Cloud>(dynains::static_points(cloud, frame.newest.labels)));
+      static_->publish(
+          std::make_unique<Cloud>(dynains::static_points(cloud, frame.newest().labels)));
     }
     if (has_readers(*dynamic_)) {
       dynamic_->publish(
-          std::make_unique<Cloud>(dynains::dynamic_points(cloud, frame.newest.labels)));
+          std::make_unique<Cloud>(dynains::dynamic_points(cloud, frame.newest().labels)));
     }
     if (frame.pose_residual) {
       residual_->publish(std::make_unique<Residual>(

@@ -9,7 +9,6 @@
 #include <exception>
 #include <memory>
 #include <optional>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -22,6 +21,7 @@
 #include "dynains/pipeline/plausibility_check.hpp"
 #include "dynains/pipeline/remover_pipeline.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
+#include "dynains/pipeline/stage_interfaces.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
@@ -33,26 +33,6 @@
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
-
-// Optional members of stages, for Offers.
-template <class Stage>
-using NeedsSensor = decltype(std::declval<const Stage&>().needs_sensor());
-template <class Stage>
-using Adapt = decltype(std::declval<Stage&>().adapt(SensorModel()));
-
-/// Whether a stage wants adapt(sensor).
-template <class Stage>
-bool needs_sensor(const Stage& stage) {
-  if constexpr (Offers<NeedsSensor, Stage>::value) {
-    return stage.needs_sensor();
-  } else {
-    return false;
-  }
-}
-template <class Stage>
-void adapt_stage(Stage& stage, const SensorModel& sensor) {
-  if constexpr (Offers<Adapt, Stage>::value) stage.adapt(sensor);
-}
 
 /// Runs `work` and adds its time to `milliseconds`.
 template <class Work>
@@ -66,6 +46,8 @@ void timed(double& milliseconds, Work&& work) {
 /// Owns the stages and every buffer.
 template <class Stages>
 class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMaker {
+  static_assert(check_stages<Stages>());
+
  public:
   using Config = PipelineConfig<Stages>;
   using Ground = typename Stages::Ground;
@@ -144,13 +126,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     } else {
       unwritten_ = &newest;
     }
-    return {{newest.scan, newest.time, newest.T_world_sensor, newest.compared, *this},
-            finished,
-            times,
-            residual,
-            time_doubt(),
-            newest.began_epoch,
-            shares};
+    return {{*this, newest.scan}, finished,           times, residual,
+            time_doubt(),         newest.began_epoch, shares};
   }
 
   std::optional<ScanVerdict> finish_oldest() override {
@@ -176,7 +153,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     build_map_ = false;
     for (std::size_t i = 0; i < std::min(scans, scans_.capacity() + 1); ++i) {
       push(example, Pose::Identity(), std::nullopt);
-      newest_verdict();
+      make_newest();
     }
   }
 
@@ -259,11 +236,19 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
         });
   }
 
-  const ScanVerdict& newest_verdict() override {
-    if (unwritten_ == nullptr) return newest_;
+  const ScanVerdict& newest_verdict(std::uint64_t scan) override {
+    const ReentrancyGuard::Guard guard(this->guard());
+    if (scan + 1 != scans_.pushed()) {
+      throw UsageError("FrameResult::newest() must be called before the next call of the remover");
+    }
+    make_newest();
+    return newest_;
+  }
+
+  void make_newest() {
+    if (unwritten_ == nullptr) return;
     newest_ = newest_writer_.write(*unwritten_, decision_->verdict(*unwritten_, false));  // Eq. 2
     unwritten_ = nullptr;
-    return newest_;
   }
 
   // The scan becomes final even if the map throws, because the ring reuses its slot.
