@@ -1,9 +1,21 @@
 // Blocks of the pages, each in code that has what the text around it presupposes. The headers are
 // those that the blocks include themselves; within a function their includes do nothing.
+#include "api_1.hpp"
+#include "api_2.hpp"
 #include "embedding_1.hpp"
 #include "embedding_3.hpp"
 #include "embedding_4.hpp"
 #include "embedding_6.hpp"
+
+#include "api_1.inc"
+
+#include "api_2.inc"
+
+/// All functions of the stages that the pipeline calls, for both decisions.
+dynains::FrameResult push_by_own_stages(const std::vector<Eigen::Vector3d>& scan) {
+  MyRemover remover;
+  return remover.push(scan, Eigen::Isometry3d::Identity());
+}
 
 void corrector_loop(const std::vector<Eigen::Vector3d>& scan, const Eigen::Isometry3d& T_odometry,
                     double time, std::vector<dynains::Pose>& trajectory,
