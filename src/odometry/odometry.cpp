@@ -61,7 +61,7 @@ class Odometry::Loop {
     if (is_lost && T_odometry_sensor) {
       T_last_newest = T_predicted;
       scan_.prepare(T_last_newest, period);
-      if (result.loss != OdometryLoss::kFewPoints) map_ = SurfaceGrid(true);
+      if (result.loss != OdometryLoss::kFewPoints) begin_map();
     }
     const double stamp = 1.0 - scan_.mean_offset() / period;  // 0: last scan, 1: this one
     if (first_ && is_taken) {
@@ -114,6 +114,13 @@ class Odometry::Loop {
     return period > kLongestPoseGap && are_scans_missing(period);
   }
 
+  /// Whether the newest scan fits to the map as registrations of other places hardly do. How well
+  /// scans fit at all depends on the pattern of their points.
+  bool is_overlap(double fit) const {
+    constexpr double kLeast = 0.6;  // ratio
+    return fit >= kLeast || fit >= kLeast * scan_.expected_fit();
+  }
+
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
     if (is_after_gap(period)) return OdometryLoss::kGap;
@@ -128,12 +135,12 @@ class Odometry::Loop {
       const Pose T_predicted = T_world_last_ * T_last_newest;
       std::optional<Registration> best;
       if (turn > 0 || is_predictable(period)) best = register_near(map_, points, T_predicted);
-      if (turn == 0 && (!best || best->score < kLeastScore)) {
+      if (turn == 0 && (!best || !is_overlap(best->score))) {
         best = register_scans(map_, points, turned(T_predicted));
       }
       if (first_ && turn == 0 && best) search_first_motion(*best, period);
       result.fit = best ? best->score : 0.0;
-      if (result.fit < kLeastScore) return OdometryLoss::kNoOverlap;
+      if (!is_overlap(result.fit)) return OdometryLoss::kNoOverlap;
       result.free_directions = best->free_directions;
       const Pose T_last_before = T_last_newest;
       T_last_newest = T_world_last_.inverse() * best->T_a_b;
@@ -155,9 +162,14 @@ class Odometry::Loop {
     }
   }
 
+  void begin_map() {
+    map_scale_ = scan_.scale();
+    map_ = SurfaceGrid(true, map_scale_);
+  }
+
   /// The map of the first scan, whose motion is that until the second one.
   void start_map(const Pose& T_first_second, double period) {
-    map_ = SurfaceGrid(true);
+    begin_map();
     first_->prepare(T_first_second, period);
     for (const ScanPreparation::Point& point : first_->map_points()) map_.insert(point.position);
   }
@@ -174,6 +186,7 @@ class Odometry::Loop {
     if (scan_count_ == 0) {
       first_ = scan_;
     } else {
+      if (map_scale_ != scan_.scale()) begin_map();
       add_to_map(result.frame.newest().labels);
       first_.reset();
       T_last_newest_ = T_last_newest;
@@ -202,6 +215,7 @@ class Odometry::Loop {
   ScanPreparation scan_;
   std::optional<ScanPreparation> first_;  // until the motion of the first scan is known
   SurfaceGrid map_{true};
+  double map_scale_ = 1.0;
   std::optional<DynaInsRemover> remover_;
   Pose T_result_world_ = Pose::Identity();
   Pose T_odometry_last_ = Pose::Identity();

@@ -2,15 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
+#include <utility>
 
 #include "dynains/io/trajectory.hpp"
+#include "dynains/median.hpp"
 #include "poses/cell_surfaces.hpp"
+#include "poses/scan_registration.hpp"
 #include "poses/way_search.hpp"
 
 namespace dynains::odometry {
 namespace {
 
-constexpr double kLongest = 0.5;  // s from the stamp, of offsets that can be right
+constexpr double kLongest = 0.5;       // s from the stamp, of offsets that can be right
+constexpr std::size_t kWanted = 2000;  // keypoints
 
 }  // namespace
 
@@ -29,6 +34,22 @@ void ScanPreparation::take(const detail::CloudView& cloud, Span<const double> of
     ++count;
   }
   mean_offset_ = count > 0 ? sum / static_cast<double>(count) : 0.0;
+  choose_scale();
+}
+
+void ScanPreparation::choose_scale() {
+  constexpr double kNarrow = 4.0, kWide = 12.0;  // m, median ranges that end a scale of 1
+  constexpr double kSmallest = 0.125;
+  constexpr std::size_t kStep = 8;  // every 8th point
+  std::vector<double> ranges;
+  for (std::size_t i = 0; 3 * i < measured_.size(); i += kStep) {
+    const double range = Eigen::Map<const Eigen::Vector3f>(&measured_[3 * i]).norm();
+    if (range > kSmallest * nearest_ && range < farthest_) ranges.push_back(range);
+  }
+  if (ranges.empty()) return;
+  const double middle = median(std::move(ranges));
+  while (scale_ < 1.0 && middle > kWide * scale_) scale_ *= 2.0;
+  while (scale_ > kSmallest && middle < kNarrow * scale_) scale_ *= 0.5;
 }
 
 /// Whether a point is a return with a time.
@@ -63,19 +84,39 @@ void ScanPreparation::prepare(const Pose& motion, double period) {
 
 void ScanPreparation::thin_out() {
   constexpr double kSmall = 0.25;  // m
+  constexpr double kFiner = 0.7;   // ratio of edges
+  const double small = scale_ * kSmall, nearest = scale_ * nearest_;
   map_points_.clear();
   taken_.clear();
   for (std::size_t i = 0; 3 * i < cloud_.size(); ++i) {
     const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&cloud_[3 * i]).cast<double>();
     const double squared = p.squaredNorm();
-    if (!(squared > nearest_ * nearest_ && squared < farthest_ * farthest_)) continue;
-    if (adds(taken_, voxel_at(p, kSmall))) map_points_.push_back({p, i});
+    if (!(squared > nearest * nearest && squared < farthest_ * farthest_)) continue;
+    if (adds(taken_, voxel_at(p, small))) map_points_.push_back({p, i});
   }
-  keypoints_.clear();
-  taken_.clear();
+  for (used_edge_ = std::max(edge_, small);; used_edge_ = std::max(kFiner * used_edge_, small)) {
+    keypoints_.clear();
+    taken_.clear();
+    for (const Point& point : map_points_) {
+      if (adds(taken_, voxel_at(point.position, used_edge_))) keypoints_.push_back(point.position);
+    }
+    if (2 * keypoints_.size() > kWanted || used_edge_ == small) break;
+  }
+}
+
+double ScanPreparation::expected_fit() const {
+  SurfaceGrid half(true, scale_);
+  std::vector<Eigen::Vector3d> others;
+  VoxelHashTable<> taken;
+  std::mt19937 random;  // halves by any order of points would be those of different beams
   for (const Point& point : map_points_) {
-    if (adds(taken_, voxel_at(point.position, edge_))) keypoints_.push_back(point.position);
+    if (random() % 2 == 0) {
+      half.insert(point.position);
+    } else if (adds(taken, voxel_at(point.position, used_edge_))) {
+      others.push_back(point.position);
+    }
   }
+  return fit_of(half, others, Pose::Identity());
 }
 
 Landmarks ScanPreparation::landmarks() const {
@@ -88,10 +129,10 @@ Landmarks ScanPreparation::landmarks() const {
 }
 
 void ScanPreparation::adapt() {
-  constexpr double kWanted = 2000.0;                 // points
   constexpr double kSmallest = 0.3, kLargest = 1.5;  // m
-  const double share = static_cast<double>(keypoints_.size()) / kWanted;
-  edge_ = std::clamp(edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), kSmallest, kLargest);
+  const double share = static_cast<double>(keypoints_.size()) / static_cast<double>(kWanted);
+  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kSmallest,
+                     scale_ * kLargest);
 }
 
 }  // namespace dynains::odometry

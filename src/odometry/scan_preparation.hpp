@@ -35,6 +35,12 @@ class ScanPreparation {
 
   /// Adapts the large voxels to the scan, for the scans after it.
   void adapt();
+  /// Ratio of all lengths of this and the map to those in streets, (0, 1]: a power of two that
+  /// follows the median range of the points, and changes late.
+  double scale() const { return scale_; }
+  /// The fit (mean weight) that the pattern of points lets one expect: that of one half of them to
+  /// the surfaces of the other half.
+  double expected_fit() const;
 
   /// All points, de-skewed.
   RawPoints<float> cloud() const { return {cloud_.data(), cloud_.size() / 3, 3}; }
@@ -48,10 +54,13 @@ class ScanPreparation {
   bool is_timed(std::size_t i) const;
   void deskew(const Pose& motion, double period);
   void thin_out();
+  void choose_scale();
 
   double nearest_;
   double farthest_;
-  double edge_ = 1.0;  // m, of the large voxels
+  double scale_ = 1.0;
+  double edge_ = 1.0;       // m, of the large voxels
+  double used_edge_ = 1.0;  // m, by this scan: smaller if it has few points
   double mean_offset_ = 0.0;
   std::vector<float> measured_;  // points as they came
   std::vector<double> offsets_;

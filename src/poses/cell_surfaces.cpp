@@ -29,10 +29,10 @@ bool is_trace_of_beam(const Eigen::Vector3d& beam, const Eigen::Vector3d& normal
 
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
-  if (!adds(taken_, voxel_at(point, kApart))) return;
+  if (!adds(taken_, voxel_at(point, scale_ * kApart))) return;
   for (std::size_t level = 0; level < kCellLevels; ++level) {
     Level& at = levels_[level];
-    const VoxelKey key = voxel_at(point, kCellEdges[level]);
+    const VoxelKey key = voxel_at(point, scale_ * kCellEdges[level]);
     const std::uint32_t number = at.numbers.insert(key);
     if (number == at.cells.size()) {
       at.cells.emplace_back();
@@ -64,7 +64,7 @@ void SurfaceGrid::forget_beyond(const Eigen::Vector3d& centre, double reach) {
 const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& point) const {
   const std::size_t coarsest = with_clutter_ ? 0 : level;
   for (std::size_t k = level + 1; k-- > coarsest;) {
-    const std::uint32_t number = levels_[k].numbers.find(voxel_at(point, kCellEdges[k]));
+    const std::uint32_t number = levels_[k].numbers.find(voxel_at(point, scale_ * kCellEdges[k]));
     if (number == kNoIndex) continue;
     const Cell& cell = levels_[k].cells[number];
     if (!cell.is_fitted) cell.surface = surface_of(cell);
@@ -105,8 +105,8 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   return surface;
 }
 
-Pose stepped(const Pose& T, const Vector6& step) {
-  const Eigen::Vector3d turn = step.tail<3>() / kLever;
+Pose stepped(const Pose& T, const Vector6& step, double lever) {
+  const Eigen::Vector3d turn = step.tail<3>() / lever;
   Pose result = T;
   result.translation() += step.head<3>();
   result.linear() =

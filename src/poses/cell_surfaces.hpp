@@ -57,9 +57,13 @@ class SurfaceGrid {
  public:
   /// `with_clutter`: whether clutter counts, and larger cells where a cell has no surface. In one
   /// scan clutter is persons and noise, in a map of many scans it tells places, too.
-  explicit SurfaceGrid(bool with_clutter = false) : with_clutter_(with_clutter) {}
+  /// `scale`: ratio of the edges of cells and kCellEdges; less in rooms that are narrower.
+  explicit SurfaceGrid(bool with_clutter = false, double scale = 1.0)
+      : with_clutter_(with_clutter), scale_(scale) {}
 
   bool empty() const { return levels_.back().cells.empty(); }
+  /// Distance (m) at which a turn moves points as far as is usual in the scene.
+  double lever() const { return scale_ * kLever; }
   /// Least eigenvalue of normal equations whose direction is determined, in points whose distance
   /// changes as much as the motion. Clutter determines every direction a little.
   double least_determined() const { return with_clutter_ ? 2.0 : 0.01; }
@@ -90,21 +94,22 @@ class SurfaceGrid {
   CellSurface surface_of(const Cell& cell) const;
 
   bool with_clutter_;
+  double scale_;
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, at the newest scan
   std::array<Level, kCellLevels> levels_;
   VoxelHashTable<> taken_;
 };
 
-/// Rotates `T` by a rotation vector (rad times kLever) about its own origin, along the axes of the
+/// Rotates `T` by a rotation vector (rad times `lever`) about its own origin, along the axes of the
 /// outer frame, and translates it (m).
-Pose stepped(const Pose& T, const Vector6& step);
+Pose stepped(const Pose& T, const Vector6& step, double lever = kLever);
 
 /// Normal equations of a step that moves points to surfaces: translation (m) and rotation (rad
-/// times kLever), as of stepped().
+/// times `lever`), as of stepped().
 class NormalEquations {
  public:
-  /// `least`: SurfaceGrid::least_determined().
-  explicit NormalEquations(double least) : least_(least) {}
+  explicit NormalEquations(const SurfaceGrid& grid)
+      : least_(grid.least_determined()), lever_(grid.lever()) {}
 
   /// Adds the point `p` (m) of a scan at the pose `T`. `scale`: m, distance at which its weight is
   /// a fourth. Returns the weight (Geman-McClure), (0, 1].
@@ -117,7 +122,7 @@ class NormalEquations {
     for (std::size_t k = 0; k < surface.direction_count; ++k) {
       const Eigen::Vector3d& n = surface.directions[k];
       Vector6 J;
-      J << n, arm.cross(n) / kLever;
+      J << n, arm.cross(n) / lever_;
       add(J, n.dot(point - surface.mean), weight);
     }
     return weight;
@@ -140,6 +145,7 @@ class NormalEquations {
   Matrix6 hessian_ = Matrix6::Zero();
   Vector6 gradient_ = Vector6::Zero();
   double least_;
+  double lever_;
 };
 
 }  // namespace dynains

@@ -14,7 +14,7 @@ using Points = std::vector<Eigen::Vector3d>;
 
 /// Normal equations at one motion, and how well it fits.
 struct Linearization {
-  explicit Linearization(double least) : equations(least) {}
+  explicit Linearization(const SurfaceGrid& grid) : equations(grid) {}
   NormalEquations equations;
   double weight = 0.0;         // of all points
   double firm_weight = 0.0;    // of points at planes and poles
@@ -24,7 +24,7 @@ struct Linearization {
 /// `scale`: m, residual at which the weight of a point is a fourth.
 Linearization linearize(const SurfaceGrid& a, const Points& b, const Pose& T, std::size_t level,
                         double scale, std::size_t stride) {
-  Linearization result(a.least_determined());
+  Linearization result(a);
   for (std::size_t i = 0; i < b.size(); i += stride) {
     const CellSurface* const surface = a.find(level, T * b[i]);
     if (surface == nullptr) continue;
@@ -46,13 +46,20 @@ Pose refine(const SurfaceGrid& a, const Points& b, Pose T, std::size_t level, do
     if (way) way->add_to(result.equations, T);
     const Vector6 step = result.equations.solve().step;
     if (!step.allFinite()) break;
-    T = stepped(T, step);
+    T = stepped(T, step, a.lever());
     if (step.norm() < kShort) break;
   }
   return T;
 }
 
+constexpr double kFine = 0.1;  // m, scale of weights at the end
+
 }  // namespace
+
+double fit_of(const SurfaceGrid& a, const Points& b, const Pose& T_a_b) {
+  const Linearization at = linearize(a, b, T_a_b, kCellLevels - 1, kFine, 1);
+  return at.firm_weight / static_cast<double>(std::max<std::size_t>(1, at.firm_count));
+}
 
 void KnownTranslation::add_to(NormalEquations& equations, const Pose& T) const {
   const double ratio = kPointDeviation / deviation;
@@ -63,7 +70,6 @@ void KnownTranslation::add_to(NormalEquations& equations, const Pose& T) const {
 
 std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b, const Pose& guess,
                                           const std::optional<KnownTranslation>& way) {
-  constexpr double kFine = 0.1;  // m
   Pose T = refine(a, b, guess, 1, 0.2, 1, 8, way);
   T = refine(a, b, T, 2, kFine, 1, 15, way);
   Linearization last = linearize(a, b, T, 2, kFine, 1);

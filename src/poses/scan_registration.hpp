@@ -37,7 +37,7 @@ inline constexpr double kDistinct = 0.5;
 inline constexpr double kAlmost = 0.93;
 /// Points at planes and poles that a registration needs.
 inline constexpr std::size_t kFewestMatches = 100;
-/// Score that registrations of other places hardly reach.
+/// Score that registrations of other places hardly reach, of dense scans.
 inline constexpr double kLeastScore = 0.45;
 /// Deviation (m) of the translation of a registration that tells where a scan or a session is.
 inline constexpr double kMostUncertain = 0.05;
@@ -62,6 +62,9 @@ struct Registration {
   bool is_ambiguous = false;
   std::optional<KnownTranslation> way = {};  ///< as given
 };
+
+/// Mean weight of those of the points `b` (m) that meet planes or poles of `a`, [0, 1].
+double fit_of(const SurfaceGrid& a, const std::vector<Eigen::Vector3d>& b, const Pose& T_a_b);
 
 /// Registers the points `b` (m) to the surfaces `a` from several guesses of T_a_b; the best result
 /// counts. Empty if too few points meet a surface.

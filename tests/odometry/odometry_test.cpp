@@ -2,8 +2,11 @@
 #include "dynains/odometry/odometry.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -66,6 +69,55 @@ TEST_CASE("In a hall, a crowd and a forest, poses are found to centimetres, also
       CHECK(worst_error(found) < 0.1);
     }
   }
+}
+
+/// A scan of 32 beams from -45 to 45 deg in an empty room of this size (m), from its middle
+/// and 0.85 m over the floor, moved by `place` (m), with noise of 1 cm.
+std::vector<Eigen::Vector3f> scan_of_room(const Eigen::Vector3d& size, const Eigen::Vector3d& place,
+                                          unsigned seed) {
+  constexpr int kBeams = 32, kColumns = 900;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  const Eigen::Vector3d high(0.5 * size.x(), 0.5 * size.y(), size.z() - 0.85);
+  const Eigen::Vector3d low(-high.x(), -high.y(), -0.85);
+  std::vector<Eigen::Vector3f> points;
+  for (int beam = 0; beam < kBeams; ++beam) {
+    const double elevation = (-45.0 + 90.0 * beam / (kBeams - 1)) * M_PI / 180.0;
+    for (int column = 0; column < kColumns; ++column) {
+      const double azimuth = 2.0 * M_PI * column / kColumns;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      double range = 1e9;
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        const double wall = ray[axis] > 0.0 ? high[axis] : low[axis];
+        if (ray[axis] != 0.0) range = std::min(range, (wall - place[axis]) / ray[axis]);
+      }
+      points.push_back(((range + noise(random)) * ray).cast<float>());
+    }
+  }
+  return points;
+}
+
+TEST_CASE("In rooms of 2.2 to 15 m, poses are found to 2 cm, standing and driving") {
+  const Eigen::Vector3d size =
+      GENERATE(Eigen::Vector3d(2.2, 2.2, 2.4), Eigen::Vector3d(5.0, 4.0, 2.6),
+               Eigen::Vector3d(8.0, 6.0, 3.2), Eigen::Vector3d(15.0, 12.0, 4.0));
+  const double step = GENERATE(0.0, 0.03);  // m
+  Odometry odometry;
+  double worst = 0.0;
+  for (unsigned i = 0; i < 15; ++i) {
+    const Eigen::Vector3d place(step * i, 0.0, 0.0);
+    const OdometryResult found = odometry.push(scan_of_room(size, place, i), {}, 0.1 * i);
+    REQUIRE(found.loss == OdometryLoss::kNone);
+    worst = std::max(worst, (found.T_world_sensor.translation() - place).norm());
+  }
+  CAPTURE(size.transpose(), step);
+  CHECK(worst < 0.02);
+}
+
+TEST_CASE("How well a scan has to fit follows its pattern: few points in a crowd are no loss") {
+  const auto config = drive_of(simulation::Scene::kCrowd, simulation::Sensor::kMid360, 8, 71);
+  CHECK(worst_error(drive(config, {})) < 0.1);
 }
 
 /// Median of the errors of the motion from scan to scan, m, for stamps `shift` s after the first

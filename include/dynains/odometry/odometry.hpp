@@ -24,7 +24,7 @@ struct OdometryConfig {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"nearest", self.nearest, closed(0, 100), "m",
-                      "nearer points are the robot's own and not registered"});
+                      "nearer points are the robot's own and not registered; less in small rooms"});
     visitor(Parameter{"farthest", self.farthest, half_open_below(0, 1000), "m",
                       "farther points are not registered, and farther parts of the map forgotten"});
     visitor(Parameter{"remove", self.remove, Bounds(), "", "keep moving points out of the map"});
