@@ -79,8 +79,8 @@ class BasicDynaInsRemover {
   /// `cloud`: m, sensor frame, z up (RemoverConfig::level handles tilted sensors); any type with
   /// PointCloudTraits, any size. Invalid points get PointLabel::kInvalid or kOutOfRange.
   /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan, in a type that
-  /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both are those of a body, such
-  /// as base_link, if RemoverConfig::sensor_origin() is the position of the sensor in it; clouds of
+  /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both may be of a body, such as
+  /// base_link, if RemoverConfig::sensor_origin() is the position of the sensor in it; clouds of
   /// several sensors are pushed one by one. `time`: s, greater than the time of the previous scan;
   /// by default 0 for the first scan, else 0.1 s after the previous scan, or the next double if
   /// 0.1 s is below the resolution.

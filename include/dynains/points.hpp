@@ -21,6 +21,7 @@ enum class PointLabel : std::uint8_t {
   kDynamic,     ///< part of a moving instance; not inserted into the map
 };
 
+/// Whether a point with this label belongs to the static map.
 constexpr bool is_static(PointLabel label) {
   return label == PointLabel::kGround || label == PointLabel::kStatic;
 }
@@ -52,6 +53,7 @@ class Span {
     assert(i < size_);
     return data_[i];
   }
+  /// `offset` + `count` is at most size().
   constexpr Span subspan(std::size_t offset, std::size_t count) const {
     assert(offset + count <= size_);
     return {data_ + offset, count};
@@ -70,6 +72,7 @@ struct PointsView {
 
   std::size_t size() const { return x.size(); }
   bool empty() const { return x.empty(); }
+  /// Points [offset, offset + count), within size().
   PointsView subview(std::size_t offset, std::size_t count) const {
     return {x.subspan(offset, count), y.subspan(offset, count), z.subspan(offset, count)};
   }

@@ -35,7 +35,7 @@ enum class Cause : std::uint8_t {
   kTooLittleFree = 15,     ///< static: too few scans with free space, or too few free samples
   kDynamicOccupancy = 16,  ///< dynamic: most other points in its dynamic grid cell are dynamic
   kCameOrWent = 17,        ///< dynamic: scans of the whole recording saw it come or go
-  kStands = 18,            ///< static: removed at first, but it came to stay
+  kStands = 18,            ///< static: removed by the first pass, but it came to stay
 };
 
 inline constexpr std::size_t kCauseCount = 19;
@@ -97,8 +97,8 @@ struct ScanVerdict {
   double time = 0.0;       ///< s, as pushed
   Pose T_world_sensor = Pose::Identity();
   Span<const PointLabel> labels = {};
-  Span<const std::uint32_t> instances =
-      {};  ///< kNoInstance for ground and points without a cluster
+  /// kNoInstance for ground and points without a cluster.
+  Span<const std::uint32_t> instances = {};
   /// Probability of being dynamic, [0, 1]. It is 0 for points without a belief: static ground,
   /// points without a cluster and, for decision = window, points that were not proposed. For
   /// decision = free_space, all other points have at least 0.5, even if they are occupied or
@@ -163,8 +163,8 @@ struct PoseResidual {
   std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
   double previous_time = 0.0;       ///< s, as pushed
 
-  /// Whether the surfaces tell the error along an axis (0 to 5, as in `covariance`) to 10 cm: three
-  /// standard deviations; rotation: of a point 10 m away.
+  /// Whether the surfaces determine the error along an axis (0 to 5, as in `covariance`) to 10 cm:
+  /// three standard deviations; for a rotation, of a point 10 m away.
   bool is_supported(std::size_t axis) const {
     const double deviation = std::sqrt(covariance[7 * axis]) * (axis < 3 ? 1.0 : 10.0);
     return 3.0 * deviation <= 0.1;
@@ -184,7 +184,7 @@ enum class EpochReason : std::uint8_t {
   kSensor,  ///< first scan with enough points for the model of the sensor
   kPause,   ///< a longer time than `max_gap` since the scan before
   kJump,    ///< the pose jumped: no motion leads to it, or its surfaces fit to the motion before it
-  kMisfit,  ///< its surfaces do not fit to those of earlier scans
+  kMisfit,  ///< its surfaces do not fit to earlier scans
 };
 
 constexpr std::array<const char*, 5> value_names(EpochReason) {

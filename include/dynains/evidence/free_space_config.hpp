@@ -83,8 +83,8 @@ struct FreeSpaceConfig {
         "lateral_margin", self.lateral_margin, closed(0, 1), "m",
         "no sample at a smaller lateral distance from a return, or in its 3x3 cells, is free"});
     visitor(Parameter{"pose_tolerance", self.pose_tolerance, closed(0, 1), "m",
-                      "poses whose static surfaces lie farther than this (rms) from those of "
-                      "earlier scans are corrected for comparisons; 0: never"});
+                      "poses that place static surfaces farther than this (rms) from earlier "
+                      "scans are corrected for comparisons; 0: never"});
     visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
                       "update probability of a reference whose beams pass (as Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",

@@ -135,8 +135,9 @@ class FreeSpaceEvidence {
     return may_move_;
   }
 
-  /// Makes the range image of the newest scan, which is a reference, without what surely moves.
-  /// Call it after the first judge() of the scan. `split`: points of the scan.
+  /// Makes the range image of the newest scan, which is a reference. Points that are certain to
+  /// move only occlude in it. Call it after the first judge() of the scan. `split`: points of the
+  /// scan.
   void make_reference(const GroundSplit& split) {
     const Record& record = record_of(newest_);
     const detail::InstanceEvidence& evidence = record.evidence;
@@ -252,9 +253,10 @@ class FreeSpaceEvidence {
     updater_.update(evidence.samples, visibility, position, evidence.beliefs);
   }
 
-  // Delay (scans) between a new image and the tests of the older scans of a phase against it. The
-  // phases have different delays, which distributes the work over the scans. The delay of phase 0
-  // is one scan, since the scan of phase 0 already makes the image.
+  // Scans are numbered by phase: 0 for references, then 1, 2, ... up to the next reference. Tests
+  // of older scans against a new image are distributed over the pushes that follow: scans of a
+  // phase are tested this many pushes after the image was made. For phase 0 it is one push, because
+  // the push of a reference already makes the image.
   std::uint64_t delay_of(std::uint64_t phase) const {
     return phase == 0 && config_.reference_step > 1 ? 1 : phase;
   }
@@ -312,8 +314,8 @@ class FreeSpaceEvidence {
   bool surely_moves(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
     return judge_.surely_moves(evidence, supervoxel, provisional_.supervoxels[supervoxel].cause);
   }
-  // Whether the instance of a supervoxel is small enough to move, and does not stand still by the
-  // evidence on this scan. Slow vehicles around the sensor would pull its pose along.
+  // Whether the instance of a supervoxel is small enough to move, and is not static by the evidence
+  // on this scan. Slow vehicles around the sensor would bias its pose.
   bool may_move(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
     const std::uint32_t instance = evidence.samples.instance_of[supervoxel];
     return evidence.tracked.shapes[instance].carried &&

@@ -19,7 +19,7 @@
 
 namespace dynains::detail {
 
-/// Largest height above the ground of the lowest return of an object that stands on it: the greater
+/// Maximum height above the ground of the lowest return of an object on it: the greater
 /// of `least` and `slope` * horizontal range. The gap between two beams defines `slope`.
 struct Clearance {
   float least;  ///< m

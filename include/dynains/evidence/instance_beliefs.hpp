@@ -17,11 +17,12 @@
 
 namespace dynains::detail {
 
-/// References that hit a place, or an instance, and show that it stands. Chosen on random worlds.
+/// Number of references whose hits show that a place or an instance is static. Chosen on random
+/// worlds.
 inline constexpr std::uint8_t kFirmHits = 7;
 
-/// An object that stands hides from other sides the surfaces that a scan measured, and beams that
-/// graze its edges pass them. So free samples of a reference on another side are no evidence where
+/// A static object hides the surfaces that a scan measured from other sides, and beams that graze
+/// its edges pass them. So free samples of a reference on another side are no evidence where
 /// references on the side of the scan hit the instance and none of them saw it free.
 class InstanceViews {
  public:
@@ -59,7 +60,7 @@ class InstanceViews {
   }
 
   /// Whether the directions from an instance to the sensor and to a reference differ by more than
-  /// the largest angle on the own side.
+  /// the largest angle of one side.
   bool is_other_side(std::size_t instance, const Position& reference) const {
     const View& view = views_[instance];  // all vectors are scaled by the number of samples
     float product = 0.0F, to_sensor = 0.0F, to_reference = 0.0F;
@@ -73,7 +74,7 @@ class InstanceViews {
   }
 
  private:
-  static constexpr float kCosine = 0.9396926F;  // of 20 deg, the largest angle on the own side
+  static constexpr float kCosine = 0.9396926F;  // of 20 deg, the largest angle of one side
 
   struct View {
     Position sum = {};  // of the positions of the samples

@@ -18,7 +18,7 @@ namespace dynains::detail {
 
 /// The instances of one scan, with links to the instances of the adjacent scans.
 struct TrackedInstances {
-  /// Weighted sums of samples; those of another scan of the track count less.
+  /// Weighted sums of samples; samples of other scans of the track count less.
   struct Seen {
     float moved = 0.0F;  ///< in free supervoxels
     float stood = 0.0F;  ///< in supervoxels that are occupied and not free
@@ -183,7 +183,7 @@ inline void sum_along_tracks(TrackedInstances::Side TrackedInstances::Instance::
                              const std::vector<InstanceBeliefs::Counts>& counts,
                              TrackedInstances& now) {
   // Factors per scan, chosen on random worlds. An object that moved remains dynamic for some time
-  // while it stands.
+  // after it stopped.
   constexpr float kMovedFade = 0.95F, kStoodFade = 0.8F;
   for (std::size_t i = 0; i < now.instances.size(); ++i) {
     TrackedInstances::Side& own = now.instances[i].*side;

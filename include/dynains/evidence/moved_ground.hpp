@@ -60,7 +60,7 @@ class SurroundingGround {
   struct Cell {
     VoxelKey place;
     PlaneMoments moments;        // of its points
-    std::optional<Plane> plane;  // through these and those of the cells around it
+    std::optional<Plane> plane;  // through the points of this cell and of the cells around it
     bool is_fitted = false;
   };
 

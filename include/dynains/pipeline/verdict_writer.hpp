@@ -119,7 +119,7 @@ class VerdictWriter {
 
   std::vector<std::uint8_t> is_kept_;  // by point of the split
   std::vector<std::uint32_t> input_;   // by point of the split
-  std::vector<Group> groups_;          // fixed groups, then those of the evidence
+  std::vector<Group> groups_;          // fixed groups, then the groups of the evidence
 };
 
 }  // namespace dynains::detail

@@ -21,7 +21,7 @@ enum class DecisionStage : std::uint8_t {
   kProposed,     ///< proposed as dynamic; belief and votes decide
 };
 
-/// Verdict of one window on a cluster, or those of all windows so far on a point.
+/// Verdict of one window on a cluster, or the sum of the verdicts of all windows so far on a point.
 struct WindowVerdict {
   float belief = 0.0F;     ///< proposed clusters: highest posterior of all windows
   std::uint8_t votes = 0;  ///< proposed clusters: number of windows with verdict dynamic

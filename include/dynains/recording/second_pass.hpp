@@ -1,4 +1,4 @@
-// Second pass over a recording: all of its scans test what the first pass called static.
+// Second pass over a recording: verdicts by the scans of the whole recording.
 #pragma once
 
 #include <cstddef>
@@ -16,14 +16,14 @@
 
 namespace dynains {
 
-/// The first pass judges a scan by the scans around it: DynaInsRemover. The second one judges it by
-/// all scans of its visit (see Returns). Poses are those by which the first pass compared the
-/// scans. Its verdicts stay in a visit that is so short that it has compared all scans, and in one
-/// with scans that it doubts.
+/// The first pass (DynaInsRemover) judges a scan by the scans around it, the second pass by all
+/// scans of its visit (see Returns), under the poses by which the first pass compared them
+/// (ScanVerdict::compared). Verdicts of the first pass stay in a visit that is short enough for it
+/// to have compared all scans, and in a visit with suspicious scans (see Plausibility).
 ///
 /// Give all scans with their first verdicts to add(), call test(), and give all scans again to
-/// revise(), in the same order. Not for several callers at once. All functions throw what the store
-/// throws.
+/// revise(), in the same order. One thread at a time. All functions throw the exceptions of the
+/// store.
 class SecondPass {
  public:
   /// References, and places and ground far from the sensor, wait in `store`, which outlives this.
@@ -38,13 +38,14 @@ class SecondPass {
   /// nothing.
   void test(const std::function<bool()>& keep_going = [] { return true; });
   /// Revises the first verdict on scan `number`, counted from 0. Returns whether anything changed.
-  /// Points that left have Cause::kCameOrWent, those that came back Cause::kStands or
-  /// Cause::kGround. Throws UsageError if the arrays have not the size of `points`.
+  /// Removed points get Cause::kCameOrWent, restored ones Cause::kStands or Cause::kGround.
+  /// `points`: m, sensor frame, all of the scan. Throws UsageError if the arrays differ in size
+  /// from `points`.
   bool revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);
 
-  /// Places that the sensor came back to after more scans than the first pass compares.
+  /// Returns of the sensor to a place after more scans than the first pass compares.
   const std::vector<ReturnToPlace>& returns() const { return returns_.found(); }
-  /// Whether test() came to its end.
+  /// Whether test() was completed.
   bool is_decided() const { return is_decided_; }
   std::size_t place_count() const { return places_; }
   /// By revise().

@@ -21,21 +21,21 @@ namespace dynains {
 
 struct SecondPassConfig {
   StaticPolicy static_policy = StaticPolicy::kAlways;
-  /// Bytes of places and ground in memory, if those around the sensor take less.
+  /// Bytes of places and ground in memory, unless those near the sensor take more.
   std::size_t memory = std::size_t{160} << 20U;
-  /// Of the first pass: the margins hold for the second one, too, and so does what the first one
-  /// has compared.
+  /// Configuration of the first pass: its margins also hold for the second pass, and its lookback
+  /// and lookahead determine which scans it has compared.
   FreeSpaceConfig evidence;
 };
 
-/// Numbers of points that left, and that came back.
+/// Numbers of points that were removed, and that were restored.
 struct RevisedPoints {
   std::uint64_t removed = 0, restored = 0;
 };
 
 /// Scans whose poses fit to each other. All of them test the places of their points above the
-/// ground. What came or went is removed (see RecordingPlaces), and the ground comes back. Scans of
-/// the visit are numbered from 0. Functions throw what the store throws.
+/// ground. Points of objects that came or left are removed (see RecordingPlaces), removed ground is
+/// restored. Scans of the visit are numbered from 0. Functions throw the exceptions of the store.
 class Visit {
  public:
   /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
@@ -44,9 +44,9 @@ class Visit {
 
   /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.
   void add(PointsView points, const ScanVerdict& verdict);
-  /// Puts all that waits into the store.
+  /// Moves all data into the store.
   void rest();
-  /// Tests all places. Returns false, without a result, if `keep_going()` does.
+  /// Tests all places. Returns false, without a result, as soon as `keep_going()` does.
   bool test(const std::function<bool()>& keep_going);
   /// Revises the first verdict on a scan, after test().
   RevisedPoints revise(PointsView points, std::uint32_t number, VerdictArrays& verdict);

@@ -11,7 +11,7 @@
 
 namespace dynains::detail {
 
-/// Instances of the non-ground points of a scan. Without: no point is on an instance.
+/// Instances of the non-ground points of a scan. Empty: no point is on an instance.
 struct ScanInstances {
   Span<const std::uint32_t> of_point;  ///< below `count`, or kNoCluster
   std::size_t count = 0;
@@ -42,8 +42,8 @@ class MotionStage {
   /// Result of the last correct(), in the frame of its pose; empty without enough common surfaces.
   virtual const std::optional<PoseResidual>& residual() const = 0;
 
-  /// Why the static world of the last scan does not fit to that of the scans before it, so that
-  /// motion and errors of poses cannot be told apart; empty if it fits.
+  /// Why the static surfaces of the last scan do not fit to the scans before, so that motion cannot
+  /// be distinguished from errors of poses; empty if they fit.
   virtual const std::optional<EpochReason>& misfit() const = 0;
 };
 

@@ -36,8 +36,8 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
   }
 }
 
-/// At most kMost points of a scan (m, sensor frame). Tells which of them are on objects that are
-/// small enough to be vehicles or persons.
+/// At most kMost points of a scan (m, sensor frame), each with a flag for objects that are small
+/// enough to be vehicles or persons.
 class AlignmentPoints {
  public:
   static constexpr std::size_t kMost = 3000;
@@ -224,11 +224,12 @@ struct Alignment {
 /// not taken for errors of the pose: the error of all elevations is estimated from scan to scan,
 /// that of the mounting may explain what is wrong with poses that are presumed to be exact.
 ///
-/// The covariance of a step is that of the distances, and that of the choice of surfaces
-/// (jackknife: changes of the step without two adjacent sectors around the sensor). The latter is
-/// large if one object decides about a direction, for example a slow vehicle ahead. Exact poses are
-/// tested with two more: changes without all objects, as traffic starts together, and without bands
-/// of elevation, as beams have biases.
+/// The covariance of a step has a part for the noise of the distances and a part for the choice of
+/// surfaces: a jackknife over overlapping blocks (Kuensch, Ann. Stat. 17(3), 1989), the changes of
+/// the step without two adjacent sectors around the sensor. The latter is large if one object
+/// decides about a direction, for example a slow vehicle ahead. The test of exact poses adds two
+/// parts: the change without all objects, because traffic starts together, and the changes without
+/// bands of elevation, because beams have biases.
 class PlaneAligner {
  public:
   /// Forgets the errors of the sensor.
@@ -345,8 +346,8 @@ class PlaneAligner {
   }
 
   // Calls `add(match, derivatives, weight)` for each match. `scale` (m): larger distances have
-  // little weight (Geman-McClure). The points of one plane share its error, so that all of them
-  // weigh at most as much as kMost points.
+  // little weight (Geman and McClure 1987). The points of one plane share its error, so that all of
+  // them weigh at most as much as kMost points.
   template <class Add>
   void weigh_matches(double scale, Add&& add) const {
     constexpr double kMost = 8.0;
@@ -409,7 +410,9 @@ class PlaneAligner {
     return squared >= kOfExact * kOfExact;
   }
 
-  // The expected step by its covariance, if steps of this size are usual.
+  // The update of a Kalman filter (Kalman 1960) from a zero prior: the covariance of the prior has
+  // a standard deviation of a quarter of the step along each axis, `covariance` is that of the
+  // measurement.
   static PoseStep supported_part(const PoseStep& found, const PoseCovariance& covariance) {
     PoseStep variances;
     PoseCovariance sum = covariance;
@@ -489,8 +492,8 @@ class PlaneAligner {
     }
   }
 
-  // Where the surfaces tell nothing, attractions keep the first estimate and its error, a standard
-  // deviation of 1 m.
+  // In directions that the surfaces do not determine, attractions keep the first estimate and its
+  // error, a standard deviation of 1 m.
   static void add_first_error(const Equations::Matrix& inverse, PoseCovariance& covariance) {
     for (std::size_t k = 0; k < 6; ++k) {
       const double kept = kAttraction[k] / (k < 3 ? 1.0 : kLever);

@@ -1,5 +1,4 @@
-// Correction of poses for the comparison of scans: how far the static world of a scan lies from
-// that of the scans before it.
+// Correction of poses for the comparison of scans, by registration of static surfaces.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -18,7 +17,7 @@
 
 namespace dynains::detail {
 
-/// Continues the motion of a sensor, and tells motions that no sensor makes.
+/// Extrapolates the motion of a sensor, and recognizes motions that no sensor makes.
 class MotionPrediction {
  public:
   /// Forgets all poses and times.
@@ -84,8 +83,8 @@ class MotionPrediction {
 /// Aligns each scan with the planes of earlier scans of its epoch. If a pose is inexact, so that
 /// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose.
 /// Directions in which the planes do not support the correction stay as they were pushed. What two
-/// scans in a row agree on is a lasting offset and applies to later poses, too. Exact poses stay as
-/// they are, bit by bit.
+/// scans in a row agree on is a lasting offset and applies to later poses, too. Exact poses stay,
+/// bit by bit.
 class PoseCorrection final : public MotionStage {
  public:
   /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays.

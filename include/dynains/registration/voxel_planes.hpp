@@ -20,7 +20,7 @@ namespace dynains::detail {
 inline constexpr std::size_t kSensorErrors = 3;
 using SensorErrors = std::array<std::array<float, 3>, kSensorErrors>;
 
-/// Those of the point (x, y, z) (m, sensor frame).
+/// SensorErrors of the point (x, y, z) (m, sensor frame).
 inline SensorErrors sensor_errors(const Pose& T_map_sensor, double x, double y, double z) {
   const double distance = std::sqrt(x * x + y * y);
   const double along = distance > 0.0 ? -z / distance : 0.0;

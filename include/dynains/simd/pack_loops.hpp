@@ -121,7 +121,7 @@ struct PackSlice : Packs {
   typename Packs::Int load(const std::uint32_t* from) const {
     return load_as<typename Packs::Int>(reinterpret_cast<const std::int32_t*>(from));
   }
-  /// The first size() numbers of `a`, then those of `b`.
+  /// The first size() numbers of `a`, then the numbers of `b`.
   typename Packs::Float padded(const typename Packs::Float& a,
                                const typename Packs::Float& b) const {
     if constexpr (!kTail) return a;
