@@ -56,7 +56,7 @@ struct CellSurface {
 class SurfaceGrid {
  public:
   /// `with_clutter`: whether clutter counts, and larger cells where a cell has no surface. In one
-  /// scan clutter is persons and noise, in a map of many scans it tells places, too.
+  /// scan clutter is persons and noise; in a map of many scans it also shows where a scan is.
   /// `scale`: ratio of the edges of cells and kCellEdges; less in rooms that are narrower.
   explicit SurfaceGrid(bool with_clutter = false, double scale = 1.0)
       : with_clutter_(with_clutter), scale_(scale) {}

@@ -15,7 +15,7 @@
 
 namespace dynains {
 
-/// Fewer landmarks of a scan tell nothing of its motion.
+/// Number of landmarks from which on a scan determines its motion.
 inline constexpr std::size_t kFewestLandmarks = 60;
 /// Nearer points (m) of two scans agree.
 inline constexpr double kAgreeing = 0.3;
@@ -45,8 +45,8 @@ class Landmarks {
   std::unique_ptr<Tree> tree_;
 };
 
-/// The step of a sample of about 40,000 points of a scan. Odd, since scans have their beams in
-/// turn.
+/// The step of a sample of about 40,000 points of a scan. It is odd: scans list their beams in
+/// turn, and their number is even, so an even step would leave out half of the beams.
 inline std::size_t sample_step(const RecordedScan& scan) { return 1 + 2 * (scan.size() / 80000); }
 
 /// A sample of the measured points of a scan, m, sensor frame.

@@ -86,7 +86,7 @@ std::vector<RecordingOptions> other_options(const Recording& recording) {
   const bool is_world = recording.frame() == PointFrame::kWorld;
   if (has_wrong_origin(recording)) add([](RecordingOptions& o) { o.sensor_origin.setZero(); });
   if (recording.columns().time && !is_world) add([](RecordingOptions& o) { o.deskew = !o.deskew; });
-  // A short way tells little, but what is proposed must agree, too.
+  // A short way is weak evidence, but a proposal must also agree.
   constexpr double kLeastWay = 1.0;  // m
   if (recording.size() > 0 && follow_sensor(recording, kLeastWay) == !is_world) {
     add([&](RecordingOptions& o) {

@@ -84,10 +84,11 @@ std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
   return CheckedMotion{forth->T_a_b, difference, deviation};
 }
 
-/// Completes a registration by planes that leaves a direction open: landmarks tell the way along
-/// it, less than `farthest` (m) from what planes say. The least certain direction is not always the
-/// open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree better without
-/// motion along it, or with the distant motion `given`: they can meet by oncoming traffic.
+/// Completes a registration by planes that leaves a direction open: landmarks determine the motion
+/// along it, less than `farthest` (m) from the registration. The least certain direction is not
+/// always the open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree
+/// better without motion along it, or with the distant motion `given`: they can meet by oncoming
+/// traffic.
 std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
                                       const Registration& by_planes, const Pose& given,
                                       double farthest) {
@@ -214,9 +215,9 @@ std::vector<Eigen::Matrix3d> axis_rotations() {
   return rotations;
 }
 
-/// Scans at which chains begin, evenly spread. A recording that stands for most of the time says in
-/// the rest what its poses mean: where they move for three steps or more, since one step alone may
-/// be a jump. It has two scans or more.
+/// Scans at which chains begin, evenly spread. If the sensor is at rest for most of the time, they
+/// begin where the poses move for three steps or more, since one step alone may be a jump. The
+/// recording has two scans or more.
 std::vector<std::size_t> starts_of_chains(const Recording& recording) {
   constexpr std::size_t kChains = 12, kApart = 4;
   const std::size_t all = recording.size() - 1;

@@ -26,12 +26,11 @@ struct RegisteredMotion {
   double deviation;  ///< m, of a direction that landmarks determine; 0: none
 };
 
-/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If it
-/// stands for most of the time, the places are where its poses move. The given poses are one of
-/// several first guesses. Pairs that determine no motion are left out, and those whose landmarks
-/// meet better under the given poses. Three places at a time are far apart: `suffice` tells of the
-/// motions so far whether further places are needed. If six show none, no others are tried. Throws
-/// IoError.
+/// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If the
+/// sensor is at rest for most of the time, the places are where its poses move. The given poses are
+/// one of several first guesses. Pairs that determine no motion are left out, and pairs whose
+/// landmarks match better under the given poses. Places are tried three at a time, far apart, until
+/// `suffice` returns true for the motions so far, or six places show no motion. Throws IoError.
 std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);

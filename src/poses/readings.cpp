@@ -14,7 +14,8 @@ namespace {
 
 using Motions = std::vector<RegisteredMotion>;
 
-/// The order of quaternions that is neither given nor, else, that of the format; kNone without any.
+/// The order of quaternions that is not in use: other than the given one, or than the order of the
+/// format if none is given. kNone without quaternions.
 QuaternionOrder other_order(const Recording& recording) {
   if (!recording.has_quaternions()) return QuaternionOrder::kNone;
   QuaternionOrder order = recording.convention().quaternion;

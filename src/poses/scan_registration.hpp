@@ -39,7 +39,8 @@ inline constexpr double kAlmost = 0.93;
 inline constexpr std::size_t kFewestMatches = 100;
 /// Score that registrations of other places hardly reach, of dense scans.
 inline constexpr double kLeastScore = 0.45;
-/// Deviation (m) of the translation of a registration that tells where a scan or a session is.
+/// Maximum standard deviation (m) of the translation of a registration that places a scan or
+/// session.
 inline constexpr double kMostUncertain = 0.05;
 
 /// A component of the translation that is known otherwise.
