@@ -13,12 +13,8 @@
 
 namespace dynains::detail {
 
-/// Number of the group of points that have a label without evidence: of kGround and those before.
-constexpr std::uint32_t fixed_group(PointLabel label) { return static_cast<std::uint32_t>(label); }
-
-/// Holds the verdict on one scan, by input point, and writes it by group of points, because random
-/// access to several arrays dominates the cost. One writer serves all scans in turn, so that
-/// open scans need no arrays of their own.
+/// Holds the verdict on one scan, by input point. One writer serves all scans in turn, so that open
+/// scans need no arrays of their own.
 class VerdictWriter {
  public:
   /// Keep flags of the last write_flags(), by point of the split (ground first): 1 if static.
@@ -27,38 +23,40 @@ class VerdictWriter {
   /// Writes the verdict on a scan, which is valid until the next call.
   ScanVerdict write(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     const std::size_t count = scan.input.size();
-    resize_with_margin(labels_, count);
-    resize_with_margin(beliefs_, count);
-    resize_with_margin(causes_, count);
-    ensure_capacity(group_of_input_, count);
-    group_of_input_.assign(count, fixed_group(PointLabel::kGround));
-    resize_with_margin(instances_, count);
-    scan.input.copy_to(input_);
-    const std::uint32_t* const input = input_.data() + scan.split.ground_count;
-    groups_.resize(kFirstGroup);
-    for (const PointLabel label : {PointLabel::kInvalid, PointLabel::kOutOfRange}) {
-      groups_[fixed_group(label)].label = label;
-    }
-    groups_[fixed_group(PointLabel::kGround)] = Group({Cause::kGround, 0.0F});
-    groups_.insert(groups_.end(), evidence.groups.begin(), evidence.groups.end());
+    const Group ground({Cause::kGround, 0.0F});
+    assign(labels_, count, ground.label);
+    assign(causes_, count, ground.cause);
+    assign(beliefs_, count, ground.belief);
+    assign(instances_, count, ground.instance);
+    groups_.assign(evidence.groups.begin(), evidence.groups.end());
     for (std::size_t i = 0; i < evidence.cluster_of.size(); ++i) {
       const std::uint32_t cluster = evidence.cluster_of[i];
-      if (cluster != kNoCluster) groups_[kFirstGroup + 1 + i].instance = scan.ids[cluster];
+      if (cluster != kNoCluster) groups_[1 + i].instance = scan.ids[cluster];
     }
-    // The group of each input point comes first, so that the arrays are written sequentially.
-    std::uint32_t* const group_of = group_of_input_.data();
-    for (std::size_t i = scan.split.count; i < count; ++i) {
-      group_of[input_[i]] =
-          fixed_group(i < scan.valid ? PointLabel::kOutOfRange : PointLabel::kInvalid);
-    }
+    scan.input.copy_to(input_);
+    const std::uint32_t* const input = input_.data();
+    const std::uint32_t* const group_of = evidence.group_of.data();
+    const Group* const groups = groups_.data();
+    // With the addresses of the arrays: a store of a byte could alias members.
+    const auto write_to = [labels = labels_.data(), causes = causes_.data(),
+                           beliefs = beliefs_.data(),
+                           instances = instances_.data()](std::size_t i, const Group& group) {
+      beliefs[i] = group.belief;
+      instances[i] = group.instance;
+      causes[i] = group.cause;
+      labels[i] = group.label;
+    };
     for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
-      group_of[input[i]] = kFirstGroup + evidence.group_of[i];
+      write_to(input[scan.split.ground_count + i], groups[group_of[i]]);
     }
-    for (const EvidenceVerdict::GroundPoint& ground : evidence.ground) {
-      group_of[input_[ground.point]] = static_cast<std::uint32_t>(groups_.size());
-      groups_.emplace_back(ground.verdict);
+    for (const EvidenceVerdict::GroundPoint& point : evidence.ground) {
+      write_to(input[point.point], point.verdict);
     }
-    expand_groups(count);
+    Group unjudged;
+    for (std::size_t i = scan.split.count; i < count; ++i) {
+      unjudged.label = i < scan.valid ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+      write_to(input[i], unjudged);
+    }
     return {scan.scan, scan.time, scan.T_world_sensor, labels_, instances_,
             beliefs_,  causes_,   scan.compared};
   }
@@ -67,7 +65,7 @@ class VerdictWriter {
   void write_flags(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     is_kept_.assign(scan.split.count, 1);
     const std::uint32_t* const group_of = evidence.group_of.data();
-    const Group* const groups = groups_.data() + kFirstGroup;
+    const Group* const groups = groups_.data();
     std::uint8_t* const is_kept = is_kept_.data() + scan.split.ground_count;
     for (std::size_t i = 0; i < evidence.group_of.size(); ++i) {
       is_kept[i] = groups[group_of[i]].label == PointLabel::kDynamic ? 0 : 1;
@@ -91,23 +89,10 @@ class VerdictWriter {
     Cause cause = Cause::kNotJudged;
   };
 
-  static constexpr std::uint32_t kFirstGroup = fixed_group(PointLabel::kGround) + 1;  // of evidence
-
-  void expand_groups(std::size_t count) {
-    // Local copies of members avoid reloads after byte stores, which could alias them.
-    const std::uint32_t* const group_of = group_of_input_.data();
-    const Group* const groups = groups_.data();
-    PointLabel* const labels = labels_.data();
-    Cause* const causes = causes_.data();
-    float* const beliefs = beliefs_.data();
-    std::uint32_t* const instances = instances_.data();
-    for (std::size_t i = 0; i < count; ++i) {
-      const Group group = groups[group_of[i]];
-      beliefs[i] = group.belief;
-      instances[i] = group.instance;
-      causes[i] = group.cause;
-      labels[i] = group.label;
-    }
+  template <class T>
+  static void assign(std::vector<T>& values, std::size_t count, T value) {
+    ensure_capacity(values, count);
+    values.assign(count, value);
   }
 
   // By input point.
@@ -115,11 +100,10 @@ class VerdictWriter {
   std::vector<std::uint32_t> instances_;
   std::vector<float> beliefs_;
   std::vector<Cause> causes_;
-  std::vector<std::uint32_t> group_of_input_;
 
   std::vector<std::uint8_t> is_kept_;  // by point of the split
   std::vector<std::uint32_t> input_;   // by point of the split
-  std::vector<Group> groups_;          // fixed groups, then the groups of the evidence
+  std::vector<Group> groups_;          // of the evidence
 };
 
 }  // namespace dynains::detail
