@@ -99,21 +99,26 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     scan.ids.resize(kClusters);
     for (std::uint32_t c = 0; c < kClusters; ++c) scan.ids[c] = 100 + c;
 
-    scan.windows.point_runs = random_runs(random, points);
-    const std::vector<std::uint32_t> first_cluster = by_point(scan.windows.point_runs);
+    const std::vector<PointRun> first_runs = random_runs(random, points);
+    const std::vector<std::uint32_t> cluster_of = by_point(first_runs);
     std::vector<Votes> expected(points);
     const auto add = [&](const std::vector<PointRun>& point_runs,
                          const std::vector<WindowVerdict>& verdicts) {
-      const std::vector<std::uint32_t> cluster_of = by_point(point_runs);
-      for (std::size_t i = 0; i < points; ++i) expected[i].add(cluster_of[i], verdicts);
+      const std::vector<std::uint32_t> clusters = by_point(point_runs);
+      for (std::size_t i = 0; i < points; ++i) expected[i].add(clusters[i], verdicts);
     };
     const auto check = [&](int votes) {
-      std::vector<EvidenceVerdict::Group> groups(points + 1);
-      std::vector<std::uint32_t> group_of(points);
-      std::iota(group_of.begin(), group_of.end(), 1U);
-      for (std::size_t i = 0; i < points; ++i) {
-        groups[i + 1] = detail::point_verdict(scan.windows.points[i], votes);
-      }
+      std::vector<EvidenceVerdict::Group> groups(1);
+      std::vector<std::uint32_t> group_of, first_cluster;
+      detail::for_each_common_run(
+          scan.windows.runs, scan.windows.point_runs,
+          [&](std::uint32_t begin, std::uint32_t end, const auto& run, const auto& point_run) {
+            REQUIRE(begin == group_of.size());
+            group_of.resize(end, static_cast<std::uint32_t>(groups.size()));
+            groups.push_back(detail::point_verdict(run.verdict, votes));
+            first_cluster.push_back(point_run.cluster);
+          });
+      REQUIRE(group_of.size() == points);
       const EvidenceVerdict evidence = {groups, first_cluster, group_of, {}};
       const ScanVerdict verdict = writer.write(scan, evidence);
       writer.write_flags(scan, evidence);
@@ -126,7 +131,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
         REQUIRE(verdict.beliefs[to] == expected[i].belief);
         REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
         REQUIRE(verdict.instances[to] ==
-                (first_cluster[i] == kNoCluster ? kNoInstance : 100 + first_cluster[i]));
+                (cluster_of[i] == kNoCluster ? kNoInstance : 100 + cluster_of[i]));
       }
       for (std::size_t i = 0; i < ground; ++i) {
         const std::uint32_t to = order[i];
@@ -144,9 +149,10 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
     };
 
     const std::vector<WindowVerdict> first = random_verdicts(random);
-    add(scan.windows.point_runs, first);
-    scan.windows.points.assign(points, WindowVerdict());
-    scan.windows.record(scan.windows.point_runs, first);
+    add(first_runs, first);
+    std::vector<detail::WindowVotes::Run> merged;
+    scan.windows.begin(first_runs);
+    scan.windows.record(first_runs, first, merged);
     check(1);
 
     const std::size_t windows = random.index(4);
@@ -154,7 +160,7 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       const std::vector<PointRun> point_runs = random_runs(random, points);
       const std::vector<WindowVerdict> verdicts = random_verdicts(random);
       add(point_runs, verdicts);
-      scan.windows.record(point_runs, verdicts);
+      scan.windows.record(point_runs, verdicts, merged);
     }
     check(1 + static_cast<int>(random.index(3)));
   }

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -46,16 +45,9 @@ class InstanceIds {
               std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
     candidate_.assign(cluster_count, kNoCluster);
     lead_.assign(cluster_count, 0);
-    const ClusterSet::PointRun* old = old_runs.begin();
-    for (const ClusterSet::PointRun& point_run : point_runs) {
-      std::uint32_t begin = point_run.begin;
-      while (begin < point_run.end) {
-        const std::uint32_t end = std::min(old->end, point_run.end);
-        vote(point_run.cluster, old->cluster, end - begin);
-        begin = end;
-        if (old->end == end) ++old;
-      }
-    }
+    for_each_common_run(point_runs, old_runs,
+                        [this](std::uint32_t begin, std::uint32_t end, const auto& run,
+                               const auto& old) { vote(run.cluster, old.cluster, end - begin); });
     propagate(candidate_, old_ids, ids);
   }
 
@@ -224,16 +216,18 @@ class WindowDecision final : public ScanDecision {
   // The windows have voted already.
   void judge(const ScanSlot&, bool) override {}
   EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) override {
-    const std::vector<WindowVerdict>& points = scan.windows.points;
-    resize_with_margin(groups_, points.size() + 1);
-    resize_with_margin(group_of_, points.size());  // each point is a group
-    std::iota(group_of_.begin(), group_of_.end(), 1U);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      groups_[i + 1] = point_verdict(points[i], is_final ? std::max(1, votes_) : 1);
-    }
-    ensure_capacity(cluster_of_, points.size());
+    groups_.assign(1, {});
     cluster_of_.clear();
-    for (const auto& run : scan.windows.point_runs) cluster_of_.resize(run.end, run.cluster);
+    resize_with_margin(group_of_, scan.non_ground_count());
+    for_each_common_run(
+        scan.windows.runs, scan.windows.point_runs,
+        [&](std::uint32_t begin, std::uint32_t end, const WindowVotes::Run& run,
+            const ClusterSet::PointRun& point_run) {
+          const auto group = static_cast<std::uint32_t>(groups_.size());
+          groups_.push_back(point_verdict(run.verdict, is_final ? std::max(1, votes_) : 1));
+          cluster_of_.push_back(point_run.cluster);
+          std::fill(&group_of_[begin], group_of_.data() + end, group);
+        });
     return {groups_, cluster_of_, group_of_, {}};
   }
 
@@ -319,14 +313,10 @@ class WindowDecision final : public ScanDecision {
   // Records the verdicts on clusters as votes on the points of every scan in the window.
   void record(ScanRing& scans, std::uint64_t first_scan) {
     ScanSlot& newest = scans.newest();
-    const Span<const ClusterSet::PointRun> runs = clusters_.point_runs(clusters_.scan_count() - 1);
-    ensure_capacity(newest.windows.point_runs, runs.size());
-    newest.windows.point_runs.assign(runs.begin(), runs.end());
+    newest.windows.begin(clusters_.point_runs(clusters_.scan_count() - 1));
     assign_ids(scans);
-    ensure_capacity(newest.windows.points, newest.non_ground_count());
-    newest.windows.points.assign(newest.non_ground_count(), WindowVerdict());
     for (std::uint64_t scan = votes_ == 0 ? newest.scan : first_scan; scan <= newest.scan; ++scan) {
-      scans[scan].windows.record(clusters_.point_runs(scan - first_scan), verdicts_);
+      scans[scan].windows.record(clusters_.point_runs(scan - first_scan), verdicts_, merged_);
     }
   }
 
@@ -355,7 +345,8 @@ class WindowDecision final : public ScanDecision {
   typename Stages::Belief belief_;
   ClusterSet clusters_;
   std::vector<WindowVerdict> verdicts_;         // by cluster of the current window
-  std::vector<EvidenceVerdict::Group> groups_;  // none, then by non-ground point
+  std::vector<WindowVotes::Run> merged_;        // working memory
+  std::vector<EvidenceVerdict::Group> groups_;  // none, then by run of points
   std::vector<std::uint32_t> cluster_of_, group_of_;
   InstanceIds instance_ids_;
 };

@@ -32,19 +32,63 @@ struct WindowVerdict {
     votes = static_cast<std::uint8_t>(votes + other.votes);
     stage = std::max(stage, other.stage);
   }
+  friend bool operator==(const WindowVerdict& a, const WindowVerdict& b) {
+    return a.belief == b.belief && a.votes == b.votes && a.stage == b.stage;
+  }
 };
 
-/// Accumulated verdicts of all windows so far.
+/// Calls `visit(begin, end, a, b)` for the parts into which two lists of runs cut the same points.
+template <class Runs, class Others, class Visitor>
+void for_each_common_run(const Runs& runs, const Others& others, Visitor&& visit) {
+  std::uint32_t begin = 0;
+  auto other = others.begin();
+  for (const auto& run : runs) {
+    while (begin < run.end) {
+      const std::uint32_t end = std::min(run.end, other->end);
+      visit(begin, end, run, *other);
+      begin = end;
+      if (other->end == end) ++other;
+    }
+  }
+}
+
+/// Accumulated verdicts of all windows so far on the non-ground points of one scan, in the order of
+/// its split. Neighbours mostly share them.
 struct WindowVotes {
-  std::vector<WindowVerdict> points;  ///< by non-ground point of one scan in the order of its split
+  /// The points from the end of the run before on.
+  struct Run {
+    std::uint32_t end;
+    WindowVerdict verdict;
+  };
+  std::vector<Run> runs;
   std::vector<ClusterSet::PointRun> point_runs;  ///< in the window that ends with the scan
 
-  /// Adds the verdicts of one window, by cluster. `runs`: point runs of the scan in that window.
-  void record(Span<const ClusterSet::PointRun> runs, Span<const WindowVerdict> verdicts) {
-    for (const ClusterSet::PointRun& run : runs) {
-      if (run.cluster == kNoCluster) continue;
-      for (std::size_t i = run.begin; i < run.end; ++i) points[i].add(verdicts[run.cluster]);
-    }
+  /// Begins with no votes, for a scan with these point runs.
+  void begin(Span<const ClusterSet::PointRun> of_scan) {
+    ensure_capacity(point_runs, of_scan.size());
+    point_runs.assign(of_scan.begin(), of_scan.end());
+    runs.clear();
+    if (!of_scan.empty()) runs.push_back({point_runs.back().end, {}});
+  }
+
+  /// Adds the verdicts of one window, by cluster. `in_window`: point runs of the scan in that
+  /// window. `merged`: working memory.
+  void record(Span<const ClusterSet::PointRun> in_window, Span<const WindowVerdict> verdicts,
+              std::vector<Run>& merged) {
+    merged.clear();
+    for_each_common_run(
+        runs, in_window,
+        [&](std::uint32_t, std::uint32_t end, const Run& run, const ClusterSet::PointRun& other) {
+          WindowVerdict verdict = run.verdict;
+          if (other.cluster != kNoCluster) verdict.add(verdicts[other.cluster]);
+          if (!merged.empty() && merged.back().verdict == verdict) {
+            merged.back().end = end;
+          } else {
+            merged.push_back({end, verdict});
+          }
+        });
+    ensure_capacity(runs, merged.size());
+    runs.assign(merged.begin(), merged.end());
   }
 };
 
