@@ -191,9 +191,9 @@ class OccupancyDescriptor {
       Float azimuth_low = first_azimuth, azimuth_high = first_azimuth;
       Float wrapped_low = first_wrapped, wrapped_high = first_wrapped;
       const auto extend = [&](const auto& at) {
-        const Float range = at.padded(at.load(points.range.data()), first_range);
-        const Float azimuth = at.padded(at.load(points.azimuth.data()), first_azimuth);
-        const Float z = at.padded(at.load(points.z.data()), first_z);
+        const Float range = at.padded(at.load_all(points.range.data()), first_range);
+        const Float azimuth = at.padded(at.load_all(points.azimuth.data()), first_azimuth);
+        const Float z = at.padded(at.load_all(points.z.data()), first_z);
         range_low = min(range_low, range);
         range_high = max(range_high, range);
         z_low = min(z_low, z);
@@ -324,15 +324,15 @@ class OccupancyDescriptor {
     const PackConstant last_azimuth(static_cast<float>(azimuth_cells_ - 1));
     const auto raise = [&](auto at) {
       using Float = typename decltype(at)::Float;
-      const Float radial = (at.load(points.range.data()) - range_min) * cells_per_metre;
-      Float offset = at.load(points.azimuth.data()) - azimuth_min;
+      const Float radial = (at.load_all(points.range.data()) - range_min) * cells_per_metre;
+      Float offset = at.load_all(points.azimuth.data()) - azimuth_min;
       offset = offset + keep(offset < just_below, Float(turn));
       const Float angular = max(offset * cells_per_radian, zero);
       std::int32_t cell[detail::kPackWidth];
       float height[detail::kPackWidth];
       (multiply(truncate(min(radial, last_radial)), row) + truncate(min(angular, last_azimuth)))
           .store(cell);
-      const Float above = at.load(points.z.data()) - z_min;
+      const Float above = at.load_all(points.z.data()) - z_min;
       keep(Float(lowest) < above, above).store(height);
       const std::size_t size = at.size();
       for (std::size_t i = 0; i < size; ++i) {

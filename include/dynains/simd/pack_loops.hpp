@@ -121,6 +121,10 @@ struct PackSlice : Packs {
   typename Packs::Int load(const std::uint32_t* from) const {
     return load_as<typename Packs::Int>(reinterpret_cast<const std::int32_t*>(from));
   }
+  /// The numbers of an array from `begin` on, also those behind `end`, which must exist.
+  typename Packs::Float load_all(const float* from) const {
+    return Packs::Float::load(from + begin);
+  }
   /// The first size() numbers of `a`, then the numbers of `b`.
   typename Packs::Float padded(const typename Packs::Float& a,
                                const typename Packs::Float& b) const {
