@@ -1,0 +1,125 @@
+// Cost of a push by stage, on one thread: milliseconds, and instructions where the system lets a
+// program count its own.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#if defined(__linux__)
+#include <linux/perf_event.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
+
+#include "dynains/compiled_remover.hpp"
+#include "support/scene.hpp"
+
+namespace dynains::bench {
+namespace {
+
+// Scans of about 110,000 points on a long lane between pillars with one van, at 10 Hz and 10 m/s.
+std::vector<test::Scan> street_scans() {
+  test::Scene scene;
+  for (int i = -5; i < 12; ++i) {
+    for (const double y : {-14.0, -9.0, 9.0, 14.0}) {
+      scene.boxes.push_back({{8.0 * i - 1.0, y - 1.5, 0.0}, {8.0 * i + 1.5, y + 1.0, 4.0}});
+    }
+  }
+  scene.boxes.push_back(test::van(12.0, 3.5, {-6.0, 0.0, 0.0}));
+  return test::drive(scene, 16, 10.0);
+}
+
+// Counts the instructions of this program, in user space.
+class InstructionCounter {
+ public:
+  InstructionCounter() {
+#if defined(__linux__)
+    perf_event_attr what = {};
+    what.size = sizeof(what);
+    what.type = PERF_TYPE_HARDWARE;
+    what.config = PERF_COUNT_HW_INSTRUCTIONS;
+    what.exclude_kernel = 1;
+    what.exclude_hv = 1;
+    file_ = static_cast<int>(syscall(SYS_perf_event_open, &what, 0, -1, -1, 0));
+#endif
+  }
+
+  // Instructions so far; 0 if the system does not count them.
+  std::uint64_t count() const {
+    std::uint64_t result = 0;
+#if defined(__linux__)
+    if (file_ < 0 || read(file_, &result, sizeof(result)) != sizeof(result)) return 0;
+#endif
+    return result;
+  }
+
+ private:
+  [[maybe_unused]] int file_ = -1;  // open until the program ends
+};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+using Rows = std::vector<std::pair<std::string, double>>;
+
+// Medians over the pushes after all references and verdicts of a full history, back and forth on
+// one lane, so that the map stops growing.
+Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>& scans) {
+  constexpr std::size_t kWarmUp = 48, kPushes = 96;
+  const InstructionCounter instructions;
+  DynaInsRemover remover(config);
+  std::vector<StageTimes> times;
+  std::vector<double> millions;
+  for (std::size_t i = 0; i < kPushes; ++i) {
+    const std::size_t at = i % (2 * scans.size());
+    const test::Scan& scan = scans[at < scans.size() ? at : 2 * scans.size() - 1 - at];
+    const std::uint64_t before = instructions.count();
+    const StageTimes spent =
+        remover.push(scan.points, scan.T_world_sensor, 0.1 * static_cast<double>(i)).times;
+    if (i < kWarmUp) continue;
+    times.push_back(spent);
+    millions.push_back(1e-6 * static_cast<double>(instructions.count() - before));
+  }
+  Rows rows;
+  const auto add = [&](const std::string& name, auto&& value) {
+    std::vector<double> values;
+    for (const StageTimes& spent : times) values.push_back(value(spent));
+    rows.emplace_back(name, median(std::move(values)));
+  };
+  std::vector<std::string> stages;
+  StageTimes::visit(times.front(), [&](const char* name, double) { stages.emplace_back(name); });
+  for (const std::string& stage : stages) {
+    add(stage + ", ms", [&](const StageTimes& spent) {
+      double result = 0.0;
+      StageTimes::visit(spent, [&](const char* name, double milliseconds) {
+        if (stage == name) result = milliseconds;
+      });
+      return result;
+    });
+  }
+  add("all stages, ms", [](const StageTimes& spent) { return spent.total(); });
+  const double counted = median(std::move(millions));
+  if (counted > 0.0) rows.emplace_back("instructions, millions", counted);
+  return rows;
+}
+
+}  // namespace
+}  // namespace dynains::bench
+
+int main() {
+  using dynains::DynaInsRemover;
+  const auto scans = dynains::bench::street_scans();
+  const auto standard = dynains::bench::measure(DynaInsRemover::Config(), scans);
+  const auto paper = dynains::bench::measure(DynaInsRemover::Config::paper(), scans);
+  std::printf("%-24s %10s %10s\n", "median of a push", "default", "paper");
+  for (std::size_t i = 0; i < paper.size(); ++i) {
+    std::printf("%-24s %10.2f %10.2f\n", paper[i].first.c_str(), standard[i].second,
+                paper[i].second);
+  }
+}
