@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "simulation/materials.hpp"
-#include "simulation/model_parts.hpp"
 #include "simulation/random.hpp"
 #include "simulation/scenes/layout.hpp"
 #include "simulation/simulator.hpp"
@@ -39,12 +38,12 @@ Object object_of(ChangeKind kind, Random& random) {
     case ChangeKind::kTree:
       object.label = semantic::kVegetation;
       object.size = {0.4, 0.4, 7.0};
-      object.model = tree_model(7.0, 1.8, 2.4, random);
+      object.model = tree_model(false, 7.0, 1.8, 2.4, random);
       break;
     case ChangeKind::kContainer:
       object.label = semantic::kOtherObject;
       object.size = {4.0, 1.6, 1.7};
-      object.model = {block(kMaterials.street_furniture, -2.0, 2.0, -0.8, 0.8, 0, 1.7)};
+      object.model = Model().block(kMaterials.street_furniture, -2, 2, -0.8, 0.8, 0, 1.7);
       break;
   }
   return object;

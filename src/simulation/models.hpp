@@ -3,12 +3,28 @@
 
 #include <vector>
 
-#include "simulation/primitive.hpp"
+#include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {
 
-using Model = std::vector<Primitive>;
+/// Primitives in the axes of the model. Each function adds one; lengths in m.
+struct Model : std::vector<Primitive> {
+  /// Corner-to-corner box, whose sides at the top have moved inwards by `taper_x`, `taper_y`.
+  Model& block(const Material& material, double x0, double x1, double y0, double y1, double z0,
+               double z1, double taper_x = 0, double taper_y = 0);
+  Model& post(const Material& material, double x, double y, double z0, double z1, double radius);
+  /// A cylinder along `rotation` times z.
+  Model& rod(const Material& material, Vec3 centre, double radius, double length,
+             const Mat3& rotation);
+  /// A wheel that stands on the ground, across the x axis.
+  Model& wheel(const Material& material, double x, double y, double radius, double half_width);
+  Model& ball(const Material& material, double x, double y, double z, double rx, double ry,
+              double rz, const Mat3& rotation = {});
+  /// A limb that hangs from (x, y, z), turned by `swing` (rad) about the y axis.
+  Model& limb(const Material& material, double x, double y, double z, double length, double radius,
+              double swing);
+};
 
 enum class Kind { kCar, kVan, kTruck, kBus, kPedestrian, kCyclist };
 
@@ -28,20 +44,21 @@ Model pedestrian_model(const Size& size, std::uint64_t seed, double phase, doubl
                        bool pushes_pram = false);
 Model cyclist_model(const Size& size, std::uint64_t seed, double phase);
 
-Model tree_model(double height, double crown_radius, double clear_height, Random& random);
-Model bush_model(double radius, double height, Random& random);
-/// Plants with gaps: branches with separate clumps of leaves; a third of the trees are bare.
-Model open_tree_model(double height, double crown_radius, double clear_height, Random& random);
-Model open_bush_model(double radius, double height, Random& random);
-Model open_hedge_model(double length, double width, double height, Random& random);
+/// Plants. `open`: with gaps between separate clumps of leaves; a third of the trees are bare.
+Model tree_model(bool open, double height, double crown_radius, double clear_height,
+                 Random& random);
+Model bush_model(bool open, double radius, double height, Random& random);
+Model hedge_model(bool open, double length, double width, double height, Random& random);
+
 Model pole_model(double height, bool lamp, bool sign, Random& random);
 /// Front along x, `depth` to the left (y from 0 to depth), base below the ground.
 Model building_model(double length, double depth, double height, Random& random);
 Model fence_model(double length, double height, bool wire);
-Model hedge_model(double length, double width, double height, Random& random);
 Model guard_rail_model(double length);
 /// Deck across the x axis with pillars `span / 2` to both sides.
 Model bridge_model(double span, double width, double clearance);
+/// Sign over a road of this half width.
+Model gantry_model(double half_width);
 /// A roof on four posts.
 Model shelter_model(double length, double width, double height);
 Model furniture_model(Random& random);

@@ -17,22 +17,21 @@ class Kerbside {
   }
 
   void add_thing(double s, int side) {
-    const Street& street = builder_.street(0);
-    const double beyond = std::max(street.pavement, 1.5) + 1.5;
-    const double lateral = side * (street.half_width + random_.uniform(0.15, beyond));
+    const double beyond = std::max(street_.pavement, 1.5) + 1.5;
+    const double lateral = side * (street_.half_width + random_.uniform(0.15, beyond));
     const double kind = random_.unit();
-    Waypoint at = street.centre.beside(s, lateral);
+    Waypoint at = street_.centre.beside(s, lateral);
     if (kind < 0.2) {
       at.heading += kPi / 2 * random_.uniform(0, 4);
       put(sign_model(random_), at, 0.1, 0.3);
     } else if (kind < 0.45) {
       add_bicycles(at);
-    } else if (kind < 0.65) {
-      const double length = random_.uniform(2, 8);
-      put(railing_model(length, random_.uniform(0.6, 1.2), random_), at, length / 2, 0.06);
     } else if (kind < 0.8) {
-      const double length = random_.uniform(2, 6);
-      put(paling_model(length, random_.uniform(0.7, 1.6), random_), at, length / 2, 0.06);
+      const bool railing = kind < 0.65;
+      const double length = railing ? random_.uniform(2, 8) : random_.uniform(2, 6);
+      const double height = railing ? random_.uniform(0.6, 1.2) : random_.uniform(0.7, 1.6);
+      put(railing ? railing_model(length, height, random_) : paling_model(length, height, random_),
+          at, length / 2, 0.06);
     } else if (kind < 0.9) {
       at.heading += random_.uniform(0, 2 * kPi);
       put(trolley_model(random_), at, 0.55, 0.3);
@@ -43,14 +42,12 @@ class Kerbside {
 
   /// Poles with wires between them.
   void add_line(double from, double to, int side) {
-    const Street& street = builder_.street(0);
-    const double lateral = side * (street.half_width + 0.4), height = random_.uniform(5.5, 8);
+    const double lateral = side * (street_.half_width + 0.4), height = random_.uniform(5.5, 8);
     const double span = random_.uniform(18, 35);
     const auto wires = static_cast<int>(1 + random_.index(3));
     for (double s = from; s + span < to; s += span) {
-      const Vec2 a = street.centre.beside(s, lateral).position;
-      const Vec2 b = street.centre.beside(s + span, lateral).position;
-      const Vec2 along = b - a;
+      const Vec2 a = street_.centre.beside(s, lateral).position;
+      const Vec2 b = street_.centre.beside(s + span, lateral).position, along = b - a;
       const Waypoint middle{0.5 * (a + b), std::atan2(along.y, along.x)};
       put(pole_model(height + 0.3, false, false, random_), {a, middle.heading}, 0.15, 0.15);
       for (int i = 0; i < wires; ++i) {
@@ -61,35 +58,30 @@ class Kerbside {
 
   /// Somebody who takes a few steps to and fro.
   void add_loiterer(double s, int side) {
-    const Street& street = builder_.street(0);
-    const double lateral = side * (street.half_width + random_.uniform(-0.3, 2.0));
-    const Vec2 from = street.centre.beside(s, lateral).position;
+    const double lateral = side * (street_.half_width + random_.uniform(-0.3, 2.0));
+    const Vec2 from = street_.centre.beside(s, lateral).position;
     const double run = random_.uniform(1.2, 3), heading = random_.uniform(0, 2 * kPi);
     const double pace = random_.uniform(0.25, 0.8), start = random_.uniform(0, 6);
     const double stop = start + random_.uniform(1, 12);
-    builder_.walker({from, from + run * direction(heading)}, pace, start, stop);
+    builder_.walker({from, from + run * direction(heading)}, pace, {start, stop});
   }
 
   /// Two to five people abreast and behind one another, now and then with a pram.
   void add_group(double s, int side) {
-    const Street& street = builder_.street(0);
-    const double room = std::max(street.pavement, 1.5);
-    const double lateral = side * (street.half_width + random_.uniform(0.3, room));
+    const double room = std::max(street_.pavement, 1.5);
+    const double lateral = side * (street_.half_width + random_.uniform(0.3, room));
     const double run = random_.either_sign(20, 60), pace = random_.uniform(0.7, 1.5);
     const bool pram = random_.chance(0.5);
     const auto people = static_cast<int>(2 + random_.index(4));
     for (int i = 0; i < people; ++i) {
-      const int row = i / 2;
-      const double beside = 0.6 * (i % 2), behind = 0.8 * row;
+      const double beside = 0.6 * (i % 2), behind = 0.8 * (i / 2);
       std::vector<Vec2> goals;
       for (int step = 0; step <= 3; ++step) {
         goals.push_back(
-            street.centre.beside(s + run * step / 3 + behind, lateral + side * beside).position);
+            street_.centre.beside(s + run * step / 3 + behind, lateral + side * beside).position);
       }
-      const std::size_t before = builder_.traffic().walkers.size();
-      builder_.walker(std::move(goals), pace);
-      if (!pram || i > 0 || builder_.traffic().walkers.size() == before) continue;
-      builder_.traffic().objects[builder_.traffic().walkers.back().object].pushes_pram = true;
+      if (!builder_.walker(std::move(goals), pace) || !pram || i > 0) continue;
+      builder_.traffic().objects.back().pushes_pram = true;
     }
   }
 
@@ -108,16 +100,11 @@ class Kerbside {
       const int side = random_.chance(0.5) ? 1 : -1;
       const double open = random_.uniform(0.2, seconds), pause = random_.uniform(2, 12);
       const Vec2 ahead = direction(car.at.heading);
-      Traffic::Door door;
-      door.object = traffic.add_object(Kind::kCar, {1.05, 0.08, size.height});
-      traffic.objects[door.object].model = door_model(size.height);
-      door.hinge = {car.at.position + (0.2 * size.length) * ahead +
-                        (side * (0.5 * size.width + 0.02)) * left_of(ahead),
-                    car.at.heading};
-      door.side = side;
-      door.open = open;
-      door.close = open + pause;
-      traffic.doors.push_back(door);
+      const Vec2 hinge = car.at.position + (0.2 * size.length) * ahead +
+                         (side * (0.5 * size.width + 0.02)) * left_of(ahead);
+      const std::size_t object = traffic.add_object(Kind::kCar, {1.05, 0.08, size.height});
+      traffic.objects[object].model = door_model(size.height);
+      traffic.doors.push_back({object, {hinge, car.at.heading}, side, open, open + pause});
     }
   }
 
@@ -137,12 +124,12 @@ class Kerbside {
     const Footprint place{at.position, at.heading, half_length, half_width};
     const Vec2 way = way_->at(way_->nearest(at.position)).position;
     const bool in_the_way = distance(place, way) < 1.2;
-    if (in_the_way || builder_.clearance(place) < 0.05) return;
-    builder_.place(model, place, 0.02);
+    if (!in_the_way && builder_.clearance(place) >= 0.05) builder_.place(model, place, 0.02);
   }
 
   Builder& builder_;
   Random random_;
+  const Street& street_ = builder_.street();
   const Route* way_;
 };
 
@@ -151,25 +138,24 @@ class Kerbside {
 void add_clutter(Builder& builder, double amount) {
   Random random = builder.random().fork(31);
   Kerbside kerbside(builder, random.fork(1));
-  const double length = builder.street(0).centre.length();
+  const double length = builder.street().centre.length();
   for (const int side : {-1, 1}) {
     for (double s = random.uniform(1, 8); s < length; s += random.uniform(2, 9) / amount) {
       kerbside.add_thing(s, side);
     }
     if (random.chance(0.35 * amount)) kerbside.add_line(random.uniform(0, 20), length, side);
   }
-  const Traffic& traffic = builder.traffic();
-  const double start = traffic.drivers[0].s;
-  for (int i = 0; i < builder.count(10 * amount); ++i) {
-    const double s = start + random.uniform(-20, 90);
-    kerbside.add_loiterer(s, random.chance(0.5) ? 1 : -1);
-  }
+  const double start = builder.traffic().drivers[0].s;
+  const auto along_the_way = [&](int number, void (Kerbside::*add)(double, int)) {
+    for (int i = 0; i < number; ++i) {
+      const double s = start + random.uniform(-20, 90);
+      (kerbside.*add)(s, random.chance(0.5) ? 1 : -1);
+    }
+  };
+  along_the_way(builder.count(10 * amount), &Kerbside::add_loiterer);
   const double seconds = builder.config().scans / builder.config().rate;
   kerbside.add_doors(30 + travel(builder.config(), 8), seconds, builder.count(4 * amount));
-  for (int i = 0; i < builder.count(5 * amount); ++i) {
-    const double s = start + random.uniform(-20, 90);
-    kerbside.add_group(s, random.chance(0.5) ? 1 : -1);
-  }
+  along_the_way(builder.count(5 * amount), &Kerbside::add_group);
 }
 
 }  // namespace dynains::simulation

@@ -20,6 +20,8 @@ Route route_of_bends(const std::vector<Bend>& bends) {
   return Route(std::move(points));
 }
 
+Route straight_route(double length) { return Route({{0, 0}, {length / 2, 0}, {length, 0}}); }
+
 double travel(const Config& config, double usual_speed) {
   const double speed = config.ego_speed < 0 ? usual_speed : config.ego_speed;
   return speed * config.scans / config.rate;

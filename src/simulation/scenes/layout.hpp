@@ -19,12 +19,15 @@ struct Bend {
 
 Route route_of_bends(const std::vector<Bend>& bends);
 
+/// Straight, along x.
+Route straight_route(double length);
+
 /// How far the ego vehicle drives, m. A negative speed in the configuration means `usual_speed`.
 double travel(const Config& config, double usual_speed);
 
 /// Gentle bends and now and then a corner, alternating so that the street never meets itself.
 /// `corner_radius`: m, about.
-Route winding(Random& random, double length, double gentle, double corner_chance,
+Route winding(Random& random, double length, double gentle, double corner_chance = 0,
               double corner_radius = 17);
 
 /// Straight streets across the main one, where that is straight.

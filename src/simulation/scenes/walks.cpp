@@ -1,6 +1,8 @@
 // Scenes at walking pace.
-#include "simulation/materials.hpp"
-#include "simulation/scenes/lanes.hpp"
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/scenes/builder.hpp"
 #include "simulation/scenes/scenes.hpp"
 
 namespace dynains::simulation {
@@ -8,9 +10,15 @@ namespace {
 
 constexpr double kStartOnSquare = 80;  // m along the street
 
+/// Somebody who stands, starts or stops by `mood` in [0, 1): shares that stand all the time, that
+/// start and that stop at `when` (s).
+Pause pause_of(double mood, double standing, double starting, double stopping, double when) {
+  return {mood < standing ? 1e9 : mood < starting ? when : 0, mood > stopping ? when : 1e9};
+}
+
 /// Trees, street furniture and stalls between the walkers.
-void furnish_square(Builder& builder, Random& random, const Street& street, double length,
-                    double side_of_ego) {
+void furnish_square(Builder& builder, Random& random, double length, double side_of_ego) {
+  const Street& street = builder.street();
   for (double s = 5; s < length - 5; s += random.uniform(7, 14)) {
     const double lateral = random.either_sign(0.5, 0.85) * street.half_width;
     const Waypoint at = street.centre.beside(s, lateral);
@@ -29,7 +37,8 @@ void furnish_square(Builder& builder, Random& random, const Street& street, doub
 }
 
 /// One group of one to four people; a quarter of the groups walk along a wall.
-void add_group(Builder& builder, Random& random, const Street& street, double from, double to) {
+void add_group(Builder& builder, Random& random, double from, double to) {
+  const Street& street = builder.street();
   const double half = street.half_width;
   const double s = random.uniform(from, to), mood = random.unit(), when = random.uniform(1.5, 11);
   const bool along_wall = random.chance(0.25);
@@ -39,39 +48,37 @@ void add_group(Builder& builder, Random& random, const Street& street, double fr
   const double drift = along_wall ? 0 : random.uniform(-0.3, 0.3) * half;
   const double pace = random.uniform(0.7, 1.7);
   const auto company = random.chance(0.35) ? 1 + random.index(3) : 0;
-  const double start = mood < 0.12 ? 1e9 : mood < 0.25 ? when : 0;
-  const double stop = mood > 0.9 ? when : 1e9;
+  const Vec2 ego = builder.traffic().lanes[0].route.at(kStartOnSquare).position;
   for (std::size_t k = 0; k <= company; ++k) {
-    const std::size_t row = k / 2;  // two walk side by side
-    const double beside = 0.65 * static_cast<double>(k % 2);
-    const double behind = -0.7 * static_cast<double>(row);
+    // Two walk side by side.
+    const double beside = 0.65 * static_cast<double>(k % 2) * (lateral > 0 ? -1 : 1);
+    const double behind = -0.7 * static_cast<double>(k / 2);
     std::vector<Vec2> goals;
     for (int step = 0; step <= 3; ++step) {
       const double u = step / 3.0;
-      const double l = std::clamp(lateral + drift * u + beside * (lateral > 0 ? -1 : 1),
-                                  -half + 0.05, half - 0.05);
+      const double l = std::clamp(lateral + drift * u + beside, -half + 0.05, half - 0.05);
       goals.push_back(street.centre.beside(s + run * u + behind, l).position);
     }
-    const Vec2 ego = builder.traffic().lanes[0].route.at(kStartOnSquare).position;
     if (norm(goals[0] - ego) < 2.0) continue;
-    builder.walker(std::move(goals), pace, start, stop);
+    builder.walker(std::move(goals), pace, pause_of(mood, 0.12, 0.25, 0.9, when));
   }
 }
 
-void add_cyclists(Builder& builder, Random& random, const Street& street, double length) {
+void add_cyclists(Builder& builder, Random& random, double length) {
+  Traffic& traffic = builder.traffic();
   for (int i = 0; i < 3; ++i) {
     const double s = kStartOnSquare + random.uniform(-40, 60), side = random.chance(0.5) ? 1 : -1;
-    const double lateral = side * random.uniform(0.2, 0.45) * street.half_width;
+    const double lateral = side * random.uniform(0.2, 0.45) * builder.street().half_width;
     const bool with = random.chance(0.5);
-    const std::size_t object = builder.traffic().add_object(Kind::kCyclist);
-    const std::size_t path = builder.traffic().add_lane(street.centre.shifted(
+    const std::size_t object = traffic.add_object(Kind::kCyclist);
+    const std::size_t path = traffic.add_lane(builder.street().centre.shifted(
         with ? 0 : length, with ? length : 0, [lateral](double) { return lateral; }));
-    const double along = with ? s : builder.traffic().lanes[path].route.length() - s;
+    const double along = with ? s : traffic.lanes[path].route.length() - s;
     if (std::abs(s - kStartOnSquare) < 5) {
-      builder.traffic().objects.pop_back();
-      continue;
+      traffic.objects.pop_back();
+    } else {
+      traffic.add_driver(object, path, along, 3.2);
     }
-    builder.traffic().add_driver(object, path, along, 3.2);
   }
 }
 
@@ -122,7 +129,8 @@ void furnish(Builder& builder, Random& random, const Hall& hall) {
   }
 }
 
-/// People who walk from place to place, or stand at stalls for some time.
+/// People who walk from place to place, or stand at stalls for some time; passers-by outside, seen
+/// through the glass.
 void add_people(Builder& builder, Random& random, const Hall& hall, double from, double to) {
   const int people = builder.count(std::min(0.9 * (to - from), 1000.0));
   for (int i = 0; i < people; ++i) {
@@ -134,16 +142,8 @@ void add_people(Builder& builder, Random& random, const Hall& hall, double from,
     }
     const double pace = random.uniform(0.6, 1.5), mood = random.unit();
     const double when = random.uniform(2, 12);
-    builder.walker(std::move(goals), pace,
-                   mood < 0.15  ? 1e9
-                   : mood < 0.3 ? when
-                                : 0,
-                   mood > 0.85 ? when : 1e9);
+    builder.walker(std::move(goals), pace, pause_of(mood, 0.15, 0.3, 0.85, when));
   }
-}
-
-/// Passers-by and a road outside, seen through the glass.
-void add_outside(Builder& builder, Random& random, const Hall& hall, double from, double to) {
   for (int i = 0; i < builder.count(8); ++i) {
     const double x = random.uniform(from, to), y = -hall.half_width - random.uniform(1.5, 4);
     const double run = random.either_sign(20, 60);
@@ -152,7 +152,8 @@ void add_outside(Builder& builder, Random& random, const Hall& hall, double from
 }
 
 /// Trees from the edge of the track on, dense at first.
-void add_trees(Builder& builder, Random& random, const Street& street) {
+void add_trees(Builder& builder, Random& random) {
+  const Street& street = builder.street();
   const double per_100_m = random.uniform(110, 180);
   const auto trees = static_cast<int>(street.centre.length() / 100 * per_100_m);
   for (int i = 0; i < trees; ++i) {
@@ -165,22 +166,16 @@ void add_trees(Builder& builder, Random& random, const Street& street) {
   }
 }
 
-/// Walkers, in twos at times, and cyclists on the track.
-void add_people(Builder& builder, Random& random, const Street& street, double from, double to) {
+/// Walkers on the track, in twos at times.
+void add_hikers(Builder& builder, Random& random, double from, double to) {
   for (int i = 0; i < builder.count(16); ++i) {
     const double s = random.uniform(from, to), pace = random.uniform(1.0, 2.6);
     const double run = random.either_sign(30, 90), lateral = random.either_sign(0.3, 1.3);
     const double stop = random.chance(0.2) ? random.uniform(2, 10) : 1e9;
-    const bool in_company = random.chance(0.4);
-    for (int k = 0; k <= (in_company ? 1 : 0); ++k) {
-      std::vector<Vec2> goals;
-      for (int step = 0; step <= 4; ++step) {
-        goals.push_back(
-            street.centre.beside(s + run * step / 4, lateral + (lateral > 0 ? -0.7 : 0.7) * k)
-                .position);
-      }
-      builder.walker(std::move(goals), pace, 0, stop);
-    }
+    builder.walker(builder.way_along(s, run, 4, lateral), pace, {0, stop});
+    if (!random.chance(0.4)) continue;
+    builder.walker(builder.way_along(s, run, 4, lateral + (lateral > 0 ? -0.7 : 0.7)), pace,
+                   {0, stop});
   }
 }
 
@@ -190,75 +185,62 @@ World crowd(const Config& config, Random random) {
   const double speed = 1.2;
   const double drive = travel(config, speed), length = 2 * kStartOnSquare + drive + 20;
   const double half = random.uniform(6, 11);
-  std::vector<Street> streets{{winding(random, length, 0.008, 0), half, 0}};
+  std::vector<Street> streets{{winding(random, length, 0.008), half, 0}};
   TerrainConfig ground;
   ground.street_label = semantic::kSidewalk;
   ground.kerb = 0;
   ground.hill_slope = random.uniform(0.002, 0.02);
   Builder builder(config, ground, std::move(streets));
-  const Street& street = builder.street(0);
   const double side_of_ego = random.uniform(-0.3, 0.3) * half;
-  const std::size_t lane = builder.traffic().add_lane(street.centre.shifted(
+  const std::size_t lane = builder.traffic().add_lane(builder.street().centre.shifted(
       0, length, [side_of_ego](double s) { return side_of_ego + 0.6 * std::sin(s / 9); }));
-  builder.ego(lane, kStartOnSquare, speed);
-  make_robot(builder.traffic());
-
+  builder.ego(lane, kStartOnSquare, speed, true);
   Frontage look;
   look.buildings = 0.95;
   look.setback = 0.6;
   look.parked = 0;
-  for (const int side : {-1, 1}) builder.furnish(street, side, look);
-  furnish_square(builder, random, street, length, side_of_ego);
+  for (const int side : {-1, 1}) builder.furnish(builder.street(), side, look);
+  furnish_square(builder, random, length, side_of_ego);
   const double from = kStartOnSquare - 45, to = kStartOnSquare + drive + 55;
   const int number = builder.count(std::min(0.85 * (to - from), 2000.0));
-  for (int i = 0; i < number; ++i) add_group(builder, random, street, from, to);
-  if (builder.lively()) add_cyclists(builder, random, street, length);
+  for (int i = 0; i < number; ++i) add_group(builder, random, from, to);
+  if (builder.lively()) add_cyclists(builder, random, length);
   return builder.finish();
 }
 
 World hall(const Config& config, Random random) {
-  const double speed = 1.0;
-  const double drive = travel(config, speed), start = 15;
+  const double speed = 1.0, drive = travel(config, speed), start = 15;
   const Hall hall{2 * start + drive + 20, random.uniform(9, 18), random.uniform(3.5, 7)};
-  std::vector<Street> streets{
-      {Route({{0, 0}, {hall.length / 2, 0}, {hall.length, 0}}), hall.half_width, 0}};
   TerrainConfig ground;
   ground.hill_slope = 0.0005;
   ground.roughness = 0.003;
   ground.kerb = 0;
   ground.street_label = semantic::kSidewalk;
-  Builder builder(config, ground, std::move(streets));
-  const Street& street = builder.street(0);
-  const std::size_t way = builder.traffic().add_lane(
-      street.centre.shifted(0, hall.length, [](double s) { return 1.2 * std::sin(s / 7); }));
+  Builder builder(config, ground, {{straight_route(hall.length), hall.half_width, 0}});
+  const std::size_t way = builder.traffic().add_lane(builder.street().centre.shifted(
+      0, hall.length, [](double s) { return 1.2 * std::sin(s / 7); }));
   builder.ego(way, start, speed);
   builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
   build_shell(builder, hall);
   furnish(builder, random, hall);
   add_people(builder, random, hall, start - 12, start + drive + 20);
-  add_outside(builder, random, hall, start - 12, start + drive + 20);
   return builder.finish();
 }
 
 World forest(const Config& config, Random random) {
-  const double speed = 1.4;
-  const double drive = travel(config, speed), start = 60;
+  const double speed = 1.4, drive = travel(config, speed), start = 60;
   const double length = 2 * start + drive + 40;
-  std::vector<Street> streets{{winding(random, length, 0.03, 0), 1.7, 0}};
-  TerrainConfig ground;
-  ground.hill_slope = random.uniform(0.02, 0.08);
-  ground.hill_length = 60;
-  ground.roughness = 0.18;
-  ground.kerb = 0;
+  std::vector<Street> streets{{winding(random, length, 0.03), 1.7, 0}};
+  TerrainConfig ground{random.uniform(0.02, 0.08), 60, 0.18, 0};
   ground.street_label = ground.open_label;
   Builder builder(config, ground, std::move(streets));
-  const Street& street = builder.street(0);
+  const Street& street = builder.street();
   builder.ego(builder.lane(street, -0.4), start, speed);
   builder.traffic().objects[0].size = {0.8, 0.6, 0.9};
-  add_trees(builder, random, street);
+  add_trees(builder, random);
   builder.plant(street, street.half_width + 0.3, 20, 0, random.uniform(60, 120));
-  if (builder.lively()) fill_lane(builder, {builder.lane(street, 0.5), 35, 4, 0, 0, 1});
-  add_people(builder, random, street, start - 40, start + drive + 50);
+  if (builder.lively()) builder.fill_lane({builder.lane(street, 0.5), 35, 4, 0, 0, 1});
+  add_hikers(builder, random, start - 40, start + drive + 50);
   return builder.finish();
 }
 
