@@ -44,6 +44,9 @@ simulation::Config make_config(const SimulateOptions& options) {
         "--rolling-shutter needs --format mcap, or --deskewed: a folder as of "
         "KITTI has no times of points");
   }
+  if (config.rig != simulation::Rig::kNone && options.format != Format::kKitti) {
+    throw ConfigError("--rig needs --format kitti");
+  }
   return config;
 }
 
@@ -64,6 +67,10 @@ OutputListing listing_of(const simulation::Simulator& simulator, Format format) 
     listing.files.insert("poses_true.txt");
   }
   listing.folders = {{"velodyne", ".bin"}, {"labels", ".label"}};
+  if (config.rig != simulation::Rig::kNone) {
+    listing.files.insert("sensors.txt");
+    listing.folders.insert({"sensor", ".id"});
+  }
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     listing.scans.insert(simulation::scan_name(i));
   }

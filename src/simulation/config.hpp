@@ -24,10 +24,14 @@ enum class Scene {
   kForest,      ///< track through a wood, walkers and cyclists
   kGarage,      ///< one storey of a multi-storey car park: low ceiling, columns, walls
   kMixed,       ///< a street whose every part is drawn from the seed
+  kRoom,        ///< one room of 2.2 to 15 m, furniture along its walls, a few people
+  kCorridor,    ///< smooth walls at 0.8 to 1.6 m, corners, doors on most of them, a few people
+  kTunnel,      ///< smooth walls and ceiling around a road with traffic both ways
 };
-constexpr std::array<const char*, 13> value_names(Scene) {
-  return {"urban",    "highway", "vegetation", "crowd",  "stop-and-go", "canopy", "hill",
-          "car-park", "static",  "hall",       "forest", "garage",      "mixed"};
+constexpr std::array<const char*, 16> value_names(Scene) {
+  return {"urban", "highway",  "vegetation", "crowd", "stop-and-go", "canopy",
+          "hill",  "car-park", "static",     "hall",  "forest",      "garage",
+          "mixed", "room",     "corridor",   "tunnel"};
 }
 
 /// Beam pattern with a typical mounting height and range.
@@ -46,6 +50,19 @@ enum class Sensor {
 constexpr std::array<const char*, 10> value_names(Sensor) {
   return {"hdl64",    "vlp16", "hdl32",   "os1-64", "os0-128",
           "pandar64", "livox", "mid-360", "raster", "rings"};
+}
+
+/// Sensors of one type whose points are one cloud, in the frame of the body on the ground. Each has
+/// its own clock. simulator.cpp lists their poses.
+enum class Rig {
+  kNone,       ///< one sensor; points in its own frame
+  kRoofTwo,    ///< in front and behind on a roof
+  kRoofThree,  ///< one on top, one on each side
+  kCorners,    ///< at the front corners of a vehicle
+  kRobot,      ///< in front and behind on a robot, tilted
+};
+constexpr std::array<const char*, 5> value_names(Rig) {
+  return {"none", "roof-two", "roof-three", "corners", "robot"};
 }
 
 /// Rule for the moving labels of an object.
@@ -79,6 +96,7 @@ struct Config {
   Scene scene = Scene::kUrban;
   Sensor sensor = Sensor::kHdl64;
   Labelling labelling = Labelling::kEver;
+  Rig rig = Rig::kNone;
 
   int scans = 150;
   std::uint64_t seed = 1;
@@ -118,6 +136,8 @@ struct Config {
     visitor(Parameter{"labelling", self.labelling, Bounds{}, "",
                       "whether objects are labelled moving in all scans if they ever move, or at "
                       "the instant"});
+    visitor(Parameter{"rig", self.rig, Bounds{}, "",
+                      "several sensors in one cloud, in the frame of the body"});
     visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
     visitor(Parameter{"seed", self.seed, Bounds{}, "",
                       "seed of the layout and the traffic of the scene"});
@@ -193,6 +213,9 @@ struct Config {
     if (day > 0 && scene != Scene::kUrban && scene != Scene::kStatic) {
       throw ConfigError("simulation.day = " + std::to_string(day) +
                         " must be 0 for this scene: only urban and static have days");
+    }
+    if (rig != Rig::kNone && rolling_shutter) {
+      throw ConfigError("simulation.rolling_shutter must be false with a rig");
     }
   }
 };

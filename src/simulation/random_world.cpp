@@ -25,7 +25,8 @@ Value draw(Random& random, const Choice<Value> (&choices)[N]) {
 }
 
 constexpr Choice<Scene> kScenes[] = {
-    {Scene::kMixed, 0.45},   {Scene::kUrban, 0.06},  {Scene::kStopAndGo, 0.08},
+    {Scene::kMixed, 0.4},    {Scene::kRoom, 0.02},   {Scene::kCorridor, 0.015},
+    {Scene::kTunnel, 0.015}, {Scene::kUrban, 0.06},  {Scene::kStopAndGo, 0.08},
     {Scene::kHill, 0.06},    {Scene::kCarPark, 0.1}, {Scene::kCrowd, 0.08},
     {Scene::kHighway, 0.04}, {Scene::kCanopy, 0.04}, {Scene::kVegetation, 0.03},
     {Scene::kHall, 0.02},    {Scene::kForest, 0.02}, {Scene::kGarage, 0.02}};
@@ -42,7 +43,8 @@ constexpr Choice<Sensor> kCarriedSensors[] = {{Sensor::kMid360, 0.4},
                                               {Sensor::kLivox, 0.1}};
 
 bool has_walking_pace(Scene scene) {
-  return scene == Scene::kCrowd || scene == Scene::kHall || scene == Scene::kForest;
+  return scene == Scene::kCrowd || scene == Scene::kHall || scene == Scene::kForest ||
+         scene == Scene::kRoom || scene == Scene::kCorridor;
 }
 
 /// How the sensor is carried, how high, how level, and how fast.

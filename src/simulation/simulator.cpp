@@ -22,6 +22,23 @@ constexpr double kSecondsOfDay = 86400.0;
 constexpr int kShutterParts = 40;     // of a scan, each measured at one time
 constexpr int kFewShutterParts = 12;  // of a scan whose points have no times
 
+/// A sensor of a rig, from the middle of the body on the ground.
+struct Mount {
+  double x, y, z;     ///< m
+  double yaw, pitch;  ///< deg, positive looks to the left and down
+  double clock;       ///< when it measures after the stamp, as a share of the time between scans
+};
+
+const std::vector<Mount>& mounts_of(Rig rig) {
+  static const std::vector<Mount> kMounts[] = {
+      {},
+      {{0.8, 0, 1.9, 0, 0, 0}, {-1.6, 0, 1.9, 180, 0, 0.35}},
+      {{0.3, 0, 2.1, 0, 0, 0}, {0.3, 0.75, 1.8, 90, 15, 0.3}, {0.3, -0.75, 1.8, -90, 15, 0.65}},
+      {{2.1, 1.1, 0.85, 60, 0, 0}, {2.1, -1.1, 0.85, -60, 0, 0.45}},
+      {{0.35, 0, 0.6, 0, 15, 0}, {-0.35, 0, 0.6, 180, 15, 0.5}}};
+  return kMounts[static_cast<std::size_t>(rig)];
+}
+
 /// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
 Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
   const double cy = std::cos(yaw), sy = std::sin(yaw);
@@ -96,6 +113,11 @@ class Simulator::Implementation {
   }
 
   const Config& config() const { return config_; }
+  std::vector<Pose> mounts() const {
+    std::vector<Pose> poses;
+    for (const Mount& mount : mounts_of(config_.rig)) poses.push_back(mount_pose(mount));
+    return poses;
+  }
   std::size_t size() const { return static_cast<std::size_t>(config_.scans); }
 
   SimulatedScan scan(std::size_t index) {
@@ -106,6 +128,10 @@ class Simulator::Implementation {
     result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
 
     const std::uint64_t scan_seed = mix(seed_of_day(500), index);
+    for (std::size_t k = 0; k < mounts_of(config_.rig).size(); ++k) {
+      measure_mounted(index, moment, k, mix(scan_seed, k), result);
+    }
+    if (config_.rig != Rig::kNone) return result;
     if (!config_.rolling_shutter) {
       measure_part(index, moment, {0, model_.columns}, scan_seed, result);
       return result;
@@ -147,15 +173,38 @@ class Simulator::Implementation {
     const Eigen::Matrix3d turn =
         rotation(share * 0.5 * (step(1, 0) - step(0, 1)), share * 0.5 * (step(0, 2) - step(2, 0)),
                  share * 0.5 * (step(2, 1) - step(1, 2)));
-    const Rigid T_stamp_now =
-        to_rigid(isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3)));
+    move_points(isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3)), first,
+                scan);
+  }
+
+  /// Moves the points from number `first` on.
+  static void move_points(const Pose& T_target_source, std::size_t first, SimulatedScan& scan) {
+    const Rigid T = to_rigid(T_target_source);
     for (std::size_t i = first; i < scan.labels.size(); ++i) {
       float* point = &scan.xyzi[4 * i];
-      const Vec3 p = T_stamp_now * Vec3{point[0], point[1], point[2]};
+      const Vec3 p = T * Vec3{point[0], point[1], point[2]};
       point[0] = p.x;
       point[1] = p.y;
       point[2] = p.z;
     }
+  }
+
+  Pose mount_pose(const Mount& mount) const {
+    return product(isometry(rotation(mount.yaw * kPi / 180, mount.pitch * kPi / 180, 0), mount.x,
+                            mount.y, mount.z),
+                   isometry(rotation(model_.yaw, 0, 0), 0, 0, 0));
+  }
+
+  /// Adds the points of sensor `k` of the rig, in the frame of the body at the stamp.
+  void measure_mounted(std::size_t index, const Moment& stamp, std::size_t k, std::uint64_t seed,
+                       SimulatedScan& scan) {
+    const Mount& mount = mounts_of(config_.rig)[k];
+    Moment now = between(stamp, moments_.at(index + 1), mount.clock);
+    now.T_world_sensor = product(now.T_world_sensor, mount_pose(mount));
+    const std::size_t first = scan.labels.size();
+    measure_part(index, now, {0, model_.columns}, seed, scan);
+    move_points(product(detail::inverted(stamp.T_world_sensor), now.T_world_sensor), first, scan);
+    scan.sensors.resize(scan.labels.size(), static_cast<std::uint8_t>(k));
   }
 
   /// Seed for a purpose, which differs from day to day.
@@ -171,8 +220,9 @@ class Simulator::Implementation {
     const double dt = interval / steps;
     std::map<std::uint32_t, Vec2> first_seen;
     ever_moved_.assign(world_.traffic.objects.size(), false);
-    // The last scan with a rolling shutter ends at one more moment.
-    const int moments = config_.scans + (config_.rolling_shutter ? 1 : 0);
+    // The last scan of a rolling shutter, or of a rig, ends at one more moment.
+    const bool takes_time = config_.rolling_shutter || config_.rig != Rig::kNone;
+    const int moments = config_.scans + (takes_time ? 1 : 0);
     for (int i = 0; i < moments; ++i) {
       const EgoPose ego = world_.traffic.ego();
       Moment moment;
@@ -218,7 +268,9 @@ class Simulator::Implementation {
     return moment;
   }
 
+  /// With a rig, that of the body.
   Pose sensor_pose(const EgoPose& ego, double time) {
+    if (config_.rig != Rig::kNone) return body_pose(ego, time);
     const Eigen::Matrix3d tilt =
         rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
     const Pose T_body_mount = isometry(tilt, 0, 0, model_.height);
@@ -336,7 +388,7 @@ class Simulator::Implementation {
                       mix(pose.object, 2));
       }
     }
-    if (config_.ego_points) {
+    if (config_.ego_points && config_.rig == Rig::kNone) {
       renderer_.add(make_primitive(Shape::kBox, kMaterials.ego_roof,
                                    {-0.6F, 0, -static_cast<float>(model_.height) + 0.75F},
                                    {1.9F, 0.85F, 0.55F}, rotation_z(-model_.yaw)),
@@ -399,7 +451,7 @@ class Simulator::Implementation {
     std::vector<ObjectState> states;
     draw_world(moment, states);
     measure(moment, columns, scan, seed);
-    if (columns.first == 0) scan.objects = std::move(states);
+    if (scan.objects.empty() && columns.first == 0) scan.objects = std::move(states);
   }
 
   /// Turns surfaces into points with noise, losses and labels.
@@ -487,6 +539,7 @@ Simulator::Simulator(Simulator&&) noexcept = default;
 Simulator& Simulator::operator=(Simulator&&) noexcept = default;
 
 const Config& Simulator::config() const { return implementation_->config(); }
+std::vector<Pose> Simulator::mounts() const { return implementation_->mounts(); }
 std::size_t Simulator::size() const { return implementation_->size(); }
 SimulatedScan Simulator::scan(std::size_t i) { return implementation_->scan(i); }
 

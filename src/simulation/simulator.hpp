@@ -36,7 +36,8 @@ struct SimulatedScan {
   std::vector<float> xyzi;            ///< interleaved; m, sensor frame; reflectivity in [0, 1]
   std::vector<std::uint32_t> labels;  ///< by point: SemanticKITTI class | instance << 16
   std::vector<float> times;           ///< by point: s after `time`; empty without a rolling shutter
-  Pose T_world_sensor = Pose::Identity();
+  std::vector<std::uint8_t> sensors;  ///< by point: number of its sensor; empty without a rig
+  Pose T_world_sensor = Pose::Identity();  ///< of the body, with a rig; so is the next
   Pose T_world_sensor_noisy = Pose::Identity();
   std::vector<ObjectState> objects;  ///< vehicles and people near the sensor, also parked ones
 };
@@ -59,6 +60,9 @@ class Simulator {
   const Config& config() const;
   /// Number of scans.
   std::size_t size() const;
+
+  /// Poses T_body_sensor of the sensors of a rig; empty without one.
+  std::vector<Pose> mounts() const;
 
   /// Scan i < size(), in any order. Not const, because scratch memory is reused.
   SimulatedScan scan(std::size_t i);

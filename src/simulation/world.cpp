@@ -8,8 +8,8 @@ namespace {
 
 World build_scene(const Config& config) {
   static constexpr World (*kScenes[])(const Config&, Random) = {
-      urban,    highway, vegetation, crowd,  stop_and_go, canopy, hill,
-      car_park, urban,   hall,       forest, garage,      mixed};
+      urban, highway, vegetation, crowd,  stop_and_go, canopy, hill,     car_park,
+      urban, hall,    forest,     garage, mixed,       room,   corridor, tunnel};
   return kScenes[static_cast<std::size_t>(config.scene)](config, Random(mix(config.seed, 77)));
 }
 

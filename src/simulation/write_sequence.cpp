@@ -25,6 +25,13 @@ void make_folder(const std::filesystem::path& folder) {
   if (error) throw IoError(folder.string() + ": cannot create the folder: " + error.message());
 }
 
+void write_sensors(const std::filesystem::path& path, const std::vector<std::uint8_t>& sensors) {
+  AtomicFile file(path);
+  file.stream().write(reinterpret_cast<const char*>(sensors.data()),
+                      static_cast<std::streamsize>(sensors.size()));
+  file.commit(AtomicFile::Sync::kLater);
+}
+
 }  // namespace
 
 std::string scan_name(std::size_t i) {
@@ -37,6 +44,8 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
                     const std::function<bool(std::size_t, std::size_t)>& progress) {
   make_folder(folder / "velodyne");
   make_folder(folder / "labels");
+  const std::vector<Pose> mounts = simulator.mounts();
+  if (!mounts.empty()) make_folder(folder / "sensor");
   const Pose Tr = camera_from_sensor();
   const Pose Tr_inverse = Tr.inverse();
   std::vector<Pose> poses, true_poses;
@@ -46,6 +55,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
     const std::string name = scan_name(i);
     write_scan(folder / "velodyne" / (name + ".bin"), scan.xyzi);
     write_labels(folder / "labels" / (name + ".label"), scan.labels);
+    if (!mounts.empty()) write_sensors(folder / "sensor" / (name + ".id"), scan.sensors);
     poses.push_back(Tr * scan.T_world_sensor_noisy * Tr_inverse);
     true_poses.push_back(Tr * scan.T_world_sensor * Tr_inverse);
     times.push_back(scan.time);
@@ -58,6 +68,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
   if (config.has_pose_errors()) {
     write_poses(folder / "poses_true.txt", true_poses);
   }
+  if (!mounts.empty()) write_poses(folder / "sensors.txt", mounts);
   write_poses(folder / "poses.txt", poses);
   return true;
 }

@@ -3,7 +3,7 @@
 // within 50 m are called moving than with right poses, or if nothing is judged. It is told if the
 // plausibility check of the remover says so, or if `dynains run` would refuse or warn before its
 // first scan.
-//   plausibility_trials [FROM [WORLDS [SCANS [right|all]]]]
+//   plausibility_trials [FROM [WORLDS [SCANS [right|all [SCENE]]]]]
 // Prints a row for each world and kind with the largest shares of any window, then the counts.
 #include <unistd.h>
 
@@ -361,6 +361,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = ::mkdtemp(pattern.data());
   for (std::uint64_t seed = from; seed < from + worlds; ++seed) {
     simulation::Config config = simulation::random_world(seed);
+    if (argc > 5) config.scene = value_of_name<simulation::Scene>(argv[5]).value();
     config.scans = static_cast<int>(number(3, 40));
     const std::string world =
         std::to_string(seed) + ' ' + plain_value(config.scene) + ' ' + plain_value(config.sensor);

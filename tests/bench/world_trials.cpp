@@ -1,7 +1,7 @@
 // Trials of the remover on random worlds, in process: each world is simulated, judged and scored.
 // A setting is a list of parameters of the remover, `name=value,name=value`; `default` changes
 // none. All settings judge the same scans.
-//   world_trials [--from SEED] [--worlds N] [--scans N] [SETTING...]
+//   world_trials [--from SEED] [--worlds N] [--scans N] [--world scene=room,...] [SETTING...]
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -32,6 +32,7 @@ struct Options {
   std::uint64_t from = 1;
   std::uint64_t worlds = 10;
   int scans = 60;
+  std::string world = "default";  ///< parameters that are not drawn, such as "scene=room"
   std::vector<std::string> settings;
 };
 
@@ -53,6 +54,7 @@ program::ParameterValues values_of(const std::string& list) {
 
 simulation::Config world_of(std::uint64_t seed, const Options& options) {
   simulation::Config config = simulation::random_world(seed);
+  values_of(options.world).apply(config);
   config.scans = options.scans;
   return config;
 }
@@ -139,6 +141,7 @@ Options parse(int argc, char** argv) {
   app.add_option("--from", options.from, "first seed [1]");
   app.add_option("--worlds", options.worlds, "number of seeds [10]");
   app.add_option("--scans", options.scans, "scans of each world [60]");
+  app.add_option("--world", options.world, "name=value,...: parameters that are not drawn");
   app.add_option("SETTING", options.settings, "name=value,...: parameters of the remover");
   try {
     app.parse(argc, argv);

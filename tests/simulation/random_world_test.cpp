@@ -32,7 +32,7 @@ TEST_CASE("a seed is a world, and worlds differ in scene, sensor and carrier") {
     sensors.insert(config.sensor);
     gaits.insert(config.gait);
   }
-  CHECK(scenes.size() == 12);  // all but the one in which nothing moves
+  CHECK(scenes.size() == 15);  // all but the one in which nothing moves
   CHECK(sensors.size() == value_names(Sensor()).size());
   CHECK(gaits.size() == 3);
 

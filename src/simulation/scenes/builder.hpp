@@ -28,6 +28,12 @@ struct Pause {
   double start = 0, stop = 1e9;
 };
 
+/// By `mood` in [0, 1): below `standing` stands all the time, below `starting` until `when` (s),
+/// above `stopping` from then on.
+inline Pause pause_of(double mood, double standing, double starting, double stopping, double when) {
+  return {mood < standing ? 1e9 : mood < starting ? when : 0, mood > stopping ? when : 1e9};
+}
+
 /// The lanes of a street with two.
 struct StreetLanes {
   std::size_t forward, backward;

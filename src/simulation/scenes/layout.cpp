@@ -6,15 +6,14 @@
 
 namespace dynains::simulation {
 
-Route route_of_bends(const std::vector<Bend>& bends) {
+Route route_of_bends(const std::vector<Bend>& bends, double step, double swerve) {
   std::vector<Vec2> points{{0, 0}};
   double heading = 0, curvature = 0;
   for (const Bend& bend : bends) {
-    for (double s = 0; s < bend.length; s += 1) {
-      // No driver turns the wheel at once.
-      curvature += std::clamp(bend.curvature - curvature, -0.006, 0.006);
-      heading += curvature;
-      points.push_back(points.back() + direction(heading));
+    for (double s = 0; s < bend.length; s += step) {
+      curvature += std::clamp(bend.curvature - curvature, -swerve, swerve);
+      heading += step * curvature;
+      points.push_back(points.back() + step * direction(heading));
     }
   }
   return Route(std::move(points));

@@ -17,7 +17,9 @@ struct Bend {
   double length, curvature;
 };
 
-Route route_of_bends(const std::vector<Bend>& bends);
+/// Points `step` (m) apart. The curvature changes by at most `swerve` (1/m) from one to the next:
+/// no driver turns the wheel at once.
+Route route_of_bends(const std::vector<Bend>& bends, double step = 1, double swerve = 0.006);
 
 /// Straight, along x.
 Route straight_route(double length);

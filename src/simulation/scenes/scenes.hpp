@@ -17,5 +17,8 @@ World garage(const Config& config, Random random);
 World mixed(const Config& config, Random random);
 World hall(const Config& config, Random random);
 World forest(const Config& config, Random random);
+World room(const Config& config, Random random);
+World corridor(const Config& config, Random random);
+World tunnel(const Config& config, Random random);
 
 }  // namespace dynains::simulation
