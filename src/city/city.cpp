@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <system_error>
 #include <thread>
 
@@ -62,6 +63,7 @@ bool is_session_name(const std::string& name) {
 }
 
 City::City(const fs::path& folder) : City(folder, SessionGrid()) {
+  reload();
   if (sessions_.empty()) fail(folder, "holds no session; expected a map of many sessions");
   grid_ = sessions_.front().grid;
 }
@@ -72,6 +74,7 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   fs::create_directories(folder, error);
   if (error) fail_by_system(folder, "cannot be created", error.value());
   City city(folder, grid);
+  city.reload();
   if (!city.sessions_.empty()) {
     refuse_other_grid(folder, city.sessions_.front().grid, grid);
     return city;
@@ -152,7 +155,8 @@ void City::drop(const std::string& name) {
   fs::remove(session_file(name), error);
   if (error) fail_by_system(session_file(name), "cannot be removed", error.value());
   sync_files(folder_);
-  reload();
+  const auto is_dropped = [&](const SessionInfo& session) { return session.name == name; };
+  sessions_.erase(std::remove_if(sessions_.begin(), sessions_.end(), is_dropped), sessions_.end());
 }
 
 std::vector<std::string> City::check() const {
@@ -164,14 +168,21 @@ std::vector<std::string> City::check() const {
       defects.emplace_back(error.what());
     }
   };
+  std::map<std::string, std::string> names_of;  // by fingerprint
+  City city = *this;
   for (const std::string& name : names()) {
     note([&] {
       const SessionInfo session = read_session(session_file(name));
-      for (const auto& tile : session.tiles) note([&] { read_tile(session, tile.first); });
+      city.grid_ = session.grid;
+      const auto [same, is_new] = names_of.emplace(session.fingerprint, name);
+      for (const auto& tile : session.tiles) note([&] { city.read_tile(session, tile.first); });
       RecordingReference reference;
       for (const SessionReference& which : session.references) {
         note([&] { read_reference(session, which, reference); });
       }
+      if (is_new || session.fingerprint.empty()) return;
+      fail(session_file(name), "is a session of the same scans, poses and times as " +
+                                   same->second + "; drop one of them");
     });
   }
   return defects;

@@ -41,6 +41,9 @@ class City {
   /// Opens a city that has sessions.
   explicit City(const std::filesystem::path& folder);
 
+  /// A city whose sessions are not read, for check() and drop(): some may be damaged.
+  static City unread(const std::filesystem::path& folder) { return City(folder, SessionGrid()); }
+
   /// Opens a city, or makes one with this grid if `folder` is missing or empty. Throws ConfigError
   /// if `grid` is invalid, or if the city has another grid.
   static City open_or_make(const std::filesystem::path& folder, const SessionGrid& grid);
@@ -75,14 +78,13 @@ class City {
   /// Removes one session. The map then has the bytes of a map without it.
   void drop(const std::string& name);
 
-  /// Reads everything. Returns one message, with path and position, for each defect.
+  /// Reads everything. Returns one message, with path and position, for each defect, and for each
+  /// session of the same scans, poses and times as another.
   std::vector<std::string> check() const;
 
  private:
   City(std::filesystem::path folder, const SessionGrid& grid)
-      : folder_(std::move(folder)), grid_(grid) {
-    reload();
-  }
+      : folder_(std::move(folder)), grid_(grid) {}
 
   std::vector<std::string> names() const;
   void revise(TileHistory& history, const TileIndex& tile, const SessionInfo& session) const;
