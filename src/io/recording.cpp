@@ -54,6 +54,21 @@ void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& sc
   }
 }
 
+/// Throws ConfigError for options that a recording of this format does not use.
+void refuse_idle(const RecordingOptions& o, ScanFormat format, const PointColumns& columns) {
+  const auto refuse_if = [](bool is_idle, const char* text) {
+    if (is_idle) throw ConfigError(text);
+  };
+  const bool has_topic = !(o.cloud_topic + o.cloud_frame + o.pose_topic + o.pose_frame).empty();
+  refuse_if(format != ScanFormat::kLog && (has_topic || !o.sensor_frame.empty()),
+            "--cloud-topic, --frame-id, --pose-topic, --pose-frame-id and --sensor-frame are for "
+            "logs of ROS");
+  refuse_if(format != ScanFormat::kNuScenes && !o.scene.empty(),
+            "--nuscenes-scene is for nuScenes");
+  refuse_if(!columns.time && o.point_time_unit > 0.0,
+            "--point-time-unit is for points with times; these have none");
+}
+
 fs::path label_file(const fs::path& folder, const std::string& scan) {
   return folder / "labels" / (scan + ".label");
 }
@@ -112,10 +127,8 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
       options.without_poses ? leave_unplaced() : read_poses();
     }
   }
-  if (!options.sensor_frame.empty() && format_ != ScanFormat::kLog) {
-    fail(path, "has no frames; expected a log of ROS for the frame of the sensor");
-  }
   find_columns();
+  refuse_idle(options, format_, columns_);
   frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
   notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
                                                 : "points are in the frame of the sensor");
@@ -311,6 +324,7 @@ void Recording::check_names() const {
 
 std::vector<fs::path> Recording::files() const {
   std::vector<fs::path> files = files_;
+  files.insert(files.end(), options_.sources.begin(), options_.sources.end());
   if (labels_ != Labels::kFiles) return files;
   for (const Scan& scan : scans_) files.push_back(label_file(folder_, scan.name));
   return files;

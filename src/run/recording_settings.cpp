@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
+#include "io/input_file.hpp"
 #include "parameter_values.hpp"
 
 namespace dynains::program {
@@ -40,11 +41,15 @@ double read_time_unit(const std::string& text) {
   throw ConfigError(text + ": expected s, ms, us, ns or seconds above 0");
 }
 
-const RecordingOptions& RecordingSettings::checked() const {
+RecordingOptions RecordingSettings::checked() const {
   if (!options.sensor_origin.isZero(0.0) && !options.sensor_frame.empty()) {
     throw ConfigError("sensor origin and sensor frame exclude each other");
   }
-  return options;
+  RecordingOptions result = options;
+  for (const std::string text : flags) {
+    if (is_file(text)) result.sources.emplace_back(text);
+  }
+  return result;
 }
 
 bool RecordingSettings::assign(const std::string& flag, const std::string& text,

@@ -31,8 +31,9 @@ struct RecordingSettings {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor);
 
-  /// The options. Throws ConfigError for settings that exclude each other.
-  const RecordingOptions& checked() const;
+  /// The options, with the files that flags name. Throws ConfigError for settings that exclude each
+  /// other.
+  RecordingOptions checked() const;
 
   /// Assigns the setting of a flag; false if none has it. `name` starts the message of a
   /// ConfigError for a text that is none of its values.

@@ -132,11 +132,27 @@ TEST_CASE(
       CHECK_THROWS_AS(Recording(folder.path(), options), ConfigError);
     }
   }
-  SECTION("a frame without a log") {
-    write_text(folder / "a1.pcd", pcd({4, 5, 6}, "1 0 0 1 0 0 0"));
-    options.sensor_frame = "lidar";
-    CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("expected a log of ROS"));
+}
+
+TEST_CASE("Options of another kind of recording are refused") {
+  const TemporaryFolder folder;
+  write_text(folder / "a1.ply", ply());
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  const auto refusal = [&](auto&& set) {
+    RecordingOptions options;
+    set(options);
+    return message_of<ConfigError>([&] { Recording(folder.path(), options); });
+  };
+  for (const auto option : {&RecordingOptions::cloud_topic, &RecordingOptions::cloud_frame,
+                            &RecordingOptions::pose_topic, &RecordingOptions::pose_frame,
+                            &RecordingOptions::sensor_frame}) {
+    CHECK_THAT(refusal([&](auto& o) { o.*option = "x"; }),
+               ContainsSubstring("are for logs of ROS"));
   }
+  CHECK_THAT(refusal([](auto& o) { o.scene = "x"; }),
+             ContainsSubstring("--nuscenes-scene is for nuScenes"));
+  CHECK_THAT(refusal([](auto& o) { o.point_time_unit = 1.0; }),
+             ContainsSubstring("--point-time-unit is for points with times; these have none"));
 }
 
 TEST_CASE("The frame of the points is detected, and can be forced") {

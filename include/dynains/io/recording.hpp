@@ -72,6 +72,7 @@ struct RecordingOptions {
   bool without_poses = false;
   bool is_compensated = false;  ///< points have times, but the recorder has de-skewed them
   bool accept_missing = false;  ///< for logs: whether parts may be missing
+  std::vector<std::filesystem::path> sources;  ///< files that these options were read from
 };
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
@@ -155,14 +156,16 @@ struct ScanAddress;
 /// All members throw IoError with path, position and expected content.
 class Recording {
  public:
-  /// Reads and checks all files except points and labels.
+  /// Reads and checks all files except points and labels. Throws ConfigError for options that are
+  /// for recordings of another format.
   explicit Recording(const std::filesystem::path& path, const RecordingOptions& options = {});
 
   /// Path of the folder or log.
   const std::filesystem::path& folder() const { return folder_; }
   /// Folder of the scans: folder() or a subfolder; for a log, folder().
   const std::filesystem::path& scan_folder() const { return scan_folder_; }
-  /// All files of the recording: scans with and without a pose, poses, times, calibration, labels.
+  /// All files of the recording: scans with and without a pose, poses, times, calibration, labels,
+  /// and RecordingOptions::sources.
   std::vector<std::filesystem::path> files() const;
   std::size_t size() const { return scans_.size(); }
   ScanFormat format() const { return format_; }
