@@ -5,12 +5,14 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "pose_advice.hpp"
+#include "run_doubts.hpp"
 #include "start_check.hpp"
 
 namespace dynains::program {
@@ -55,8 +57,10 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
 }
 
 /// Adds the findings that need more scans than the diagnosis reads. Throws IoError.
-void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::ostream& text) {
+void add_findings_in_scans(const Recording& recording, const Diagnosis& d,
+                           const std::vector<ScanCounts>& counts, std::ostream& text) {
   if (recording.size() == 0) return;
+  for (const std::string& odd : odd_scans(counts, 0, recording)) text << "note: " << odd << '\n';
   for (const std::string& remark : remarks_on_clouds(recording, whole_of(recording))) {
     text << "note: " << remark << '\n';
   }
@@ -67,23 +71,25 @@ void add_findings_in_scans(const Recording& recording, const Diagnosis& d, std::
 
 /// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
 /// IoError of the first and counts the others.
-void check_files(const Recording& recording) {
+std::vector<ScanCounts> check_files(const Recording& recording) {
+  std::vector<ScanCounts> counts;
   std::string first;
   std::size_t broken = 0;
   for (std::size_t i = 0; i < recording.size(); ++i) {
     try {
-      recording.point_count(i);
+      counts.push_back({recording.point_count(i), 0});
     } catch (const IoError& error) {
       if (broken == 0) first = error.what();
       ++broken;
     }
   }
-  if (broken == 0) return;
+  if (broken == 0) return counts;
   if (broken > 1) first += "; " + std::to_string(broken - 1) + " more scan files are broken";
   throw IoError(first);
 }
 
-std::string describe(const Recording& recording, const Diagnosis& d) {
+std::string describe(const Recording& recording, const Diagnosis& d,
+                     const std::vector<ScanCounts>& counts) {
   std::ostringstream text;
   add_line(text, "scans",
            std::to_string(d.scan_files) + " files, " + std::to_string(d.pose_rows) + " poses, " +
@@ -111,18 +117,18 @@ std::string describe(const Recording& recording, const Diagnosis& d) {
   add_line(text, "  no motion at all", to_text(d.standing));
   text << '\n';
   add_remarks(text, d);
-  add_findings_in_scans(recording, d, text);
+  add_findings_in_scans(recording, d, counts, text);
   return text.str();
 }
 
 }  // namespace
 
 RecordingCheck check_recording(const Recording& recording) {
-  check_files(recording);
+  const std::vector<ScanCounts> counts = check_files(recording);
   RecordingCheck check;
   check.diagnosis = diagnose(recording);
   const bool sound = check.diagnosis.sound();
-  check.findings = describe(recording, check.diagnosis);
+  check.findings = describe(recording, check.diagnosis, counts);
   std::optional<std::string> lone;
   if (recording.size() > 1) {
     lone = remark_on_lone_scans(recording, whole_of(recording), RemoverConfig());

@@ -1,6 +1,8 @@
 #include "run_results.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <numeric>
 #include <utility>
 
 #include "dynains/pose.hpp"
@@ -205,7 +207,14 @@ bool RunResults::is_complete() const {
 
 void RunResults::complete_scan(const RecordedScan& scan, const ScanVerdict& verdict) {
   points_ += verdict.labels.size();
+  const std::uint64_t moving_before = labels_[PointLabel::kDynamic];
   labels_.add(verdict.labels);
+  counts_.push_back({verdict.labels.size(), labels_[PointLabel::kDynamic] - moving_before});
+  unclustered_ += std::inner_product(
+      verdict.labels.begin(), verdict.labels.end(), verdict.causes.begin(), std::uint32_t{0},
+      std::plus<>(), [](PointLabel label, Cause cause) {
+        return label == PointLabel::kStatic && cause == Cause::kNotJudged ? 1U : 0U;
+      });
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
   for_each_moving(verdict.labels, [&](std::size_t i) {

@@ -25,6 +25,7 @@
 #include "output_listing.hpp"
 #include "overview.hpp"
 #include "point_labels.hpp"
+#include "run_doubts.hpp"
 #include "scan_range.hpp"
 
 namespace dynains {
@@ -123,6 +124,10 @@ class RunResults {
   bool is_complete() const;
   std::uint64_t points() const { return points_; }
   const LabelCounts& labels() const { return labels_; }
+  /// Points of each scan, and those of them that move.
+  const std::vector<ScanCounts>& counts() const { return counts_; }
+  /// Static points that are neither ground nor in a cluster.
+  std::uint64_t unclustered() const { return unclustered_; }
   std::optional<std::size_t> map_points() const;
 
  private:
@@ -143,6 +148,8 @@ class RunResults {
   std::size_t finished_ = 0;
   std::uint64_t points_ = 0;
   LabelCounts labels_;
+  std::vector<ScanCounts> counts_;
+  std::uint64_t unclustered_ = 0;
   // These belong to the writing thread until writing_.wait().
   JudgedScan judged_;
   std::vector<std::uint8_t> keep_;
