@@ -1,5 +1,6 @@
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,11 +27,9 @@ struct CheckFlags {
   bool force = false;
 };
 
-void find_closures(const Recording& recording, const CheckFlags& flags) {
-  OutputFile file(flags.closures, flags.force, InputFiles(recording));
+void find_closures(const Recording& recording, OutputFile& file) {
   const std::vector<ReturnToPlace> returns = find_returns(recording, file.path().parent_path());
-  write_closures(file.path(), returns);
-  file.put_in_place();
+  file.write([&](std::ostream& out) { write_closures(out, returns); });
   for (const ReturnError& error : return_errors(recording, 0, returns)) {
     std::cout << sentence(error, recording) << '\n';
   }
@@ -39,6 +38,10 @@ void find_closures(const Recording& recording, const CheckFlags& flags) {
 void check(const CheckFlags& given) {
   const RecordingFlags& flags = given.recording;
   const Recording recording(flags.folder, flags.settings.checked());
+  std::optional<OutputFile> closures;
+  if (!given.closures.empty()) {
+    closures.emplace(given.closures, existing_by(given.force), InputFiles(recording));
+  }
   const RecordingCheck check = check_recording(recording);
   std::cout << check.findings << check.advice << std::flush;
   if (!check.flags.empty()) {
@@ -46,7 +49,7 @@ void check(const CheckFlags& given) {
               << " --out OUT\n";
   }
   std::cout << check.remark << std::flush;
-  if (!given.closures.empty()) find_closures(recording, given);
+  if (closures) find_closures(recording, *closures);
   if (!check.passed) throw Finding{};
 }
 

@@ -14,7 +14,6 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
-#include "dynains/io/atomic_file.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
@@ -271,12 +270,9 @@ void clean(CleanOptions& options) {
   const ResultFolder out = open_finished_run(options.run);
   const Recording recording =
       options.sequence.open_of_run(out, "dynains clean " + options.map + ' ' + options.run);
-  InputFiles inputs(recording);
-  for (const fs::path& read :
-       {fs::path(options.map), recording.scan_folder(), out.path(), out.path() / "labels"}) {
-    inputs.add(read);
-  }
-  OutputFile cleaned(target, options.force, inputs);
+  InputFiles inputs(recording, options.map);
+  inputs.add_results(out.path());
+  OutputFile cleaned(target, existing_by(options.force), inputs);
   const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
 
   const InterruptGuard interrupt;
@@ -285,10 +281,7 @@ void clean(CleanOptions& options) {
   MapAlignment alignment(positions);
   add_scans(recording, out, options.quiet, alignment, votes);
   const Verdicts verdicts = judge(votes, positions.size(), options.map);
-  AtomicFile file(cleaned.path());
-  copy_points(options.map, verdicts.keep, file.stream());
-  file.commit();
-  cleaned.put_in_place();
+  cleaned.write([&](std::ostream& file) { copy_points(options.map, verdicts.keep, file); });
 
   if (2 * verdicts.unseen > positions.size()) {
     print_warning(std::to_string(verdicts.unseen) + " of " + std::to_string(positions.size()) +

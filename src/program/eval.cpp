@@ -33,27 +33,16 @@ struct EvalOptions {
   bool online = false;
   bool errors = false;
   bool unfinished = false;
+  bool force = false;
   std::string json;
   std::string csv;
 };
 
-/// Scores must not replace the files that they are made from. Throws ConfigError or IoError.
-void check_targets(const EvalOptions& options, const Recording& recording) {
-  if (!options.json.empty() && !options.csv.empty() &&
-      whole_path(options.json) == whole_path(options.csv)) {
-    throw ConfigError("--json and --csv name one file: " + options.json);
-  }
+InputFiles inputs_of(const EvalOptions& options, const Recording& recording) {
   InputFiles inputs(recording);
   for (const std::string& map : options.maps) inputs.add(map);
-  for (const std::filesystem::path run : options.runs) {
-    inputs.add(run / "report.json");
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      inputs.add(run / "labels" / (recording.name(i) + ".label"));
-      inputs.add(run / "online" / (recording.name(i) + ".label"));
-      inputs.add(run / "causes" / (recording.name(i) + ".cause"));
-    }
-  }
-  for (const std::string& target : {options.json, options.csv}) inputs.refuse(target);
+  for (const std::string& run : options.runs) inputs.add_results(run);
+  return inputs;
 }
 
 void check_are_finished(const EvalOptions& options) {
@@ -79,9 +68,13 @@ void eval(const EvalOptions& options) {
   }
 
   Recording recording = options.sequence.open();
-  check_targets(options, recording);
-  TextFile json(options.json);
-  TextFile csv(options.csv);
+  if (!options.json.empty() && !options.csv.empty() &&
+      whole_path(options.json) == whole_path(options.csv)) {
+    throw ConfigError("--json and --csv name one file: " + options.json);
+  }
+  const InputFiles inputs = inputs_of(options, recording);
+  TextFile json(options.json, options.force, inputs);
+  TextFile csv(options.csv, options.force, inputs);
   LabelledSequence sequence(std::move(recording), options.window, runs);
   if (sequence.missing_truths() > 0) {
     print_warning(std::to_string(sequence.missing_truths()) + " of " +
@@ -131,6 +124,7 @@ void add_eval_command(CLI::App& app) {
                    "also judge runs, and maps of runs, whose report.json says \"complete\": false");
   command.add_option("--json", options->json, "write everything to this file, errors included");
   command.add_option("--csv", options->csv, "write the table to this file");
+  command.add_flag("--force", options->force, "replace the files of --json and --csv");
   command.callback([options] { eval(*options); });
 }
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "dynains/io/atomic_file.hpp"
-
 namespace dynains::program {
 
 EvaluationOptions::EvaluationOptions(CLI::App& command, std::string unlabeled,
@@ -41,18 +39,6 @@ evaluation::EvaluationConfig EvaluationOptions::config() const {
       evaluation::TruthClasses(classes_, value_of_name<evaluation::Unlabeled>(unlabeled_).value());
   config.validate();
   return config;
-}
-
-TextFile::TextFile(const std::string& path) {
-  if (!path.empty()) file_.emplace(path, true, InputFiles());
-}
-
-void TextFile::write(const std::string& text) {
-  if (!file_) return;
-  AtomicFile file(file_->path());
-  file.stream() << text;
-  file.commit();
-  file_->put_in_place();
 }
 
 }  // namespace dynains::program

@@ -32,10 +32,14 @@ class EvaluationOptions {
 class TextFile {
  public:
   /// Opens it unless `path` is empty: then there is none. Throws IoError.
-  explicit TextFile(const std::string& path);
+  TextFile(const std::string& path, bool force, const InputFiles& inputs) {
+    if (!path.empty()) file_.emplace(path, existing_by(force), inputs);
+  }
 
   /// Puts the file in place, whole or not at all. Throws IoError.
-  void write(const std::string& text);
+  void write(const std::string& text) {
+    if (file_) file_->write([&](std::ostream& out) { out << text; });
+  }
 
  private:
   std::optional<OutputFile> file_;

@@ -91,10 +91,12 @@ constexpr std::array<PublishedRow, 30> kPublishedRows = {{
 struct ExperimentOptions {
   ExperimentOptions(CLI::App& command, const std::string& what) : sequence(command, what) {
     command.add_option("--csv", csv, "write the table to this file");
+    command.add_flag("--force", force, "replace files that exist");
   }
 
   RecordingFlags sequence;
   std::string csv;
+  bool force = false;
 };
 
 /// Options of experiments that give scores.
@@ -114,10 +116,12 @@ struct ScoreOptions : ExperimentOptions {
 /// A table on standard output, and the same numbers in a file of CSV.
 class ResultTable {
  public:
-  /// `names`: columns at the left that are text. `csv`: path; empty: none. Throws IoError.
+  /// `names`: columns at the left that are text. Throws IoError.
   ResultTable(std::vector<std::string> columns, std::size_t names, const std::string& csv_columns,
-              const std::string& csv)
-      : table_(std::move(columns), names), csv_(csv_columns + '\n'), file_(csv) {}
+              const ExperimentOptions& options, const InputFiles& inputs)
+      : table_(std::move(columns), names),
+        csv_(csv_columns + '\n'),
+        file_(options.csv, options.force, inputs) {}
 
   /// `source` is the last column of CSV, unless it is empty.
   void add(std::vector<std::string> row, const std::vector<double>& values,
@@ -198,12 +202,19 @@ void table1(const Table1Options& options) {
     throw ConfigError("--poses and --times need one sequence, not " + std::to_string(tasks.size()));
   }
   const std::vector<Variant> variants = table1_variants();
-  TextFile json_file(options.json);
-  ResultTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"}, 2,
-                    "sequence,method,pr,rr,f1,source", options.csv);
-  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  InputFiles inputs;
+  std::vector<Recording> recordings;
   for (const Task& task : tasks) {
-    LabelledSequence sequence(options.sequence.open(task.folder), task.window);
+    recordings.push_back(options.sequence.open(task.folder));
+    inputs.add(recordings.back());
+  }
+  TextFile json_file(options.json, options.force, inputs);
+  ResultTable table({"Seq.", "Method", "PR [%]", "RR [%]", "F1 score"}, 2,
+                    "sequence,method,pr,rr,f1,source", options, inputs);
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const Task& task = tasks[i];
+    LabelledSequence sequence(std::move(recordings[i]), task.window);
     Progress progress(sequence.size(), "scans of " + task.name, options.quiet);
     const evaluation::Evaluation result =
         evaluate_variants(sequence, variants, Answer::kFinal, config,
@@ -245,9 +256,9 @@ struct SweepOptions : ScoreOptions {
 
 /// As many at once as one evaluation takes, so that a scan is read once for several values.
 std::vector<EvaluationRow> measure(const SweepOptions& options,
-                                   const std::vector<Variant>& variants) {
+                                   const std::vector<Variant>& variants,
+                                   LabelledSequence& sequence) {
   const evaluation::EvaluationConfig config = options.evaluation.config();
-  LabelledSequence sequence(options.sequence.open(), options.window);
   std::vector<EvaluationRow> rows;
   const std::size_t batches =
       (variants.size() + evaluation::kMaxEstimates - 1) / evaluation::kMaxEstimates;
@@ -277,9 +288,11 @@ void sweep(const SweepOptions& options) {
     variant.config.validate();
     variants.push_back(variant);
   }
+  LabelledSequence sequence(options.sequence.open(), options.window);
   ResultTable table({name, "PR %", "RR %", "F1", "SA %", "DA %", "HA %"}, 1,
-                    name + ",pr,rr,f1,sa,da,ha", options.csv);
-  for (const EvaluationRow& row : measure(options, variants)) {
+                    name + ",pr,rr,f1,sa,da,ha", options,
+                    InputFiles(sequence.sequence(), options.remover.config_file()));
+  for (const EvaluationRow& row : measure(options, variants, sequence)) {
     const evaluation::Score& points = row.points;
     table.add({row.name}, {row.voxels.kept(), row.voxels.removed(), row.voxels.f1(), points.kept(),
                            points.removed(), points.harmonic()});
@@ -308,9 +321,10 @@ double mean(const std::vector<double>& values) {
 }
 
 void runtime(const RuntimeOptions& options) {
-  ResultTable table({"component", "mean ms", "median", "p95", "p99", "max"}, 1,
-                    "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms", options.csv);
   const Recording sequence = options.sequence.open();
+  ResultTable table({"component", "mean ms", "median", "p95", "p99", "max"}, 1,
+                    "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms", options,
+                    InputFiles(sequence, options.remover.config_file()));
   std::vector<double> points, totals;                 // by frame
   std::map<std::string, std::vector<double>> stages;  // ms
   DynaInsRemover remover(options.remover.config());

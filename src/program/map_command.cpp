@@ -25,17 +25,11 @@ struct MapOptions {
   bool force = false;
 };
 
-/// Where points of a city go. Throws ConfigError for a place in the map.
-fs::path target_of(const fs::path& city, const std::string& name) {
-  const fs::path path = whole_path(name);
-  if (!is_map_name(name) || !is_map_name(path)) {
-    throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
-  }
-  const fs::path inner = fs::relative(path, whole_path(city));
-  if (!inner.empty() && *inner.begin() != "..") {
-    throw ConfigError(name + ": lies in the map of many sessions; choose another folder");
-  }
-  return path;
+/// By whole_path(). Throws ConfigError.
+fs::path target_of(const std::string& name) {
+  fs::path path = whole_path(name);
+  if (is_map_name(name) && is_map_name(path)) return path;
+  throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
 }
 
 MapFileOptions file_options(const City& city) {
@@ -60,7 +54,7 @@ class CityPointFile {
   /// Throws ConfigError, IoError.
   CityPointFile(const City& city, const std::string& name, bool force)
       : city_(city),
-        output_(target_of(city.folder(), name), force, InputFiles()),
+        output_(target_of(name), existing_by(force), InputFiles(city.folder())),
         file_(MapFile::open(output_.path(), file_options(city))) {}
 
   void add(const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
@@ -147,21 +141,19 @@ void diff(const MapOptions& options) {
 }
 
 void drop(const MapOptions& options) {
-  City city{fs::path(options.city)};
-  city.drop(options.session);
-  std::cout << options.session << ": dropped, " << city.sessions().size() << " sessions left"
-            << std::endl;
+  City::unread(options.city).drop(options.session);
+  std::cout << options.session << ": dropped" << std::endl;
 }
 
 void check(const MapOptions& options) {
-  const City city{fs::path(options.city)};
-  const std::vector<std::string> defects = city.check();
+  const std::vector<std::string> defects = City::unread(options.city).check();
   for (const std::string& defect : defects) std::cout << defect << '\n';
   if (!defects.empty()) {
     std::cout << defects.size() << " defects" << std::endl;
     throw Finding{};
   }
-  std::cout << options.city << ": " << city.sessions().size() << " sessions, whole" << std::endl;
+  std::cout << options.city << ": " << City{fs::path(options.city)}.sessions().size()
+            << " sessions, whole" << std::endl;
 }
 
 }  // namespace

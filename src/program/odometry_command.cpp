@@ -39,7 +39,7 @@ void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
 
 void write_poses(const OdometryFlags& flags) {
   Recording recording = flags.recording.open_without_poses(flags.is_compensated);
-  OutputFile file(flags.out, flags.force, InputFiles(recording));
+  OutputFile file(flags.out, existing_by(flags.force), InputFiles(recording));
   const PoseEstimate estimate =
       estimate_with_progress(recording, flags.window, flags.one_thread, flags.quiet);
   write_trajectory(file.path(), recording);

@@ -156,7 +156,7 @@ class NewMap {
     if (is_inside_) {
       file_.emplace(out, kRemappedMap);
     } else {
-      file_.emplace(path_, options.force, inputs);
+      file_.emplace(path_, existing_by(options.force), inputs);
     }
     writer_ = open_map(file_->path(), recording, range, RunOutputs());
   }
@@ -220,7 +220,6 @@ void remap(RemapOptions& options) {
   const ScanRange range{scans.front(), scans.back()};
   InputFiles inputs(corrected);
   if (original) inputs.add(*original);
-  inputs.add(corrected.scan_folder());
   NewMap file(options, out, corrected, range, inputs);
 
   const InterruptGuard interrupt;

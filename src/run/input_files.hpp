@@ -1,8 +1,11 @@
-// Files and folders that a command reads, so that it never changes them.
+// What a command was given: files that it reads, and recordings and results, of which it changes
+// nothing.
 #pragma once
 
 #include <filesystem>
 #include <map>
+#include <string>
+#include <utility>
 
 #include "dynains/io/recording.hpp"
 #include "io/folder.hpp"
@@ -12,12 +15,18 @@ namespace dynains::program {
 class InputFiles {
  public:
   InputFiles() = default;
-  /// The files of a recording.
-  explicit InputFiles(const Recording& recording) { add(recording); }
-
-  void add(const Recording& recording) {
-    for (const std::filesystem::path& file : recording.files()) add(file);
+  explicit InputFiles(const std::filesystem::path& path) { add(path); }
+  /// A recording, and one more file, unless `file` is empty.
+  explicit InputFiles(const Recording& recording, const std::filesystem::path& file = {})
+      : InputFiles(file) {
+    add(recording);
   }
+
+  /// The files of a recording, and its folders: those of scans and labels take no files as outputs,
+  /// and the one above them keeps the files that it has.
+  void add(const Recording& recording);
+  /// The folder OUT of a run.
+  void add_results(const std::filesystem::path& out);
   /// A file, or a folder that takes no files as outputs. A path that leads nowhere is left out.
   void add(const std::filesystem::path& path) {
     if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
@@ -30,9 +39,16 @@ class InputFiles {
   void refuse(const std::filesystem::path& output) const {
     if (const auto identity = identity_of(output)) refuse(*identity, output);
   }
+  /// Throws IoError if the file `name` in `folder` is a part of a recording or of results, or would
+  /// be one, unless it `is_there` already.
+  void refuse_part(const Folder& folder, const std::string& name, bool is_there) const;
 
  private:
+  void add_owner(const std::filesystem::path& folder, bool has_scans);
+
   std::map<FileIdentity, std::filesystem::path> paths_;
+  // Folders that keep their files, and whether a file with the extension of a scan would be one.
+  std::map<FileIdentity, std::pair<std::filesystem::path, bool>> owners_;
 };
 
 }  // namespace dynains::program

@@ -1,11 +1,16 @@
 #include "output_folder.hpp"
 
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
 #include <system_error>
 #include <utility>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
+#include "io/fingerprint.hpp"
+#include "io/input_file.hpp"
 
 namespace dynains::program {
 namespace {
@@ -14,6 +19,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kPartialEnd = ".partial";
+const Json::json_pointer kComplete("/complete");
 
 /// The folder of an OutputFile.
 const OutputKind& file_kind() {
@@ -23,28 +29,69 @@ const OutputKind& file_kind() {
 
 OutputListing listing_of_file(const std::string& name) { return {{listed_name(name)}, {}, {}}; }
 
-bool has(const Json& marker, const char* field, const Json& value) {
-  const Json::json_pointer pointer(field);
-  return marker.contains(pointer) && marker[pointer] == value;
+bool has(const Json& marker, const Json::json_pointer& field, const Json& value) {
+  return marker.contains(field) && marker[field] == value;
 }
 
-/// Throws ConfigError for a name that another output has while it is written.
-void check_name(const fs::path& target) {
-  if (target.extension() != kPartialEnd) return;
+/// By whole_path(). Throws ConfigError for a name that another output has while it is written.
+fs::path checked_place(const fs::path& target) {
+  fs::path place = whole_path(target);
+  if (place.extension() != kPartialEnd) return place;
   throw ConfigError(target.string() +
                     ": names that end in .partial are those of unfinished outputs; choose another");
 }
 
-/// The place of a file. Throws ConfigError for the name, IoError if the file or its folder is read.
-fs::path allowed_target(const fs::path& target, const InputFiles& inputs) {
-  const fs::path place = whole_path(target);
-  check_name(place);
-  inputs.refuse(place);
-  inputs.refuse(place.parent_path());
-  return place;
+/// Moves what is left in `from`, in folders too, to the same places in `to`. Throws IoError.
+void move_rest(const Folder& from, const Folder& to) {
+  for (const std::string& name : from.names()) {
+    const auto moved = from.find(name), there = to.find(name);
+    if (moved && there && moved->kind == there->kind && there->kind == Folder::Kind::kFolder) {
+      move_rest(Folder(from, name), Folder(to, name));
+      from.remove_folder(name);
+    } else {
+      from.rename(name, to, name, Folder::Rename::kNew);
+    }
+  }
 }
 
 }  // namespace
+
+Folder::Rename check_output(const Folder& folder, const std::string& name, Existing existing,
+                            const InputFiles& inputs) {
+  const std::string path = (folder.path() / name).string();
+  inputs.refuse(folder.identity(), path);
+  const std::optional<Folder::Entry> entry = folder.find(name);
+  if (entry) inputs.refuse(entry->identity, path);
+  if (entry && existing == Existing::kForeign) {
+    throw IoError(path +
+                  ": exists, and is no file of the results that would be replaced, as they "
+                  "wrote it; move it away, or choose another name");
+  }
+  if (entry && entry->kind != Folder::Kind::kFile) {
+    throw IoError(path + ": is a link or a folder; expected a file or nothing there");
+  }
+  if (!entry || existing != Existing::kOurs) inputs.refuse_part(folder, name, entry.has_value());
+  if (!entry) return Folder::Rename::kNew;
+  if (existing == Existing::kStays) {
+    throw IoError(path + ": exists; choose another name, or replace it by --force");
+  }
+  folder.check_replaceable(name);
+  return Folder::Rename::kReplace;
+}
+
+Json content_of(const fs::path& file) {
+  constexpr std::size_t kBlock = std::size_t{1} << 20U;
+  std::ifstream stream = open_input(file);
+  Fingerprint fingerprint;
+  std::string block(kBlock, '\0');
+  std::uint64_t bytes = 0;
+  while (stream.read(block.data(), kBlock), stream.gcount() > 0) {
+    fingerprint.add(block.data(), static_cast<std::size_t>(stream.gcount()));
+    bytes += static_cast<std::uint64_t>(stream.gcount());
+  }
+  if (stream.bad()) throw IoError(file.string() + ": cannot be read");
+  return {{"bytes", bytes}, {"fingerprint", fingerprint.text()}};
+}
 
 fs::path whole_path(const fs::path& path) {
   const fs::path whole = fs::weakly_canonical(fs::absolute(path)).lexically_normal();
@@ -82,7 +129,7 @@ ResultFolder::ResultFolder(Folder folder, const OutputKind& kind)
   }
 }
 
-bool ResultFolder::is_complete() const { return has(marker_, "/complete", true); }
+bool ResultFolder::is_complete() const { return has(marker_, kComplete, true); }
 
 bool ResultFolder::is_listed(const std::string& folder, const std::string& name) const {
   const std::string target = target_of_temporary(name);
@@ -114,13 +161,13 @@ void ResultFolder::check(const InputFiles& inputs) const {
   folder_.check_changeable();
   visit_entries(
       [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
-        const fs::path file = parent.path() / name;
-        if (!is_ours) {
-          throw IoError(file.string() + ": is no file of the results (" + kind_.marker +
-                        " does not list it), which would be replaced as a whole; move it away");
+        if (!is_ours || entry.kind != Folder::Kind::kFolder) {
+          check_output(parent, name, is_ours ? Existing::kOurs : Existing::kForeign, inputs);
+          return;
         }
-        inputs.refuse(entry.identity, file);
-        if (entry.kind == Folder::Kind::kFolder) Folder(parent, name).check_changeable();
+        const Folder inner(parent, name);
+        inputs.refuse(entry.identity, inner.path());
+        inner.check_changeable();
       });
 }
 
@@ -192,22 +239,24 @@ void PartialFolder::remove() {
 }
 
 void PartialFolder::replace(ResultFolder* earlier) {
-  if (earlier == nullptr) {
-    parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
-    parent_.sync();
-    return;
-  }
-  if (parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
-    parent_.sync();
+  // What others put into the folder meanwhile stays there.
+  const auto empty = [&] {
     earlier->remove_results();
+    move_rest(earlier->folder(), results_->folder());
+  };
+  if (earlier != nullptr && parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
+    parent_.sync();
+    empty();
     parent_.remove_folder(name_);
     return;
   }
-  // Nothing that is called complete loses its files one by one.
-  Json marker = earlier->marker();
-  marker["complete"] = false;
-  earlier->mark(marker, OutputListing(earlier->listing()));
-  earlier->remove_results();
+  if (earlier != nullptr) {
+    // Nothing that is called complete loses its files one by one.
+    Json marker = earlier->marker();
+    marker["complete"] = false;
+    earlier->mark(marker, OutputListing(earlier->listing()));
+    empty();
+  }
   parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
   parent_.sync();
 }
@@ -215,8 +264,7 @@ void PartialFolder::replace(ResultFolder* earlier) {
 OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
                            const OutputListing& listing, bool may_replace, const InputFiles& inputs)
     : listing_(listing) {
-  const fs::path place = whole_path(target);
-  check_name(place);
+  const fs::path place = checked_place(target);
   inputs.refuse(place);
   if (fs::exists(fs::symlink_status(place))) {
     if (identity_of(place) == identity_of(".")) {
@@ -237,18 +285,21 @@ OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
 }
 
 bool OutputFolder::earlier_have(const char* field, const std::string& text) const {
-  return earlier_ && has(earlier_->marker(), field, text);
+  return earlier_ && has(earlier_->marker(), Json::json_pointer(field), text);
 }
 
 bool OutputFolder::left_have(const char* field, const std::string& text) const {
-  return has(partial_->left(), "/complete", true) && has(partial_->left(), field, text);
+  return has(partial_->left(), kComplete, true) &&
+         has(partial_->left(), Json::json_pointer(field), text);
 }
 
-bool OutputFolder::owns(const char* field, const fs::path& path) const {
-  // A file that still waits to be put in place is not the one there.
-  const fs::path waiting = fs::path(path).concat(kPartialEnd) / path.filename();
-  return earlier_have(field, path.string()) ||
-         (left_have(field, path.string()) && !fs::exists(fs::symlink_status(waiting)));
+Existing OutputFolder::owns(const fs::path& path) const {
+  if (!is_file(path)) return Existing::kForeign;
+  const Json::json_pointer field = Json::json_pointer("/written") / listed_name(path.string());
+  const Json content = content_of(path);
+  const bool is_ours = (earlier_ && has(earlier_->marker(), field, content)) ||
+                       has(partial_->left(), field, content);
+  return is_ours ? Existing::kOurs : Existing::kForeign;
 }
 
 void OutputFolder::keep_unfinished(const Json& marker) {
@@ -266,30 +317,19 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
   partial_->replace(earlier_ ? &*earlier_ : nullptr);
 }
 
-OutputFile::OutputFile(const fs::path& target, bool may_replace, const InputFiles& inputs)
-    : target_(allowed_target(target, inputs)), locked_(target_.parent_path()) {
+OutputFile::OutputFile(const fs::path& target, Existing existing, const InputFiles& inputs)
+    : target_(checked_place(target)), locked_(target_.parent_path()) {
   locked_->lock(Folder::Lock::kShared);
   const std::string name = target_.filename().string();
-  const auto entry = locked_->find(name);
-  if (entry && entry->kind != Folder::Kind::kFile) {
-    throw IoError(target_.string() + ": is a link or a folder; expected a file or nothing there");
-  }
-  if (entry && !may_replace) {
-    throw IoError(target.string() + ": exists; choose another name, or replace it by --force");
-  }
-  if (!entry) how_ = Folder::Rename::kNew;
+  how_ = check_output(*locked_, name, existing, inputs);
   partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
   folder_ = &partial_->parent();
 }
 
 OutputFile::OutputFile(const ResultFolder& results, const std::string& name)
     : target_(whole_path(results.path()) / name), folder_(&results.folder()) {
-  const std::optional<Folder::Entry> entry = folder_->find(name);
-  if (entry && (entry->kind != Folder::Kind::kFile || !results.listing().contains("", name))) {
-    throw IoError((results.path() / name).string() +
-                  ": is in the way, and no part of the results (" + results.kind().marker +
-                  " does not list it); move it away");
-  }
+  const bool is_ours = results.listing().contains("", name);
+  how_ = check_output(*folder_, name, is_ours ? Existing::kOurs : Existing::kForeign, {});
   // Beside the folder, in which a file that is not listed is one of the user.
   partial_.emplace(whole_path(results.path()).concat('.' + name), file_kind(),
                    listing_of_file(name), InputFiles());
@@ -303,6 +343,13 @@ void OutputFile::put_in_place(const std::function<void()>& publish_more) {
   partial_->results().folder().rename(name, *folder_, name, how_);
   folder_->sync();
   partial_->remove();
+}
+
+void OutputFile::write(const std::function<void(std::ostream&)>& fill) {
+  AtomicFile file(path());
+  fill(file.stream());
+  file.commit();
+  put_in_place();
 }
 
 }  // namespace dynains::program

@@ -10,6 +10,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ostream>
 #include <string>
 
 #include "input_files.hpp"
@@ -25,6 +26,24 @@ std::filesystem::path whole_path(const std::filesystem::path& path);
 
 /// Creates a folder and those above it. Throws IoError.
 void create_folder(const std::filesystem::path& folder);
+
+/// What becomes of a file in the place of an output.
+enum class Existing {
+  kStays,   ///< the command is refused: --force was not given
+  kForced,  ///< it is replaced, unless it is a part of what the command was given
+  kOurs,    ///< it is replaced: the results that the command replaces, or adds to, have written it
+  kForeign  ///< the command is refused: they have not
+};
+inline Existing existing_by(bool force) { return force ? Existing::kForced : Existing::kStays; }
+
+/// The one rule for every file that a command writes: where nothing is, a new one; else in place of
+/// a file that may be replaced, never of one that the command reads, of a link or of a folder.
+/// Throws IoError.
+Folder::Rename check_output(const Folder& folder, const std::string& name, Existing existing,
+                            const InputFiles& inputs);
+
+/// Size and fingerprint of a file, so that results know what they have written. Throws IoError.
+nlohmann::ordered_json content_of(const std::filesystem::path& file);
 
 /// Folders of results of one command, and the name of their marker: a file of JSON that names the
 /// program and the command, says whether the results are complete, and lists all other files.
@@ -130,9 +149,9 @@ class OutputFolder {
   bool earlier_have(const char* field, const std::string& text) const;
   /// Whether complete results have, which a killed command has left beside the target.
   bool left_have(const char* field, const std::string& text) const;
-  /// Whether the file `path` was put in place with those results, which name it in `field`. Then it
-  /// is theirs, wherever it lies.
-  bool owns(const char* field, const std::filesystem::path& path) const;
+  /// kOurs if any of those results have written the file `path`, as it is now: their markers have
+  /// its content_of() in the field `written`, by its listed_target().
+  Existing owns(const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
   /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. The results
@@ -150,26 +169,28 @@ class OutputFolder {
 /// A file as an output of its own, or in the folder of finished results.
 class OutputFile {
  public:
-  /// Throws IoError if `target` cannot be written, is one of `inputs`, or exists and must not be
-  /// replaced; UsageError if another command writes it or its folder.
-  OutputFile(const std::filesystem::path& target, bool may_replace, const InputFiles& inputs);
-  /// A file of `results`, which outlive this: a new one, or in place of the listed one. Throws
-  /// IoError if a file of others has the name.
+  /// Throws IoError if `target` cannot be written, or by check_output(); UsageError if another
+  /// command writes it or its folder.
+  OutputFile(const std::filesystem::path& target, Existing existing, const InputFiles& inputs);
+  /// A file of `results`, which outlive this: a new one, or in place of the listed one.
   OutputFile(const ResultFolder& results, const std::string& name);
 
   /// The file to write, of the name of the target.
   std::filesystem::path path() const { return partial_->path() / target_.filename(); }
   /// By whole_path().
   const std::filesystem::path& target() const { return target_; }
+  std::string listed_target() const { return listed_name(target_.string()); }
   /// The file is at the target, and on the disk. If it cannot be put there, it stays in path().
   /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   /// Throws IoError.
   void put_in_place(const std::function<void()>& publish_more = [] {});
+  /// Lets `fill` write the content, and puts the file in place. Throws IoError.
+  void write(const std::function<void(std::ostream&)>& fill);
 
  private:
   std::filesystem::path target_;
   std::optional<Folder> locked_;  // of the target
-  Folder::Rename how_ = Folder::Rename::kReplace;
+  Folder::Rename how_;
   std::optional<PartialFolder> partial_;
   const Folder* folder_ = nullptr;  // of the target
 };

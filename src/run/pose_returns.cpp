@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iomanip>
+#include <ostream>
 
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
@@ -79,8 +79,7 @@ std::string sentence(const ReturnError& error, const Recording& recording) {
          evaluation::format_number(error.degrees, 1) + " deg";
 }
 
-void write_closures(const std::filesystem::path& file, const std::vector<ReturnToPlace>& returns) {
-  std::ofstream text(file);
+void write_closures(std::ostream& text, const std::vector<ReturnToPlace>& returns) {
   text << std::setprecision(9);
   for (const ReturnToPlace& place : returns) {
     if (!place.is_known()) continue;
@@ -98,7 +97,6 @@ void write_closures(const std::filesystem::path& file, const std::vector<ReturnT
     }
     text << '\n';
   }
-  if (!text.flush()) throw IoError(file.string() + ": cannot be written");
 }
 
 }  // namespace dynains::program

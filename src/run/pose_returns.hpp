@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,7 @@ std::vector<ReturnError> return_errors(const Recording& recording, std::size_t f
 std::string sentence(const ReturnError& error, const Recording& recording);
 
 /// Writes the certain returns as edges of a pose graph, EDGE_SE3:QUAT of g2o. Vertices are numbers
-/// of scans. Throws IoError.
-void write_closures(const std::filesystem::path& file, const std::vector<ReturnToPlace>& returns);
+/// of scans.
+void write_closures(std::ostream& text, const std::vector<ReturnToPlace>& returns);
 
 }  // namespace dynains::program

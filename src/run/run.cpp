@@ -89,18 +89,40 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 " invalid (NaN, infinite or at the origin)");
 }
 
+/// Warns if most points, or most of those above the ground, were not judged, and of odd scans.
+void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunListener& listener) {
+  const LabelCounts& labels = results.labels();
+  const auto warn_if_most = [&](std::uint64_t part, std::uint64_t whole, const char* text) {
+    if (2 * part > whole)
+      listener.warn(std::to_string(100 * part / whole) + " % of the points " + text);
+  };
+  // Beams without a return are not judged in any recording; those of a box are.
+  const bool has_box = !plan.sequence.options().self_boxes.empty();
+  const std::uint64_t lost = labels[PointLabel::kInvalid];
+  warn_if_most(labels[PointLabel::kOutOfRange] + (has_box ? lost : 0),
+               results.points() - (has_box ? 0 : lost),
+               "are not judged: nearer than --min-range, farther than --max-range, deeper than "
+               "--noise-depth, or in --self-box");
+  warn_if_most(results.unclustered(), labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
+               "above the ground are in no cluster and not judged; see --cluster-range and "
+               "--sensor-origin-z");
+  for (const std::string& text : odd_scans(results.counts(), plan.range.first, plan.sequence)) {
+    listener.warn(text);
+  }
+}
+
 /// Outputs outside of the folder of results.
 struct OutsideOutputs {
   /// Files of the results that `out` replaces are replaced, too.
   OutsideOutputs(const RunPlan& plan, const OutputFolder& out) {
     const fs::path& map_file = plan.settings.outputs.map;
     if (plan.settings.outputs.has_outside_map()) {
-      map.emplace(map_file, out.owns("/static_map/file", map_file), plan.inputs);
+      map.emplace(map_file, out.owns(map_file), plan.inputs);
     }
     const fs::path& log_file = plan.settings.outputs.log;
     if (log_file.empty()) return;
     check_log_output(plan);
-    log.emplace(log_file, out.owns("/request/write_log", log_file), plan.inputs);
+    log.emplace(log_file, out.owns(log_file), plan.inputs);
   }
 
   std::optional<OutputFile> map, log;
@@ -160,6 +182,9 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
     write_page(outputs.folder / kViewPage, outputs.folder, plan.sequence, plan.range,
                plan.settings.config.map.map_voxel, kDefaultViewPoints);
   }
+  for (const auto* const file : {&outside.map, &outside.log}) {
+    if (*file) outcome.report["written"][(*file)->listed_target()] = content_of((*file)->path());
+  }
   out.finish(outcome.report, [&] {
     if (outside.map) outside.map->put_in_place();
     if (outside.log) outside.log->put_in_place();
@@ -208,6 +233,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   outcome.complete = results.is_complete();
   outcome.alignment = alignment;
   check_not_empty(plan, results);
+  warn_of_scans(plan, results, listener);
   RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
   doubts.returns = return_errors(plan.sequence, plan.range.first,
                                  second_pass ? second_pass->returns() : returns.found());

@@ -120,14 +120,6 @@ RunOutputs outputs_of(const RunSettings& settings) {
   return outputs;
 }
 
-InputFiles inputs_of(const RunSettings& settings, const Recording& sequence) {
-  InputFiles inputs(sequence);
-  inputs.add(sequence.scan_folder());
-  inputs.add(sequence.folder() / "labels");
-  if (!settings.config_file.empty()) inputs.add(settings.config_file);
-  return inputs;
-}
-
 /// Name of the session of a recording: that of its folder or file.
 std::string session_name(const RunSettings& settings) {
   if (!settings.session.empty()) return settings.session;
@@ -247,7 +239,8 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   }
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range);
-  InputFiles inputs = inputs_of(settings, sequence);
+  InputFiles inputs(sequence, settings.config_file);
+  inputs.add(settings.align_start);
   return {std::move(settings), std::move(sequence), range,
           std::move(listing),  std::move(inputs),   configuration,
           std::move(request),  std::move(session)};

@@ -130,8 +130,8 @@ const std::string kNoMessage = "(nothing was thrown)";
 struct JudgedStreet {
   JudgedStreet() { write_run(run, scans, 0); }
   std::vector<std::string> eval(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments = {"eval", sequence.string(), run.string(), "--json",
-                                          json.string()};
+    std::vector<std::string> arguments = {"eval",   sequence.string(), run.string(),
+                                          "--json", json.string(),     "--force"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -303,7 +303,7 @@ TEST_CASE("eval scores map files of either format") {
     }
     writer.commit();
     const std::string json_path = (folder.path() / "map.json").string();
-    call({"eval", sequence.string(), "--map", path.string(), "--json", json_path});
+    call({"eval", sequence.string(), "--map", path.string(), "--json", json_path, "--force"});
     const auto json = nlohmann::json::parse(read_text(json_path));
     REQUIRE(json["rows"].size() == 3);
     CHECK(json["rows"][2]["voxels"]["f1"] == 1.0);

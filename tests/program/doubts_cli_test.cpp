@@ -92,6 +92,53 @@ TEST_CASE("run names the scan at which poses jump, and the size") {
   CHECK(jumps[0]["degrees"].get<double>() == Approx(2.0).margin(1.0));
 }
 
+TEST_CASE("run and check name scans with far fewer points than those before them") {
+  const Drive drive;
+  const auto cut = [&](std::size_t first, std::size_t last, std::size_t share) {
+    for (std::size_t i = first; i <= last; ++i) {
+      const std::vector<float>& whole = drive.scan(i).xyzi;
+      const auto end = whole.begin() + static_cast<std::ptrdiff_t>(whole.size() / 4 / share * 4);
+      const std::vector<float> part(whole.begin(), end);
+      write_scan(drive.file_of(i), part);
+    }
+  };
+  const auto is_told = [&](const std::string& scans) {
+    const std::string told = scans + ": less than half of the points of the scan before";
+    CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("note: " + told));
+    CHECK_THAT(drive.run({"--accept-poses"}).err, ContainsSubstring("warning: " + told));
+  };
+  cut(12, 12, 1000000);
+  is_told("scan 000012");
+  cut(12, 12, 10);
+  cut(16, 22, 3);
+  is_told("8 scans from 000012 to 000022");
+}
+
+TEST_CASE("run names scans that lie at the places of others") {
+  const Drive drive;
+  write_scan(drive.file_of(8), drive.scan(20).xyzi);
+  write_scan(drive.file_of(20), drive.scan(8).xyzi);
+  CHECK_THAT(drive.run({"--accept-poses"}).err,
+             ContainsSubstring("2 scans from 000008 to 000020: much more seems to move"));
+}
+
+TEST_CASE("run tells by how much its parameters leave points unjudged") {
+  const Drive drive;
+  const auto told = [&](const Arguments& flags, const std::string& words) {
+    const std::string text = drive.run(flags).err;
+    CAPTURE(text);
+    const std::size_t at = text.find(" % of the points " + words);
+    REQUIRE(at != std::string::npos);
+    CHECK(std::stoi(text.substr(text.rfind(' ', at - 1))) > 50);
+  };
+  const std::string outside = "are not judged: ", loose = "above the ground are in no cluster";
+  told({"--max-range", "4.5"}, outside);
+  told({"--noise-depth", "0.1"}, outside);
+  told({"--self-box", "-50 -50 -50 50 50 50"}, outside);
+  told({"--cluster-range", "0.001"}, loose);
+  told({"--sensor-origin-z", "100"}, loose);
+}
+
 TEST_CASE("run tells the error of a return to a place, and check writes it for a pose graph") {
   constexpr int kScans = 75;  // of the way there
   const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, kScans, 4));

@@ -89,11 +89,12 @@ TEST_CASE("map: diff writes points, and replaces nothing unasked") {
     return start(arguments);
   };
   // Bad input, and nothing is written.
-  const auto is_refused = [&](std::vector<std::string> more, const std::string& reason) {
-    check_refused(diff(std::move(more)), 2, reason);
+  const auto is_refused = [&](std::vector<std::string> more, const std::string& reason,
+                              int code = 2) {
+    check_refused(diff(std::move(more)), code, reason);
     CHECK(read_tree(days.at("changes")).empty());
   };
-  is_refused({"--removed", days.at("city/changes.ply")}, "lies in the map");
+  is_refused({"--removed", days.at("city/changes.ply")}, "changes.ply: is read by", 1);
   is_refused({"--removed", days.at("changes/changes.jpg")}, "expected a name that ends in .ply");
   is_refused({"--removed", days.at("changes/added.ply")}, "--removed");
 
@@ -109,8 +110,8 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   const Days days;
   succeed(days.update(0, "city", "out"));
   const auto before = read_tree(days.at("city"));
-  const auto is_refused = [&](const Outcome& outcome, const std::string& reason) {
-    check_refused(outcome, 2, reason);
+  const auto is_refused = [&](const Outcome& outcome, const std::string& reason, int code = 2) {
+    check_refused(outcome, code, reason);
     CHECK(read_tree(days.at("city")) == before);
   };
   is_refused(days.update(0, "city", "out2"), "a session is added once");
@@ -122,7 +123,8 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   is_refused(days.update(1, "city", "city/out2"), "outside of it");
   is_refused(start({"map", days.at("city"), "at", "day7", days.at("x.ply")}),
              "no session \"day7\"");
-  is_refused(start({"map", days.at("city"), "export", days.at("city/x.ply")}), "lies in the map");
+  is_refused(start({"map", days.at("city"), "export", days.at("city/x.ply")}),
+             "city/x.ply: is read by this command", 1);
   is_refused(start({"run", days.at("day1"), "--out", days.at("out3"), "--session", "x"}),
              "--session needs --update");
   // The same run again adds no second session.
@@ -147,6 +149,26 @@ TEST_CASE("map: a broken session is named by check with path and position") {
   check_refused(start({"map", days.at("city"), "export", days.at("x.ply")}), 1,
                 file + ": byte 8: ");
   CHECK_FALSE(fs::exists(days.at("x.ply")));
+}
+
+TEST_CASE("map: a copy of a session and an empty one are told, and drop repairs") {
+  const Days days;
+  succeed(days.update(0, "city", "out"));
+  const std::string city = days.at("city");
+  const auto before = read_tree(city);
+  fs::copy_file(city + "/day0.session", city + "/z.session");
+  const Outcome copied = start({"map", city, "check"});
+  CHECK(copied.code == 1);
+  CHECK_THAT(copied.out, ContainsSubstring(
+                             "z.session: is a session of the same scans, poses and times as day0"));
+  write_text(city + "/e.session", "");
+  const Outcome damaged = start({"map", city, "check"});
+  CHECK(damaged.code == 1);
+  CHECK_THAT(damaged.out, ContainsSubstring("e.session: ") && ContainsSubstring("2 defects"));
+  succeed(start({"map", city, "drop", "z"}));
+  succeed(start({"map", city, "drop", "e"}));
+  succeed(start({"map", city, "check"}));
+  CHECK(read_tree(city) == before);
 }
 
 TEST_CASE("map: remap --update moves one session to corrected poses, as if it had been added so") {

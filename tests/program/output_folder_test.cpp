@@ -264,7 +264,8 @@ TEST_CASE("Files that a command reads are never replaced, by any path to them") 
              ContainsSubstring((place.out / "labels/000001.label").string() +
                                ": is read by this command, as " + (place.root / "link").string()));
   CHECK_THAT(refusal_with(place.root / "hard"), ContainsSubstring("map.ply: is read by this"));
-  CHECK_THAT(refusal_with(place.root / "scans"), ContainsSubstring("labels: is read by this"));
+  CHECK_THAT(refusal_with(place.root / "scans"),
+             ContainsSubstring("labels/000000.label: is read by"));
   CHECK_THAT(refusal_with(place.out), ContainsSubstring("is read by this command"));
   CHECK_THAT(refusal_with(place.partial / "labels"), ContainsSubstring("is read by this command"));
   CHECK(read_text(place.partial / "a.txt") == "old");
@@ -285,9 +286,9 @@ TEST_CASE("Two commands never write one output") {
   }
   const fs::path file = place.root / "map.ply";
   {
-    OutputFile first(file, false, InputFiles());
-    CHECK_THROWS_AS(OutputFile(file, true, InputFiles()), UsageError);
-    OutputFile other(place.root / "other.ply", false, InputFiles());
+    OutputFile first(file, Existing::kStays, InputFiles());
+    CHECK_THROWS_AS(OutputFile(file, Existing::kForced, InputFiles()), UsageError);
+    OutputFile other(place.root / "other.ply", Existing::kStays, InputFiles());
     write_text(first.path(), "first");
     write_text(other.path(), "other");
     first.put_in_place();
@@ -297,7 +298,7 @@ TEST_CASE("Two commands never write one output") {
   CHECK(read_text(place.root / "other.ply") == "other");
   CHECK_FALSE(fs::exists(file.string() + ".partial"));
   // Nobody replaces the folder of a file that is being written.
-  const OutputFile within(place.out / "map.ply", false, InputFiles());
+  const OutputFile within(place.out / "map.ply", Existing::kStays, InputFiles());
   CHECK_THROWS_AS(place.begin(), UsageError);
 }
 
@@ -305,12 +306,12 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
   const TemporaryFolder root;
   const fs::path file = root / "map.ply";
   const auto refusal = [&](bool may_replace) {
-    return message_of<IoError>([&] { OutputFile(file, may_replace, InputFiles()); });
+    return message_of<IoError>([&] { OutputFile(file, existing_by(may_replace), InputFiles()); });
   };
   SECTION("a file") {
     write_text(file, "mine");
     CHECK_THAT(refusal(false), ContainsSubstring("map.ply: exists"));
-    OutputFile output(file, true, InputFiles());
+    OutputFile output(file, Existing::kForced, InputFiles());
     write_text(output.path(), "new");
     CHECK(read_text(file) == "mine");
     output.put_in_place();
@@ -320,7 +321,7 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
     write_text(file, "mine");
     InputFiles inputs;
     inputs.add(file);
-    CHECK_THAT(message_of<IoError>([&] { OutputFile(file, true, inputs); }),
+    CHECK_THAT(message_of<IoError>([&] { OutputFile(file, Existing::kForced, inputs); }),
                ContainsSubstring("is read by this command"));
   }
   SECTION("a folder, and a link that leads nowhere") {
@@ -329,7 +330,7 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
                ContainsSubstring("map.ply: is a link or a folder") || ContainsSubstring("none: "));
   }
   SECTION("a file that came meanwhile") {
-    OutputFile output(file, true, InputFiles());
+    OutputFile output(file, Existing::kForced, InputFiles());
     write_text(output.path(), "new");
     write_text(file, "mine");
     CHECK_THAT(message_of<IoError>([&] { output.put_in_place(); }),
@@ -346,7 +347,7 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
       json["outputs"] = OutputListing{{"map.ply"}, {}, {}}.to_json();
       write_text(partial / "partial.json", json.dump());
       write_text(partial / "map.ply", "half");
-      OutputFile output(file, false, InputFiles());
+      OutputFile output(file, Existing::kStays, InputFiles());
       CHECK_FALSE(fs::exists(output.path()));
     }
     SECTION("of others") {
@@ -355,6 +356,48 @@ TEST_CASE("A file is replaced only if it may be, and never a link, a folder or a
       CHECK(read_text(partial / "map.ply") == "mine");
     }
   }
+}
+
+TEST_CASE("What comes into a folder while its results are replaced stays there") {
+  const Place place;
+  write_results(place.out);
+  const auto out = place.begin();
+  write_text(out->path() / "labels/000000.label", "new");
+  write_text(place.out / "notes.txt", "mine");
+  write_text(place.out / "labels/notes.txt", "mine");
+  write_text(place.out / "more/notes.txt", "mine");
+  out->finish(begin_marker(kKind));
+  for (const char* const file : {"notes.txt", "labels/notes.txt", "more/notes.txt"}) {
+    CHECK(read_text(place.out / file) == "mine");
+  }
+  CHECK(read_text(place.out / "labels/000000.label") == "new");
+  CHECK_FALSE(fs::exists(place.partial));
+}
+
+TEST_CASE("A file outside of a folder belongs to the results that have written it as it is") {
+  const Place place;
+  const fs::path map = place.out.string() + ".ply";
+  write_text(map, "theirs");
+  Json json = listed();
+  const auto owner = [&](const fs::path& folder) {
+    fs::create_directories(folder);
+    write_text(folder / "report.json", json.dump());
+    const Existing existing = place.begin()->owns(map);
+    fs::remove_all(folder);
+    return existing;
+  };
+  CHECK(owner(place.out) == Existing::kForeign);
+  json["written"] = {{map.string(), content_of(map)}};
+  for (const fs::path& folder : {place.out, place.partial}) {
+    CHECK(owner(folder) == Existing::kOurs);
+    write_text(map, "mine!!");
+    CHECK(owner(folder) == Existing::kForeign);
+    fs::remove(map);
+    CHECK(owner(folder) == Existing::kForeign);
+    write_text(map, "theirs");
+  }
+  json["written"] = "none";
+  CHECK(owner(place.out) == Existing::kForeign);
 }
 
 TEST_CASE("A file is added to results, and replaced if it was added before") {
@@ -373,13 +416,13 @@ TEST_CASE("A file is added to results, and replaced if it was added before") {
   results.check(InputFiles());
   write_text(place.out / "other.html", "mine");
   CHECK_THAT(message_of<IoError>([&] { OutputFile(results, "other.html"); }),
-             ContainsSubstring("other.html: is in the way"));
+             ContainsSubstring("is no file of the results"));
 }
 
 TEST_CASE("Names of unfinished outputs and the current folder are no places for results") {
   const Place place;
   CHECK_THROWS_AS(OutputFolder(place.partial, kKind, kListing, true, InputFiles()), ConfigError);
-  CHECK_THROWS_AS(OutputFile(place.partial, true, InputFiles()), ConfigError);
+  CHECK_THROWS_AS(OutputFile(place.partial, Existing::kForced, InputFiles()), ConfigError);
   const fs::path before = fs::current_path();
   fs::create_directory(place.out);
   fs::current_path(place.out);

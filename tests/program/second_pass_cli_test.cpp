@@ -79,7 +79,7 @@ TEST_CASE(
 
   const auto rows_of = [&](std::vector<std::string> arguments) {
     const std::string json = recording.folder / "scores.json";
-    arguments.insert(arguments.end(), {"--unlabeled", "static", "--json", json});
+    arguments.insert(arguments.end(), {"--unlabeled", "static", "--json", json, "--force"});
     succeed(start(arguments));
     return nlohmann::json::parse(read_text(json));
   };

@@ -35,7 +35,8 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
   const std::string out = folder / "out";
   for (const char* preset : {"paper", "default"}) {
     succeed(start({"run", a, "--out", out, "--preset", preset, "--force"}));
-    const Outcome judged = start({"eval", a, out, "--errors", "--json", folder / "eval.json"});
+    const Outcome judged =
+        start({"eval", a, out, "--errors", "--json", folder / "eval.json", "--force"});
     CAPTURE(judged.err);
     CHECK(judged.code == 0);
     CHECK_THAT(judged.out, ContainsSubstring("identity") && ContainsSubstring("oracle") &&

@@ -193,7 +193,7 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
     std::string text;
   };
   const std::vector<Case> cases = {
-      {{"--write-log", there}, 1, "exists; choose another name"},
+      {{"--write-log", there}, 1, "exists, and is no file of the results"},
       {{"--write-log", fixture.log, "--force"}, 1, "drive.mcap"},
       {{"--write-log", fixture.folder / "a.bag"}, 2, "ends in .mcap"},
       {{"--write-log", fs::path(fixture.out) / "a.mcap"}, 2, "outside of --out"},

@@ -169,7 +169,7 @@ TEST_CASE("a session is whole or out of the map if it cannot be dropped") {
 TEST_CASE("calls of a simulation fail once") { check_faults(replacing_simulation()); }
 
 TEST_CASE("calls of an evaluation fail once") {
-  const Arguments command = {"eval", "/seq", "/disk/out", "--json", "/maps/eval.json"};
+  const Arguments command = {"eval", "/seq", "/disk/out", "--json", "/maps/eval.json", "--force"};
   check_faults({{run_with({})}, command, command});
 }
 

@@ -81,6 +81,20 @@ else
   [[ $(ls "$work") != *vanished* ]] || fail "vanishing input: leftovers"
 fi
 
+echo "--- a result that cannot be removed"
+if chattr +i "$work/earlier/report.json" 2>/dev/null; then
+  cp -r "$work/earlier" "$work/locked"
+  code=0
+  "$program" run "$seq" --out "$work/earlier" --force --quiet 2>"$work/err" || code=$?
+  chattr -i "$work/earlier/report.json"
+  [[ $code == 1 ]] || fail "a locked result: exit code $code"
+  grep -q 'report.json: cannot be replaced' "$work/err" || fail "a locked result: $(cat "$work/err")"
+  diff -r "$work/locked" "$work/earlier" || fail "a locked result: earlier results changed"
+  [[ $(ls "$work") != *partial* ]] || fail "a locked result: leftovers"
+else
+  not_tested="a result that cannot be removed: chattr has no effect here (needs root)"
+fi
+
 echo "--- a full disk"
 mkdir "$disk"
 if mount -t tmpfs -o size=600k tmpfs "$disk" 2>/dev/null; then

@@ -276,6 +276,7 @@ class WorldMaker {
     if (online) start.arguments.emplace_back("--online");
     if (chance(0.6)) add_target(world, start, "--json");
     if (chance(0.3)) add_target(world, start, "--csv");
+    if (chance(0.6)) start.arguments.emplace_back("--force");
   }
 
   const Parts& parts_;
