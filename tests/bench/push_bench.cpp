@@ -48,7 +48,7 @@ class InstructionCounter {
   }
 
   // Instructions so far; 0 if the system does not count them.
-  std::uint64_t count() const {
+  std::uint64_t count() {
     std::uint64_t result = 0;
 #if defined(__linux__)
     if (file_ < 0 || read(file_, &result, sizeof(result)) != sizeof(result)) return 0;
@@ -72,7 +72,7 @@ using Rows = std::vector<std::pair<std::string, double>>;
 // one lane, so that the map stops growing.
 Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>& scans) {
   constexpr std::size_t kWarmUp = 48, kPushes = 96;
-  const InstructionCounter instructions;
+  InstructionCounter instructions;
   DynaInsRemover remover(config);
   std::vector<StageTimes> times;
   std::vector<double> millions;
@@ -82,13 +82,15 @@ Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>
     const std::uint64_t before = instructions.count();
     const StageTimes spent =
         remover.push(scan.points, scan.T_world_sensor, 0.1 * static_cast<double>(i)).times;
+    const std::uint64_t after = instructions.count();
     if (i < kWarmUp) continue;
     times.push_back(spent);
-    millions.push_back(1e-6 * static_cast<double>(instructions.count() - before));
+    millions.push_back(1e-6 * static_cast<double>(after - before));
   }
   Rows rows;
   const auto add = [&](const std::string& name, auto&& value) {
     std::vector<double> values;
+    values.reserve(times.size());
     for (const StageTimes& spent : times) values.push_back(value(spent));
     rows.emplace_back(name, median(std::move(values)));
   };

@@ -231,7 +231,7 @@ class GroundSegmenter {
       std::size_t& next = next_[patch(begin)];
       std::size_t k = next;
       next += end - begin;
-      if (end + Packs::kCount > scan.size()) {
+      if (scan.size() < end + Packs::kCount) {
         for (std::size_t i = begin; i < end; ++i, ++k) copy_point(from, i, to, k);
         return;
       }
@@ -293,8 +293,8 @@ class GroundSegmenter {
   // step from ring to ring.
   void find_overhangs() {
     using Zones = detail::ConcentricZones;
-    constexpr auto kOutermost =
-        static_cast<std::size_t>(Zones::kRings.back() * Zones::kSectors.back());
+    constexpr auto kOutermost = static_cast<std::size_t>(Zones::kRings.back()) *
+                                static_cast<std::size_t>(Zones::kSectors.back());
     overhangs_.reset();
     if (config_.ground_step <= 0.0) return;
     for (std::size_t p = 0; p < kPatches - kOutermost; ++p) overhangs_[p] = overhangs(p);
@@ -310,9 +310,9 @@ class GroundSegmenter {
       using Packs = decltype(packs);
       const std::optional<detail::HalfSpace> below = find_ground<Packs>(patch, points);
       for (std::size_t i = 0; below && i < points.size(); i += Packs::kCount) {
-        const auto local = below->template local<typename Packs::Float>(points, i);
+        const auto position = below->template local<typename Packs::Float>(points, i);
         is_ground_[(begin + i) / Packs::kCount] =
-            static_cast<std::uint8_t>(below->contains(local).bits());
+            static_cast<std::uint8_t>(below->contains(position).bits());
       }
     });
   }
