@@ -79,11 +79,12 @@ class BasicDynaInsRemover {
   /// `cloud`: m, sensor frame, z up (RemoverConfig::level handles tilted sensors); any type with
   /// PointCloudTraits, any size. Invalid points get PointLabel::kInvalid or kOutOfRange.
   /// `T_world_sensor`: pose of the frame of the cloud at the time of the scan, in a type that
-  /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both may be of a body, such as
-  /// base_link, if RemoverConfig::sensor_origin() is the position of the sensor in it; clouds of
-  /// several sensors are pushed one by one. `time`: s, greater than the time of the previous scan;
-  /// by default 0 for the first scan, else 0.1 s after the previous scan, or the next double if
-  /// 0.1 s is below the resolution.
+  /// to_pose() takes (Eigen::Isometry3d, Matrix4d, Isometry3f, ...). Both may be of a body, such
+  /// as base_link, if RemoverConfig::sensors has the poses of the sensors in it. Points of several
+  /// sensors are pushed together, at the time of the pose. `sensors`: which sensor
+  /// measured them, unless PointCloudTraits::sensor() says it; a sensor may be missing. `time`: s,
+  /// greater than the time of the previous scan; by default 0 for the first scan, else 0.1 s after
+  /// the previous scan, or the next double if 0.1 s is below the resolution.
   ///
   /// Throws PoseError, or the exceptions of PointCloudTraits such as CloudError; the state is then
   /// unchanged. If a stage throws (std::bad_alloc), the scan is discarded and the next scan starts
@@ -91,9 +92,10 @@ class BasicDynaInsRemover {
   /// an older scan throws, for example in the map, only the final verdict on that scan is lost.
   template <class Cloud, class PoseLike>
   FrameResult push(const Cloud& cloud, const PoseLike& T_world_sensor,
-                   std::optional<double> time = std::nullopt) {
+                   std::optional<double> time = std::nullopt,
+                   Span<const SensorRange> sensors = {}) {
     const detail::ReentrancyGuard::Guard guard(pipeline().guard());
-    return pipeline().push(detail::CloudView(cloud), to_pose(T_world_sensor), time);
+    return pipeline().push(detail::CloudView(cloud, sensors), to_pose(T_world_sensor), time);
   }
 
   /// Makes the verdicts on all open scans final, oldest first, and calls `sink(const ScanVerdict&)`

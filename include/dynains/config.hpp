@@ -3,14 +3,17 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/ground/ground_config.hpp"
 #include "dynains/parameters.hpp"
+#include "dynains/pose.hpp"
 
 namespace dynains {
 
@@ -87,14 +90,14 @@ struct RemoverConfig {
   BeliefObservations belief_observations = BeliefObservations::kNewest;
   Comparison compared_clusters = Comparison::kEnds;
   bool big_is_static = false;
-  int votes = 1;                 ///< number of windows
-  double min_range = 2.7;        ///< m, in the sensor's x-y plane
-  double max_range = 250;        ///< m, in the sensor's x-y plane, and along its z axis
-  double sensor_origin_x = 0.0;  ///< m, frame of the pushed clouds
-  double sensor_origin_y = 0.0;  ///< m
-  double sensor_origin_z = 0.0;  ///< m
-  double max_gap = 1.0;          ///< s
-  double max_speed = 100;        ///< m/s
+  int votes = 1;           ///< number of windows
+  double min_range = 2.7;  ///< m, in the sensor's x-y plane
+  double max_range = 250;  ///< m, in the sensor's x-y plane, and along its z axis
+  /// By sensor, its pose in the frame of the pushed clouds (m), such as base_link: its rays begin
+  /// at its origin. PointCloudTraits tell which sensor measured a point; by default the first one.
+  std::vector<Pose> sensors = {Pose::Identity()};
+  double max_gap = 1.0;    ///< s
+  double max_speed = 100;  ///< m/s
   bool level = true;
   double mounting_pitch = 0.0;  ///< deg, nose down
   double mounting_roll = 0.0;   ///< deg, left side up
@@ -146,12 +149,6 @@ struct RemoverConfig {
     visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
                       "points that are farther in the sensor's own x-y plane or along its z axis "
                       "are not judged"});
-    visitor(Parameter{"sensor_origin_x", self.sensor_origin_x, closed(-1000, 1000), "m",
-                      "x of the sensor in the frame of the clouds, such as base_link"});
-    visitor(Parameter{"sensor_origin_y", self.sensor_origin_y, closed(-1000, 1000), "m",
-                      "y of the sensor in that frame"});
-    visitor(Parameter{"sensor_origin_z", self.sensor_origin_z, closed(-1000, 1000), "m",
-                      "z of the sensor in that frame"});
     visitor(
         Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
                   "a longer pause starts a new epoch: scans before and after it are not compared"});
@@ -170,20 +167,17 @@ struct RemoverConfig {
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 
-  /// Position of the sensor, where all rays begin, in the frame of the pushed clouds, m.
-  Eigen::Vector3d sensor_origin() const {
-    return {sensor_origin_x, sensor_origin_y, sensor_origin_z};
-  }
-
   /// Whether a scan starts a new epoch. `pause`: s since the previous scan. `distance`: m from its
   /// pose.
   bool starts_epoch(double pause, double distance) const {
     return pause > max_gap || distance > max_speed * pause;
   }
 
-  /// Throws ConfigError for a field out of bounds, min_range >= max_range or votes > window.
+  /// Throws ConfigError for a field out of bounds, min_range >= max_range, votes > window, or
+  /// sensors that are none, more than 255, farther than 1000 m, or without a rigid pose.
   void validate() const {
     validate_parameters("DynaInsRemover", *this);
+    validate_sensors();
     if (!(min_range < max_range)) {
       throw ConfigError("DynaInsRemover.min_range = " + std::to_string(min_range) +
                         " must be less than max_range = " + std::to_string(max_range));
@@ -191,6 +185,27 @@ struct RemoverConfig {
     if (votes > window) {
       throw ConfigError("DynaInsRemover.votes = " + std::to_string(votes) +
                         " must be at most window = " + std::to_string(window));
+    }
+  }
+
+ private:
+  void validate_sensors() const {
+    constexpr std::size_t kMostSensors = 255;
+    constexpr double kFarthestSensor = 1000.0;  // m
+    if (sensors.empty() || sensors.size() > kMostSensors) {
+      throw ConfigError("DynaInsRemover.sensors has " + std::to_string(sensors.size()) +
+                        " poses; expected 1 to " + std::to_string(kMostSensors));
+    }
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      const std::string name = "DynaInsRemover.sensors[" + std::to_string(i) + "]";
+      try {
+        validate_pose(name, sensors[i]);
+      } catch (const PoseError& error) {
+        throw ConfigError(error.what());
+      }
+      if (sensors[i].translation().cwiseAbs().maxCoeff() > kFarthestSensor) {
+        throw ConfigError(name + " is farther than 1000 m from the origin of the clouds");
+      }
     }
   }
 };

@@ -3,11 +3,15 @@
 //   template <> struct dynains::PointCloudTraits<MyCloud> {
 //     static std::size_t size(const MyCloud& cloud);
 //     static Eigen::Vector3f point(const MyCloud& cloud, std::size_t i);  // metres, sensor frame
+//     // Optional, for several sensors: index in RemoverConfig::sensors.
+//     static std::uint8_t sensor(const MyCloud& cloud, std::size_t i);
 //   };
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -30,6 +34,8 @@ struct RawPoints {
   const Scalar* data;
   std::size_t count;
   std::size_t stride = 3;  ///< scalars per point, at least 3
+  /// By point, index of its sensor in RemoverConfig::sensors; null: all are of the first one.
+  const std::uint8_t* sensors = nullptr;
 };
 
 template <class Scalar>
@@ -53,6 +59,9 @@ struct PointCloudTraits<RawPoints<Scalar>> {
   static Eigen::Vector3f point(const RawPoints<Scalar>& cloud, std::size_t i) {
     const Scalar* const p = cloud.data + i * cloud.stride;
     return {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+  }
+  static std::uint8_t sensor(const RawPoints<Scalar>& cloud, std::size_t i) {
+    return cloud.sensors == nullptr ? std::uint8_t{0} : cloud.sensors[i];
   }
 };
 
@@ -118,9 +127,20 @@ struct PointCloudTraits<
   }
 };
 
+/// Consecutive points of a cloud that one sensor measured, as in a concatenated cloud.
+struct SensorRange {
+  std::size_t begin = 0;    ///< index of the first point
+  std::size_t length = 0;   ///< number of points
+  std::uint8_t sensor = 0;  ///< index in RemoverConfig::sensors
+};
+
 }  // namespace dynains
 
 namespace dynains::detail {
+
+template <class Cloud>
+using SensorAccessor = decltype(std::uint8_t{
+    PointCloudTraits<Cloud>::sensor(std::declval<const Cloud&>(), 0)});
 
 template <class Cloud, class = void>
 struct HasPointCloudTraits : std::false_type {};
@@ -136,7 +156,8 @@ struct HasPointCloudTraits<
 class CloudView {
  public:
   template <class Cloud>
-  explicit CloudView(const Cloud& cloud) : cloud_(&cloud) {
+  explicit CloudView(const Cloud& cloud, Span<const SensorRange> sensors = {})
+      : cloud_(&cloud), ranges_(sensors) {
     static_assert(HasPointCloudTraits<Cloud>::value,
                   "no cloud of points: specialise dynains::PointCloudTraits<Cloud> with "
                   "static std::size_t size(const Cloud&) and static Eigen::Vector3f point(const "
@@ -145,6 +166,7 @@ class CloudView {
     if constexpr (HasPointCloudTraits<Cloud>::value) {  // else one error is enough
       size_ = PointCloudTraits<Cloud>::size(cloud);
       copy_ = &copy_from<Cloud>;
+      if constexpr (HasSensors<Cloud>::value) copy_sensors_ = &copy_sensors_from<Cloud>;
     }
   }
 
@@ -153,8 +175,31 @@ class CloudView {
   void copy(std::size_t begin, std::size_t count, float* x, float* y, float* z) const {
     copy_(cloud_, begin, count, x, y, z);
   }
+  /// Writes the sensor of each point: 0 where none is given. Throws CloudError for a range beyond
+  /// the cloud.
+  void copy_sensors(std::uint8_t* sensors) const {
+    std::fill_n(sensors, size_, std::uint8_t{0});
+    if (copy_sensors_ != nullptr) copy_sensors_(cloud_, size_, sensors);
+    for (const SensorRange& range : ranges_) {
+      if (range.begin > size_ || range.length > size_ - range.begin) {
+        throw CloudError("SensorRange: points " + std::to_string(range.begin) + " + " +
+                         std::to_string(range.length) + " of a cloud of " + std::to_string(size_));
+      }
+      std::fill_n(sensors + range.begin, range.length, range.sensor);
+    }
+  }
 
  private:
+  template <class Cloud, class = void>
+  struct HasSensors : std::false_type {};
+  template <class Cloud>
+  struct HasSensors<Cloud, std::void_t<SensorAccessor<Cloud>>> : std::true_type {};
+
+  template <class Cloud>
+  static void copy_sensors_from(const void* erased, std::size_t count, std::uint8_t* sensors) {
+    const Cloud& cloud = *static_cast<const Cloud*>(erased);
+    for (std::size_t i = 0; i < count; ++i) sensors[i] = PointCloudTraits<Cloud>::sensor(cloud, i);
+  }
   template <class Cloud>
   static void copy_from(const void* erased, std::size_t begin, std::size_t count, float* x,
                         float* y, float* z) {
@@ -169,6 +214,8 @@ class CloudView {
 
   const void* cloud_;
   std::size_t size_ = 0;
+  Span<const SensorRange> ranges_;
+  void (*copy_sensors_)(const void*, std::size_t, std::uint8_t*) = nullptr;  // null: none given
   void (*copy_)(const void*, std::size_t, std::size_t, float*, float*, float*) = nullptr;
 };
 

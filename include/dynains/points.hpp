@@ -143,6 +143,8 @@ struct GroundSplit {
   PointBuffer points;  ///< m, sensor frame; padded for packs beyond `count`
   /// Index of each point in the input of the remover; empty after the push of the scan.
   std::vector<std::uint32_t> input;
+  /// By point of that input, index of its sensor; empty for one sensor, and after the push.
+  Span<const std::uint8_t> sensor_of_input;
   std::size_t ground_count = 0;  ///< number of ground points
   std::size_t count = 0;         ///< number of all points; those behind them are not judged
 

@@ -72,7 +72,8 @@ TEST_CASE("the paper's configuration has the published parameters") {
   CHECK(config.descriptor.cell_range == 0.25);
   CHECK(config.descriptor.cell_azimuth == 1.5);
   CHECK(config.min_range == 2.7);
-  CHECK(config.sensor_origin().isZero(0.0));
+  REQUIRE(config.sensors.size() == 1);
+  CHECK(config.sensors[0].matrix().isIdentity(0.0));
   CHECK(config.map.map_voxel == 0.2);
 }
 

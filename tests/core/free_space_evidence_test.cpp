@@ -36,7 +36,7 @@ class Watch {
   explicit Watch(const FreeSpaceConfig& config) : evidence_(config) {
     SensorModel sensor = SensorModel::typical();
     sensor.azimuth_step = sensor.elevation_gap = sensor.elevation_gap_wide = 0.5;
-    evidence_.adapt(sensor);
+    evidence_.adapt(sensor, {&sensor, 1});
   }
 
   Watch& see(const PointBuffer& instance, const PointBuffer& background = wall(),

@@ -407,7 +407,7 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     SensorModel sensor = SensorModel::typical();
     sensor.azimuth_step = 1.0;
     sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
-    views.adapt(sensor);
+    views.adapt({&sensor, 1});
     constexpr std::uint64_t kScans = 240, kBreak = 17;  // another epoch begins at kBreak
     const auto epoch_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
     const auto since_begin = [](std::uint64_t scan) {
@@ -441,8 +441,9 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
     points.grow(3 + detail::kPackWidth);
-    detail::Visibility visibility;
-    views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest(), visibility);
+    detail::ReferenceTest memory;
+    const detail::Visibility& visibility =
+        views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest(), memory);
     CHECK(visibility.bits(0, 3).free == 1);
     CHECK(visibility.bits(0, 3).hit == 2);
     const std::uint64_t newest_scan = views.newest().scan;

@@ -450,7 +450,7 @@ std::vector<Scan> moved_into_body(std::vector<Scan> scans, const Eigen::Vector3f
   return scans;
 }
 
-TEST_CASE("rays begin at sensor_origin: clouds of a body frame get the verdicts of the sensor") {
+TEST_CASE("rays begin at the sensor: clouds of a body frame get the verdicts of the sensor") {
   Config config = GENERATE(Config::paper(), Config());
   const Eigen::Vector3f origin(1.0F, -0.5F, 1.5F);
   std::vector<Scan> scans = drive(oncoming(), 10, 5.0, 0.7);
@@ -465,9 +465,7 @@ TEST_CASE("rays begin at sensor_origin: clouds of a body frame get the verdicts 
   const Run by_sensor = run(expected, scans);
 
   SECTION("with the position of the sensor") {
-    config.sensor_origin_x = 1.0;
-    config.sensor_origin_y = -0.5;
-    config.sensor_origin_z = 1.5;
+    config.sensors[0].translation() = origin.cast<double>();
     DynaInsRemover remover(config);
     const Run by_body = run(remover, in_body);
     REQUIRE(by_body.final.size() == by_sensor.final.size());
@@ -484,7 +482,7 @@ TEST_CASE("rays begin at sensor_origin: clouds of a body frame get the verdicts 
 
 TEST_CASE("the corrected motion is that of the pushed frame, wherever the sensor is in it") {
   Config config;
-  config.sensor_origin_x = 3.0;
+  config.sensors[0].translation().x() = 3.0;
   std::vector<Scan> scans;
   for (int i = 0; i < 6; ++i) {
     scans.push_back(yard().scan(sensor_at(0.5 * i, 0.0, 0.05 * i), 0.1 * i));

@@ -57,10 +57,11 @@ class FreeSpaceEvidence {
   /// Number of later scans after which a verdict is final.
   std::size_t lookahead_scans() const { return static_cast<std::size_t>(config_.lookahead_scans); }
 
-  /// Sets the sensor. Call it before the first scan, and after each new estimate of the sensor.
-  void adapt(const SensorModel& sensor) {
-    references_.adapt(sensor);
-    moved_ground_.adapt(sensor);
+  /// Sets the sensors of a scan. Call it before the first scan, and after each new estimate of
+  /// them. `all`: model of all together.
+  void adapt(const SensorModel& all, Span<const SensorModel> sensors) {
+    references_.adapt(sensors);
+    moved_ground_.adapt(all);
   }
 
   /// Lets `other`, which outlives this, work for observe() and make_reference(). Results stay the
@@ -227,7 +228,7 @@ class FreeSpaceEvidence {
     for (std::uint64_t age = 1; age <= record.since_begin && age <= lookback; ++age) {
       if (!references_.span().compares(record.since_begin, static_cast<int>(age))) continue;
       const detail::ReferenceScan* const reference = references_.find(scan - age, record.epoch);
-      if (reference != nullptr) test(record, *reference, newest_visibility_);
+      if (reference != nullptr) test(record, *reference, newest_test_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
   }
@@ -239,14 +240,14 @@ class FreeSpaceEvidence {
 
   // Tests all samples of a scan against one reference. `memory`: of the thread.
   void test(Record& record, const detail::ReferenceScan& reference,
-            detail::Visibility& memory) const {
+            detail::ReferenceTest& memory) const {
     record.ground.add(references_.test(record.ground.points, record.ground.size(),
                                        record.T_world_sensor, reference, memory));
     detail::InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility = references_.test(
         evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference, memory);
     const Pose T_sensor_reference =
-        detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_beams);
+        detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_level);
     const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
                                                       static_cast<float>(T_sensor_reference(1, 3)),
                                                       static_cast<float>(T_sensor_reference(2, 3))};
@@ -272,7 +273,7 @@ class FreeSpaceEvidence {
           !detail::is_compared(age, config_.reference_step, most)) {
         continue;
       }
-      test(older, reference, older_visibility_);
+      test(older, reference, older_test_);
     }
   }
 
@@ -341,7 +342,7 @@ class FreeSpaceEvidence {
   detail::GroundSampler ground_sampler_;
   detail::ReferenceScans references_;
   detail::InstanceBeliefUpdater updater_;
-  detail::Visibility newest_visibility_, older_visibility_;
+  detail::ReferenceTest newest_test_, older_test_;
   Background* other_ = nullptr;
   detail::InstanceLinker linker_;
   detail::InstanceJudge judge_;

@@ -6,7 +6,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
@@ -75,15 +74,27 @@ struct ReferenceSpan {
   }
 };
 
-/// A reference scan: its range image is evidence on other scans.
+/// The range image of one sensor of a scan.
+struct ReferenceView {
+  Pose T_world_beams = Pose::Identity();
+  RangeImage image;
+};
+
+/// A reference scan: the range images of its sensors are evidence on other scans.
 struct ReferenceScan {
   static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};  ///< epoch without a valid image
 
   std::uint64_t scan = 0;
   std::uint64_t since_begin = 0;  ///< scans since the first scan of the epoch
   std::uint64_t epoch = kNoEpoch;
-  Pose T_world_beams = Pose::Identity();
-  RangeImage image;
+  Pose T_world_level = Pose::Identity();
+  std::vector<ReferenceView> views;  ///< by sensor
+};
+
+/// What a reference sees of samples, with memory for the test.
+struct ReferenceTest {
+  Visibility all;      ///< of all views: each sample is judged once
+  Visibility of_view;  ///< of one of several
 };
 
 /// The reference scans that are still needed, see ReferenceSpan. The first scan of each epoch, and
@@ -97,13 +108,24 @@ class ReferenceScans {
         span_(config),
         references_(span_.count()) {}
 
-  /// Sets the resolution of later images, and the tilt of their frame, for a sensor. Allocates all
-  /// images.
-  void adapt(const SensorModel& sensor) {
-    grid_ = RangeImageGrid::for_sensor(sensor);
-    for (ReferenceScan& reference : references_) reference.image.allocate(grid_);
-    R_beams_level_.reset();
-    if (!sensor.is_level()) R_beams_level_ = transposed(sensor.R_level_headed);
+  /// Sets the resolution of later images, and their frames, for the sensors of a scan. Allocates
+  /// all images.
+  void adapt(Span<const SensorModel> sensors) {
+    grids_.clear();
+    T_level_beams_.clear();
+    for (const SensorModel& sensor : sensors) {
+      grids_.push_back(RangeImageGrid::for_sensor(sensor));
+      T_level_beams_.emplace_back(Pose::Identity());
+      T_level_beams_.back().linear() = sensor.R_level_headed;
+      T_level_beams_.back().translation() = sensor.origin;
+    }
+    is_level_ = sensors.size() == 1 && sensors[0].is_level();
+    for (ReferenceScan& reference : references_) {
+      reference.views.resize(sensors.size());
+      for (std::size_t i = 0; i < sensors.size(); ++i) {
+        reference.views[i].image.allocate(grids_[i]);
+      }
+    }
   }
 
   const ReferenceSpan& span() const { return span_; }
@@ -113,8 +135,8 @@ class ReferenceScans {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Adds a reference in the place of one that is not needed any more. Its image is in the tilted
-  /// frame of the sensor, in which each beam is a row. `scan`, `epoch`: numbers of the scan and of
+  /// Adds a reference in the place of one that is not needed any more. Each image is in the tilted
+  /// frame of its sensor, in which each beam is a row. `scan`, `epoch`: numbers of the scan and of
   /// its epoch. `since_begin`: scans since the first scan of the epoch, a multiple of
   /// `reference_step`. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground
   /// point, as in RangeImage::build().
@@ -130,15 +152,25 @@ class ReferenceScans {
     reference.scan = scan;
     reference.epoch = epoch;
     reference.since_begin = since_begin;
-    reference.T_world_beams = T_world_level;
+    reference.T_world_level = T_world_level;
+    if (reference.views.size() > 1) {
+      sort_by_sensor(split, moving);
+      for (std::size_t i = 0; i < reference.views.size(); ++i) {
+        build_view(i, T_world_level, reference.views[i]);
+      }
+      return;
+    }
+    ReferenceView& view = reference.views.front();
+    view.T_world_beams = T_world_level;
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
-    if (R_beams_level_) {
-      reference.T_world_beams = rotated(T_world_level, *R_beams_level_);
-      ground = rotate(ground, *R_beams_level_, rotated_ground_);
-      rest = rotate(rest, *R_beams_level_, rotated_rest_);
+    if (!is_level_) {
+      const Eigen::Matrix3d R_beams_level = transposed(T_level_beams_.front().linear());
+      view.T_world_beams = rotated(T_world_level, R_beams_level);
+      ground = rotate(ground, R_beams_level, rotated_ground_);
+      rest = rotate(rest, R_beams_level, rotated_rest_);
     }
-    reference.image.build(grid_, ground, rest, moving, lateral_margin_, scratch_);
+    view.image.build(grids_.front(), ground, rest, moving, lateral_margin_, scratch_);
   }
 
   const ReferenceScan& newest() const { return references_[newest_]; }
@@ -151,24 +183,81 @@ class ReferenceScans {
     return nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from a reference. Returns `out`.
+  /// Visibility of the first `count` points (m; padded for packs) from a reference, held by `out`.
   const Visibility& test(const PointBuffer& points, std::size_t count, const Pose& T_world_points,
-                         const ReferenceScan& reference, Visibility& out) const {
-    const Pose T_reference_points = composed(inverted(reference.T_world_beams), T_world_points);
-    test_visibility(reference.image, T_reference_points, points, count, margin_, margin_slope_,
-                    out);
-    return out;
+                         const ReferenceScan& reference, ReferenceTest& out) const {
+    for (const ReferenceView& view : reference.views) {
+      const bool is_first = &view == reference.views.data();
+      Visibility& visibility = is_first ? out.all : out.of_view;
+      const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
+      test_visibility(view.image, T_view_points, points, count, margin_, margin_slope_, visibility);
+      if (!is_first) out.all.merge(visibility, count);
+    }
+    return out.all;
   }
 
  private:
+  // Points of one sensor in own_.
+  struct OwnPoints {
+    std::size_t begin, ground_count, rest_count;
+  };
+
+  // Sorts the points of a scan by sensor into own_ and own_moving_, those on the ground first.
+  void sort_by_sensor(const GroundSplit& split, Span<const std::uint8_t> moving) {
+    const auto sensor_of = [&](std::size_t i) -> std::size_t {
+      return split.sensor_of_input.empty() ? 0 : split.sensor_of_input[split.input[i]];
+    };
+    own_of_.assign(grids_.size(), OwnPoints());
+    for (std::size_t i = 0; i < split.count; ++i) {
+      OwnPoints& own = own_of_[sensor_of(i)];
+      ++(i < split.ground_count ? own.ground_count : own.rest_count);
+    }
+    next_.clear();
+    std::size_t begin = 0;
+    for (OwnPoints& own : own_of_) {
+      own.begin = begin;
+      next_.push_back(begin);
+      begin += own.ground_count + own.rest_count + kPackWidth;
+    }
+    own_.grow(begin);
+    grow(own_moving_, begin);
+    for (std::size_t i = 0; i < split.count; ++i) {
+      const std::size_t to = next_[sensor_of(i)]++;
+      own_.x[to] = split.points.x[i];
+      own_.y[to] = split.points.y[i];
+      own_.z[to] = split.points.z[i];
+      if (i < split.ground_count) continue;
+      own_moving_[to] = moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count];
+    }
+  }
+
+  // The image of one of several sensors, of its own points.
+  void build_view(std::size_t sensor, const Pose& T_world_level, ReferenceView& view) {
+    const OwnPoints& own = own_of_[sensor];
+    const std::size_t rest = own.begin + own.ground_count;
+    const PointsView points =
+        PointsView(own_).subview(own.begin, own.ground_count + own.rest_count);
+    transform_points(points, PackTransform(inverted(T_level_beams_[sensor])), own_, own.begin);
+    view.T_world_beams = composed(T_world_level, T_level_beams_[sensor]);
+    view.image.build(grids_[sensor], PointsView(own_).subview(own.begin, own.ground_count),
+                     PointsView(own_).subview(rest, own.rest_count),
+                     Span<const std::uint8_t>(own_moving_).subspan(rest, own.rest_count),
+                     lateral_margin_, scratch_);
+  }
+
   float margin_;
   float margin_slope_;
   float lateral_margin_;
   ReferenceSpan span_;
   std::vector<ReferenceScan> references_;
-  std::size_t newest_ = 0;  // index of the newest reference
-  RangeImageGrid grid_;
-  std::optional<Eigen::Matrix3d> R_beams_level_;  // if the sensor is tilted
+  std::size_t newest_ = 0;             // index of the newest reference
+  std::vector<RangeImageGrid> grids_;  // by sensor
+  std::vector<Pose> T_level_beams_;    // by sensor
+  bool is_level_ = true;               // the images of the only sensor are in the level frame
+  PointBuffer own_;                    // points of several sensors, by sensor
+  std::vector<std::uint8_t> own_moving_;
+  std::vector<OwnPoints> own_of_;  // by sensor
+  std::vector<std::size_t> next_;  // by sensor
   PointBuffer rotated_ground_;
   PointBuffer rotated_rest_;
   RangeImage::Scratch scratch_;

@@ -38,6 +38,17 @@ class Visibility {
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
+  /// Adds what another view of the same moment sees of the first `count` samples. A sample on which
+  /// the views contradict each other is unknown.
+  void merge(const Visibility& view, std::size_t count) {
+    for (std::size_t i = 0; i < (count + 7) / 8; ++i) {
+      const auto free = static_cast<std::uint8_t>(free_[i] | view.free_[i]);
+      const auto hit = static_cast<std::uint8_t>(hit_[i] | view.hit_[i]);
+      free_[i] = static_cast<std::uint8_t>(free & ~hit);
+      hit_[i] = static_cast<std::uint8_t>(hit & ~free);
+    }
+  }
+
   /// Most samples of bits(): a word that begins with the byte of a bit contains at least as many
   /// bits from this bit on.
   static constexpr std::size_t kMostBits = 56;

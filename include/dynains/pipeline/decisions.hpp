@@ -156,7 +156,8 @@ class ScanDecision {
   virtual std::size_t latency() const = 0;
 
   virtual bool needs_sensor() const = 0;
-  virtual void adapt(const SensorModel& sensor) = 0;
+  /// Takes the models of the sensors of a scan, and that of all together.
+  virtual void adapt(const SensorModel& all, Span<const SensorModel> sensors) = 0;
 
   /// Adds the newest scan and assigns an instance id to each of its clusters.
   virtual void observe(ScanRing& scans, const ScanWindow& window) = 0;
@@ -203,7 +204,7 @@ class WindowDecision final : public ScanDecision {
   std::size_t window_length() const override { return length_; }
   std::size_t latency() const override { return votes_ == 0 ? 0 : length_ - 1; }
   bool needs_sensor() const override { return false; }
-  void adapt(const SensorModel&) override {}
+  void adapt(const SensorModel&, Span<const SensorModel>) override {}
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {

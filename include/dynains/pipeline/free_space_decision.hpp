@@ -30,7 +30,9 @@ class FreeSpaceDecision final : public ScanDecision {
   std::size_t window_length() const override { return 1; }
   std::size_t latency() const override { return evidence_.lookahead_scans(); }
   bool needs_sensor() const override { return true; }
-  void adapt(const SensorModel& sensor) override { evidence_.adapt(sensor); }
+  void adapt(const SensorModel& all, Span<const SensorModel> sensors) override {
+    evidence_.adapt(all, sensors);
+  }
   void clear() override { instance_ids_.clear(); }
 
   void observe(ScanRing& scans, const ScanWindow& window) override {

@@ -60,7 +60,9 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
       : config_(validated(config)),
         build_map_(config.build_map),
         other_(config.threads > 1 ? std::make_unique<Background>() : nullptr),
-        frame_(config.level, config.mounting_pitch, config.mounting_roll),
+        frame_(config.level, config.mounting_pitch, config.mounting_roll, config.sensors),
+        region_{static_cast<float>(config.min_range), static_cast<float>(config.max_range),
+                frame_.origin().template cast<float>(), frame_.positions()},
         ground_(config.ground),
         clusterer_(config.clusterer),
         motion_(make_motion(config, config.evidence)),
@@ -80,7 +82,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   FrameResult push(const CloudView& cloud, const Pose& T_world_sensor,
                    std::optional<double> time) override {
     StageTimes times;
-    ScanSlot& newest = scans_.prepare(T_world_sensor, time.value_or(scans_.next_time()), config_);
+    ScanSlot& newest =
+        scans_.prepare(T_world_sensor, time.value_or(scans_.next_time()), frame_.origin(), config_);
     timed(times.ingest, [&] { ingest(cloud, newest); });
     PushTransaction transaction(scans_, newest);
     unwritten_ = nullptr;
@@ -90,6 +93,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     }
     const auto cluster = [&] {
       newest.split.input = std::move(split_input_);
+      newest.split.sensor_of_input = ingest_.sensors();
       timed(times.ground,
             [&] { ground_.segment(ingest_.points(), ingest_.input(), newest.split); });
       timed(times.window, [&] { window_.gather(scans_, decision_->window_length()); });  // Eq. 3
@@ -108,6 +112,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     });
     timed(times.verdict, [&] {
       split_input_ = std::move(newest.split.input);
+      newest.split.sensor_of_input = {};
       split_input_.resize(ingest_.points().size());
       for (const auto* list : {&ingest_.out_of_range(), &ingest_.invalid()}) {
         newest.valid = split_input_.size();
@@ -173,38 +178,38 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   // Filters the input points. If the sensor is known, the valid points are rotated into the level
   // frame.
   void ingest(const CloudView& cloud, ScanSlot& next) {
-    const JudgedRegion region = {static_cast<float>(config_.min_range),
-                                 static_cast<float>(config_.max_range),
-                                 config_.sensor_origin().template cast<float>()};
     if (frame_.rotates_scans()) {
       const Eigen::Matrix3d R_level_sensor = level(next);
-      ingest_.read(cloud, region, &R_level_sensor);
+      ingest_.read(cloud, region_, &R_level_sensor);
     } else {
-      ingest_.read(cloud, region, nullptr);
+      ingest_.read(cloud, region_, nullptr);
     }
   }
 
   bool is_sensor_wanted() const {
-    if (sensor().known()) return false;
+    if (!frame_.is_new(ingest_.counts())) return false;
     return decision_->needs_sensor() || config_.level || needs_sensor(ground_) ||
            needs_sensor(clusterer_);
   }
 
-  // Estimates the sensor model from the newest scan and adapts the stages to it. Stages use
-  // SensorModel::typical() until a scan has enough points.
+  // Estimates the models of the sensors from the newest scan and adapts the stages to them. Stages
+  // use SensorModel::typical() until a scan has enough points.
   void find_sensor(ScanSlot& newest) {
-    frame_.estimate(ingest_.points(), newest.split.points);
+    const bool is_turned = frame_.rotates_scans();
+    frame_.estimate(ingest_.points(), ingest_.valid_sensors(), newest.split.points);
     if (sensor().known() && newest.scan > 0) scans_.begin_epoch(newest, EpochReason::kSensor);
-    const SensorModel model = sensor().known() ? sensor() : SensorModel::typical();
+    const SensorModel typical = SensorModel::typical();
+    const SensorModel& model = sensor().known() ? sensor() : typical;
     try {
       adapt_stage(ground_, model);
       adapt_stage(clusterer_, model);
-      decision_->adapt(model);
+      decision_->adapt(model,
+                       sensor().known() ? frame_.sensors() : Span<const SensorModel>(&typical, 1));
     } catch (...) {
       frame_.forget();  // the next scan adapts all stages
       throw;
     }
-    if (frame_.rotates_scans()) ingest_.turn(level(newest));
+    if (frame_.rotates_scans() && !is_turned) ingest_.turn(level(newest));
   }
 
   // Levels the pose of the scan. Returns the rotation for its points.
@@ -292,7 +297,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
       residual->previous_scan = scans_.newest().scan - 1;
       residual->previous_time = scans_[residual->previous_scan].time;
     }
-    const Eigen::Vector3d origin = config_.sensor_origin();
+    const Eigen::Vector3d& origin = frame_.origin();
     if (residual && (frame_.rotates_scans() || !origin.isZero(0.0))) {
       Pose T_cloud_level = Pose::Identity();
       T_cloud_level.linear() = transposed(sensor().R_level_sensor());
@@ -342,6 +347,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   bool build_map_;
   std::unique_ptr<Background> other_;  // null: one thread
   LevelFrame frame_;
+  JudgedRegion region_;
   Ingest ingest_;
   Ground ground_;
   ScanWindow window_;

@@ -62,7 +62,9 @@ class ScanRing {
 
   /// Initializes the slot of the next scan. A PushTransaction adds the scan to the ring. Throws
   /// PoseError for an invalid pose or a time (s) not greater than the previous one.
-  ScanSlot& prepare(const Pose& T_world_sensor, double time, const RemoverConfig& config) {
+  /// `origin`: of the level frame, in that of the cloud, m.
+  ScanSlot& prepare(const Pose& T_world_sensor, double time, const Eigen::Vector3d& origin,
+                    const RemoverConfig& config) {
     validate_pose("T_world_sensor", T_world_sensor);
     validate_time(time);
     ScanSlot& next = (*this)[pushed_];
@@ -73,7 +75,7 @@ class ScanRing {
     if (next.began_epoch) begin_epoch(next, *next.began_epoch);
     next.T_world_sensor = orthonormalized(T_world_sensor);
     next.T_world_level = next.T_world_sensor;
-    next.T_world_level.translation() = next.T_world_sensor * config.sensor_origin();
+    next.T_world_level.translation() = next.T_world_sensor * origin;
     return next;
   }
 

@@ -304,43 +304,128 @@ inline Eigen::Matrix3d R_headed(double heading) {
 
 namespace detail {
 
-/// Estimates the sensor model from a scan, with the rotation from the sensor frame to the level
-/// frame.
+/// The sensors of a scan: their models, and the rotation of their common cloud to the level frame.
 class LevelFrame {
  public:
   /// `level`: whether scans are rotated to the level frame. `pitch`, `roll`: tilt of the mounting,
-  /// deg, as in up_of_mounting(); if both are 0, estimate() estimates the tilt.
-  LevelFrame(bool level, double pitch, double roll)
+  /// deg, as in up_of_mounting(); if both are 0, estimate() estimates the tilt. `T_cloud_sensor`:
+  /// by sensor, at least one.
+  LevelFrame(bool level, double pitch, double roll, Span<const Pose> T_cloud_sensor)
       : is_enabled_(level),
         is_tilt_given_(pitch != 0.0 || roll != 0.0),
-        up_given_(up_of_mounting(pitch, roll)) {}
+        up_given_(up_of_mounting(pitch, roll)),
+        T_cloud_sensor_(T_cloud_sensor.begin(), T_cloud_sensor.end()),
+        is_one_(T_cloud_sensor.size() == 1 && T_cloud_sensor[0].linear().isIdentity(0.0)) {
+    for (const Pose& T : T_cloud_sensor_) origin_ += T.translation();
+    origin_ /= static_cast<double>(T_cloud_sensor_.size());
+    forget();
+  }
 
-  /// Not known() until estimate() was called with enough points.
+  /// Origin of the level frame in the frame of the cloud, m: the mean of the sensors.
+  const Eigen::Vector3d& origin() const { return origin_; }
+  /// Position of each sensor, m, relative to origin(), along the axes of the cloud. Empty for one
+  /// sensor.
+  std::vector<Eigen::Vector3f> positions() const {
+    std::vector<Eigen::Vector3f> positions;
+    if (T_cloud_sensor_.size() == 1) return positions;
+    for (const Pose& T : T_cloud_sensor_) {
+      positions.emplace_back((T.translation() - origin_).cast<float>());
+    }
+    return positions;
+  }
+
+  /// Model of all sensors together, by all of their points. Not known() until estimate() was called
+  /// with enough points.
   const SensorModel& sensor() const { return sensor_; }
+  /// Model of each sensor.
+  Span<const SensorModel> sensors() const { return sensors_; }
 
   /// Whether the caller rotates scans by sensor().R_level_sensor().
   bool rotates_scans() const { return sensor_.known() && is_enabled_; }
 
-  /// Estimates the sensor model from a scan (m, sensor frame). The model is unchanged if the scan
-  /// has too few points. `headed`: memory for the scan.
-  void estimate(PointsView scan, PointBuffer& headed) {
+  /// Whether estimate() would find a sensor that it has not seen. `counts`: points by sensor, or
+  /// empty for one sensor.
+  bool is_new(Span<const std::size_t> counts) const {
+    if (!sensor_.known()) return true;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      if (!is_seen_[i] && counts[i] >= kFewestOfSensor) return true;
+    }
+    return false;
+  }
+
+  /// Estimates the models of the sensors from a scan: m, relative to origin(), in the axes of the
+  /// cloud, or in those of the level frame if rotates_scans(), which then stays. `sensor_of`: by
+  /// point; empty for one sensor. Nothing changes if the scan has too few points. `headed`: memory
+  /// for the scan.
+  void estimate(PointsView scan, Span<const std::uint8_t> sensor_of, PointBuffer& headed) {
+    Eigen::Matrix3d R_scan_cloud = Eigen::Matrix3d::Identity();
+    if (rotates_scans()) {
+      R_scan_cloud = sensor_.R_level_sensor();
+    } else if (!sensor_.known()) {
+      sensor_ = estimate_all(scan, headed);
+      if (!sensor_.known()) return;
+    }
+    if (is_one_) {
+      sensors_[0] = sensor_;
+      return;
+    }
+    for (std::size_t i = 0; i < sensors_.size(); ++i) {
+      if (!is_seen_[i]) estimate_one(i, scan, sensor_of, R_scan_cloud, headed);
+    }
+  }
+
+  void forget() {
+    sensor_ = {};
+    sensors_.assign(T_cloud_sensor_.size(), SensorModel());
+    is_seen_.assign(T_cloud_sensor_.size(), false);
+  }
+
+ private:
+  SensorModel estimate_all(PointsView scan, PointBuffer& headed) const {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_enabled_) R_headed_sensor = R_headed(estimate_heading(scan));
     const PointsView points = rotate(scan, R_headed_sensor, headed);
     SensorModel sensor = estimate_sensor_model(points);
-    if (!sensor.known()) return;
+    if (!sensor.known()) return sensor;
     const Mounting mounting = estimate_mounting(points);
     if (mounting.known) sensor.height = mounting.height;
     if (is_enabled_) {
       sensor.R_headed_sensor = R_headed_sensor;
       sensor.R_level_headed = R_level_headed(mounting, R_headed_sensor);
     }
-    sensor_ = sensor;
+    return sensor;
   }
 
-  void forget() { sensor_ = {}; }
+  // The model of sensor i: its sampling by its own points in its own frame, or that of all points
+  // if these are few.
+  void estimate_one(std::size_t i, PointsView scan, Span<const std::uint8_t> sensor_of,
+                    const Eigen::Matrix3d& R_scan_cloud, PointBuffer& own) {
+    const Pose& T = T_cloud_sensor_[i];
+    const Eigen::Vector3d position = T.translation() - origin_;
+    Pose T_scan_sensor = Pose::Identity();
+    T_scan_sensor.linear() = composed(R_scan_cloud, T.linear());
+    T_scan_sensor.translation() = multiplied(R_scan_cloud, position);
+    std::size_t count = 0;
+    own.grow(scan.size() + kPackWidth);
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      own.x[count] = scan.x[k];
+      own.y[count] = scan.y[k];
+      own.z[count] = scan.z[k];
+      count += (sensor_of.empty() ? 0U : sensor_of[k]) == i ? 1 : 0;
+    }
+    const PointsView points = PointsView(own).subview(0, count);
+    transform_points(points, PackTransform(inverted(T_scan_sensor)), own, 0);
+    is_seen_[i] = count >= kFewestOfSensor;
+    SensorModel model = estimate_sensor_model(points);
+    if (!model.known()) model = sensor_;
+    const Eigen::Matrix3d R_level_cloud = sensor_.R_level_sensor();
+    model.height = sensor_.height;
+    model.R_headed_sensor.setIdentity();
+    model.R_level_headed = composed(R_level_cloud, T.linear());
+    model.origin = multiplied(R_level_cloud, position);
+    sensors_[i] = model;
+  }
 
- private:
   // `mounting`: estimate in the headed frame.
   Eigen::Matrix3d R_level_headed(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
     constexpr double kLevel = 4.0;  // deg; estimates for level sensors are up to 2.6
@@ -354,8 +439,13 @@ class LevelFrame {
 
   bool is_enabled_;
   bool is_tilt_given_;
-  Eigen::Vector3d up_given_;  // normal of the ground, sensor frame
+  Eigen::Vector3d up_given_;  // normal of the ground, frame of the cloud
+  std::vector<Pose> T_cloud_sensor_;
+  bool is_one_;  // the axes of the only sensor are those of the cloud
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   SensorModel sensor_;
+  std::vector<SensorModel> sensors_;
+  std::vector<bool> is_seen_;  // by sensor: it had enough points
 };
 
 }  // namespace detail

@@ -24,6 +24,8 @@ struct SensorModel {
   double elevation_max = 0.0;       ///< elevation of the highest beam
 
   double height = 0.0;  ///< m above the ground
+  /// m, level frame, where the beams begin; zero unless a scan has several sensors.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 
   /// Rotation about z from the sensor frame to the headed frame, whose x axis has the azimuth
   /// estimate_heading().
@@ -122,13 +124,15 @@ inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
 
 }  // namespace detail
 
+/// Points of a scan that estimate_sensor_model() asks for.
+inline constexpr std::size_t kFewestOfSensor = 500;
+
 /// Estimates the angular sampling from one scan (m, sensor frame, finite coordinates). Sets the
 /// height of SensorModel::typical(); estimate_mounting() estimates the height. The result is not
-/// known() if the scan has fewer than 500 points, or no two points on one beam. Allocates memory,
-/// so call it for one scan of a sensor, not for each.
+/// known() if the scan has fewer than kFewestOfSensor points, or no two points on one beam.
+/// Allocates memory, so call it for one scan of a sensor, not for each.
 inline SensorModel estimate_sensor_model(PointsView points) {
-  constexpr std::size_t kFewest = 500;
-  if (points.size() < kFewest) return {};
+  if (points.size() < kFewestOfSensor) return {};
   constexpr double kBeamBand = 0.1;    // deg, range of the elevations of one beam
   constexpr double kLeastStep = 0.01;  // deg
   constexpr double kLeastGap = 0.08;   // deg, between beams
