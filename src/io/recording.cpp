@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
@@ -28,7 +29,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFarthestSensor = 1000.0;  // m, as RemoverConfig::sensor_origin_x
+constexpr double kFarthestSensor = 1000.0;  // m, as of RemoverConfig::sensors
+constexpr const char* kSensorPoses = "sensors.txt";
+constexpr const char* kSensorFolder = "sensor";
 
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
@@ -129,6 +132,7 @@ Recording::Recording(const fs::path& path, const RecordingOptions& options)
   }
   find_columns();
   refuse_idle(options, format_, columns_);
+  find_sensors();
   frame_ = options.frame == PointFrame::kAuto ? guess_frame() : options.frame;
   notes_.push_back(frame_ == PointFrame::kWorld ? "points are in the frame of the world"
                                                 : "points are in the frame of the sensor");
@@ -409,9 +413,46 @@ void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   if (frame_ == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
+  read_sensors(i, scan);
   if (!options_.self_boxes.empty()) clear_boxes(options_.self_boxes, scan);
   if (options_.deskew && !motion_.poses.empty())
     deskew(motion_, time(i), T_world_sensor(i), *clock_, file(i), scan);
+}
+
+void Recording::find_sensors() {
+  const fs::path file = folder_ / kSensorPoses;
+  if (options_.sensors.empty() && is_folder(folder_) && is_file(file)) {
+    options_.sensors = read_trajectory(file).poses;
+    files_.push_back(file);
+  }
+  if (options_.sensors.empty()) return;
+  if (!sensor_origin().isZero(0.0)) {
+    throw ConfigError("the origin of one sensor and the poses of several exclude each other");
+  }
+  notes_.push_back("points are of " + std::to_string(options_.sensors.size()) + " sensors");
+}
+
+/// Numbers of the sensors in a file beside the scans take the place of those of the scan.
+void Recording::read_sensors(std::size_t i, RecordedScan& scan) const {
+  if (options_.sensors.empty()) {
+    scan.sensor.clear();
+    return;
+  }
+  const fs::path file = folder_ / kSensorFolder / (name(i) + ".id");
+  if (is_file(file)) {
+    ByteReader reader(file);
+    if (reader.remaining() != scan.size()) {
+      fail(file, "has " + std::to_string(reader.remaining()) + " bytes, expected one for each of " +
+                     std::to_string(scan.size()) + " points");
+    }
+    const std::string bytes = reader.read_block(scan.size(), "sensors of points");
+    scan.sensor.assign(bytes.begin(), bytes.end());
+  }
+  if (options_.sensor_beams > 0) {
+    for (std::uint8_t& sensor : scan.sensor) {
+      sensor = static_cast<std::uint8_t>(sensor / options_.sensor_beams);
+    }
+  }
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {

@@ -38,6 +38,7 @@ class BinReader final : public ScanReader {
             RecordedScan& points) const override {
     points.ring.clear();
     points.time.clear();
+    points.sensor.clear();
     const bool is_usual = layout_.columns == 4 && !layout_.is_double;
     is_usual ? read_scan(scan.file, points.xyzi)
              : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
@@ -74,6 +75,7 @@ class PointFileReader final : public ScanReader {
     }
     points.ring = std::move(file.ring);
     points.time = std::move(file.time);
+    points.sensor = std::move(file.sensor);
   }
   std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
     PointFile points = read_points(scan.file);

@@ -327,7 +327,9 @@ void runtime(const RuntimeOptions& options) {
                     InputFiles(sequence, options.remover.config_file()));
   std::vector<double> points, totals;                 // by frame
   std::map<std::string, std::vector<double>> stages;  // ms
-  DynaInsRemover remover(options.remover.config());
+  DynaInsRemover::Config config = options.remover.config();
+  take_sensors(sequence, config);
+  DynaInsRemover remover(config);
   RecordedScan scan;
   // Each repetition starts with an empty map and warm buffers.
   for (std::size_t repetition = 0; repetition < options.repeat; ++repetition) {

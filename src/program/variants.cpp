@@ -30,6 +30,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
   for (const Variant& variant : variants) {
     DynaInsRemover::Config config = variant.config;
     config.build_map = false;
+    take_sensors(sequence.sequence(), config);
     removers.emplace_back(config);
   }
   evaluation::LabelledScan scan;
@@ -37,7 +38,7 @@ VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Varia
     in_map[i].assign(scan.size(), 0);
     for (std::size_t v = 0; v < removers.size(); ++v) {
       const FrameResult frame = naming_scan(sequence.sequence(), sequence.index(i), [&] {
-        return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
+        return removers[v].push(RawPoints<float>{scan.xyz, scan.size(), scan.stride, scan.sensors},
                                 scan.T_world_sensor, sequence.sequence().time(sequence.index(i)));
       });
       if (answer == Answer::kNewest) {

@@ -1,3 +1,8 @@
+#include <pybind11/numpy.h>
+
+#include <algorithm>
+
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "settings.hpp"
@@ -41,6 +46,26 @@ std::string represent(const Config& config) {
   return text + ')';
 }
 
+py::list sensors_of(const Config& config) {
+  py::list poses;
+  for (const Pose& pose : config.sensors) poses.append(to_array(pose));
+  return poses;
+}
+
+void set_sensors(Config& config, const py::list& poses) {
+  Config result = config;
+  result.sensors.clear();
+  for (const py::handle pose : poses) result.sensors.push_back(to_pose(pose));
+  result.validate();
+  config = result;
+}
+
+bool are_equal(const Config& a, const Config& b) {
+  const auto is_same = [](const Pose& x, const Pose& y) { return x.matrix() == y.matrix(); };
+  return to_dict(a).equal(to_dict(b)) && std::equal(a.sensors.begin(), a.sensors.end(),
+                                                    b.sensors.begin(), b.sensors.end(), is_same);
+}
+
 }  // namespace
 
 void bind_config(py::module_& module) {
@@ -53,6 +78,9 @@ void bind_config(py::module_& module) {
                return result;
              }),
              "Defaults, with the parameters that are named set.");
+  config.def_property(
+      "sensors", &sensors_of, &set_sensors,
+      "Poses of the sensors in the frame of the pushed clouds, each (4, 4): one, the identity.");
   const auto add_preset = [&](const char* name, Config (*preset)(), const char* help) {
     config.def_static(
         name,
@@ -73,15 +101,16 @@ void bind_config(py::module_& module) {
   config.def("validate", &Config::validate, "Raises ConfigError if parameters contradict.");
   config.def_static("parameters", &list_parameters,
                     "Name, section, default, bounds or values, unit and help of every parameter.");
+  config.def("__eq__", &are_equal, py::arg("other"),
+             py::is_operator());  // with anything else: not equal
   config.def(
-      "__eq__", [](const Config& a, const Config& b) { return to_dict(a).equal(to_dict(b)); },
-      py::arg("other"), py::is_operator());  // with anything else: not equal
-  config.def(py::pickle([](const Config& self) { return to_dict(self); },
-                        [](const py::dict& values) {
-                          Config result;
-                          assign_all(result, values);
-                          return result;
-                        }));
+      py::pickle([](const Config& self) { return py::make_tuple(to_dict(self), sensors_of(self)); },
+                 [](const py::tuple& state) {
+                   Config result;
+                   assign_all(result, state[0].cast<py::dict>());
+                   set_sensors(result, state[1].cast<py::list>());
+                   return result;
+                 }));
   config.def("__repr__", [](const Config& self) { return represent(self); });
 }
 

@@ -14,6 +14,8 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "settings.hpp"
 
@@ -74,19 +76,39 @@ py::dict to_dict(const Plausibility& window) {
   return shares;
 }
 
+using SensorNumbers = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
+
+// Runs of points of one sensor.
+std::vector<SensorRange> ranges_of(const SensorNumbers& sensors, const py::object& points) {
+  const auto count = static_cast<std::size_t>(sensors.size());
+  if (sensors.ndim() != 1 || count != py::len(points)) {
+    throw CloudError("sensors have " + std::to_string(count) + " numbers for " +
+                     std::to_string(py::len(points)) + " points");
+  }
+  std::vector<SensorRange> ranges;
+  const std::uint8_t* const numbers = sensors.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (ranges.empty() || ranges.back().sensor != numbers[i]) ranges.push_back({i, 0, numbers[i]});
+    ++ranges.back().length;
+  }
+  return ranges;
+}
+
 // The remover without the interpreter's lock: a mutex keeps threads that share it apart.
 class Remover {
  public:
   explicit Remover(const DynaInsRemover::Config& config) : remover_(config) {}
 
-  Frame push(const py::object& points, const py::object& pose, std::optional<double> time) {
+  Frame push(const py::object& points, const py::object& pose, std::optional<double> time,
+             const std::optional<SensorNumbers>& sensors) {
     const Pose T_world_sensor = to_pose(pose);
+    const std::vector<SensorRange> ranges =
+        sensors ? ranges_of(*sensors, points) : std::vector<SensorRange>();
     Frame frame;
     with_points(points, [&](const auto& cloud) {
       const py::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
-      const FrameResult result =
-          time ? remover_.push(cloud, T_world_sensor, *time) : remover_.push(cloud, T_world_sensor);
+      const FrameResult result = remover_.push(cloud, T_world_sensor, time, ranges);
       const ScanVerdict newest = result.newest();
       // Whoever holds the interpreter's lock releases it to wait for the mutex.
       const py::gil_scoped_acquire acquire;
@@ -304,12 +326,14 @@ void bind_remover(py::module_& module) {
              return std::make_unique<Remover>(config);
            }),
            "Defaults, with the parameters that are named set.")
-      .def("push", &Remover::push, py::arg("points"), py::arg("T_world_sensor"),
-           py::arg("time") = py::none(),
-           "Takes one scan in and returns a FrameResult.\n\n"
-           "points: (N, 3 to 64) float32 or float64, metres, sensor frame; any strides, never "
-           "copied as a whole. T_world_sensor: (4, 4). time: s, increasing; without it scans are "
-           "0.1 s apart. Raises CloudError, PoseError or TypeError, and then nothing has changed.")
+      .def(
+          "push", &Remover::push, py::arg("points"), py::arg("T_world_sensor"),
+          py::arg("time") = py::none(), py::arg("sensors") = py::none(),
+          "Takes one scan in and returns a FrameResult.\n\n"
+          "points: (N, 3 to 64) float32 or float64, metres, sensor frame; any strides, never "
+          "copied as a whole. T_world_sensor: (4, 4). time: s, increasing; without it scans are "
+          "0.1 s apart. sensors: (N,) uint8, index in Config.sensors; without it all points are of "
+          "the first. Raises CloudError, PoseError or TypeError, and then nothing has changed.")
       .def("flush", &Remover::flush,
            "Final verdicts on all scans still open, oldest first, as a list of ScanVerdict. The "
            "next push starts a new window.")

@@ -21,7 +21,8 @@ SecondPass::SecondPass(ByteStore& store, const SecondPassConfig& config)
       store_(store),
       returns_(store, config.evidence) {}
 
-void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
+void SecondPass::add(PointsView points, const ScanVerdict& verdict,
+                     Span<const std::uint8_t> sensor_of) {
   if (verdict.scan != scans_.size() || is_decided_) {
     throw UsageError(
         "SecondPass::add: scan " + std::to_string(verdict.scan) +
@@ -33,7 +34,7 @@ void SecondPass::add(PointsView points, const ScanVerdict& verdict) {
   if (visit != latest_) visits_[latest_]->rest();
   latest_ = visit;
   scans_.push_back({visit, visits_[visit]->scans()});
-  visits_[visit]->add(points, verdict);
+  visits_[visit]->add(points, verdict, sensor_of);
 }
 
 void SecondPass::test(const std::function<bool()>& keep_going) {

@@ -14,12 +14,14 @@ constexpr float kBelief = 0.95F;  // of points that the second pass removes
 }  // namespace
 
 Visit::Visit(ByteStore& store, const SecondPassConfig& config)
-    : config_(config),
-      store_(store),
-      places_(store, config.memory),
-      references_(/*most_scans=*/5, config.evidence.lateral_margin) {}
+    : config_(config), store_(store), places_(store, config.memory) {
+  constexpr std::uint32_t kMostScans = 5;  // from one reference to the next
+  for (std::size_t i = 0; i < config.sensors.size(); ++i) {
+    references_.emplace_back(kMostScans, config.evidence.lateral_margin);
+  }
+}
 
-void Visit::add(PointsView points, const ScanVerdict& verdict) {
+void Visit::add(PointsView points, const ScanVerdict& verdict, Span<const std::uint8_t> sensor_of) {
   const ComparedPose& compared = verdict.compared;
   const std::uint32_t number = scans();
   if (number == 0) {
@@ -34,11 +36,40 @@ void Visit::add(PointsView points, const ScanVerdict& verdict) {
   last_ = static_cast<std::uint32_t>(verdict.scan);
   if (is_suspicious_) return;  // first verdicts stay
   places_.add(points, verdict.labels, verdict.causes, T, scans_.back().epoch);
-  const RecordingReference* const reference = references_.add(points, verdict.labels, T, number);
+  const std::vector<Pose>& sensors = config_.sensors;
+  if (sensors.size() == 1 && sensors.front().matrix().isIdentity(0.0)) {
+    keep_reference(0, points, verdict.labels);
+    return;
+  }
+  for (std::size_t sensor = 0; sensor < sensors.size(); ++sensor) {
+    select_own(sensor, points, verdict.labels, sensor_of);
+    keep_reference(sensor, own_, own_labels_);
+  }
+}
+
+void Visit::select_own(std::size_t sensor, PointsView points, Span<const PointLabel> labels,
+                       Span<const std::uint8_t> sensor_of) {
+  const Eigen::Isometry3f T_sensor_cloud(config_.sensors[sensor].inverse().cast<float>().matrix());
+  own_.clear();
+  own_labels_.clear();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if ((sensor_of.empty() ? 0U : sensor_of[i]) != sensor) continue;
+    const Eigen::Vector3f p =
+        T_sensor_cloud * Eigen::Vector3f(points.x[i], points.y[i], points.z[i]);
+    own_.push_back(p.x(), p.y(), p.z());
+    own_labels_.push_back(labels[i]);
+  }
+}
+
+// Keeps the newest scan, as one sensor has measured it, if it is a reference.
+void Visit::keep_reference(std::size_t sensor, PointsView points, Span<const PointLabel> labels) {
+  const std::uint32_t number = scans() - 1;
+  const RecordingReference* const reference = references_[sensor].add(
+      points, labels, scans_.back().T_level_sensor * config_.sensors[sensor], number);
   if (reference == nullptr) return;
   packed_.clear();
   pack_image(reference->image, packed_);
-  kept_.push_back({number, store_.append(packed_), packed_.size()});
+  kept_.push_back({number, sensor, store_.append(packed_), packed_.size()});
 }
 
 void Visit::rest() { places_.rest(); }
@@ -49,8 +80,8 @@ bool Visit::test(const std::function<bool()>& keep_going) {
   for (const Reference& kept : kept_) {
     if (!keep_going()) return false;
     store_.read(kept.offset, kept.size, packed_);
-    reference.T_world_beams = scans_[kept.scan].T_level_sensor;
-    if (!unpack_image(references_.grid(), packed_, reference.image)) {
+    reference.T_world_beams = scans_[kept.scan].T_level_sensor * config_.sensors[kept.sensor];
+    if (!unpack_image(references_[kept.sensor].grid(), packed_, reference.image)) {
       throw IoError("a reference of the second pass was damaged in its store");
     }
     places_.test(
@@ -102,8 +133,8 @@ bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and
-// no observation of its place is free. Ground that left with the instance above it stays removed: it holds wheels and
-// undersides.
+// no observation of its place is free. Ground that left with the instance above it stays removed:
+// it holds wheels and undersides.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
   constexpr double kMostRise = 0.02;  // m

@@ -69,6 +69,7 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   const std::size_t index = scans_[i];
   scan.xyz = scan_.points.xyzi.data();
   scan.stride = 4;
+  scan.sensors = scan_.points.sensor.empty() ? nullptr : scan_.points.sensor.data();
   scan.T_world_sensor = sequence_.T_world_sensor(index);
   scan.truth = scan_.truth;
   scan.in_map = scan_.in_map;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/point_cloud_traits.hpp"
@@ -12,7 +13,12 @@
 namespace dynains::program {
 
 inline RawPoints<float> points_of(const RecordedScan& scan) {
-  return {scan.xyzi.data(), scan.size(), 4};
+  return {scan.xyzi.data(), scan.size(), 4, scan.sensor.empty() ? nullptr : scan.sensor.data()};
+}
+
+/// Sets the sensors of a recording of several.
+inline void take_sensors(const Recording& recording, RemoverConfig& config) {
+  if (!recording.sensors().empty()) config.sensors = recording.sensors();
 }
 
 /// Copies the coordinates of a scan.

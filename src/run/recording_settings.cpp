@@ -45,6 +45,9 @@ RecordingOptions RecordingSettings::checked() const {
   if (!options.sensor_origin.isZero(0.0) && !options.sensor_frame.empty()) {
     throw ConfigError("sensor origin and sensor frame exclude each other");
   }
+  if (!options.sensor_origin.isZero(0.0) && !options.sensors.empty()) {
+    throw ConfigError("sensor origin and sensors exclude each other");
+  }
   RecordingOptions result = options;
   for (const std::string text : flags) {
     if (is_file(text)) result.sources.emplace_back(text);

@@ -221,6 +221,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   // The first pass has compared all scans of a shorter recording.
   if (plan.settings.passes > 1 && plan.range.size() > returns.compared()) {
     SecondPassConfig config;
+    config.sensors = plan.settings.config.sensors;
     config.static_policy = plan.settings.static_policy;
     config.evidence = plan.settings.config.evidence;
     results.wait_for(second_pass.emplace(store, config));

@@ -26,8 +26,23 @@ nlohmann::ordered_json parameters_of(const DynaInsRemover::Config& config) {
   return json;
 }
 
+/// Finite points of one sensor of a scan, m, in its frame.
+PointBuffer points_of_sensor(const Recording& recording, const RecordedScan& scan,
+                             std::size_t sensor) {
+  if (recording.sensors().empty()) return finite_points(scan);
+  const Pose T_sensor_cloud = recording.sensors()[sensor].inverse();
+  RecordedScan own;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if ((scan.sensor.empty() ? 0U : scan.sensor[i]) != sensor) continue;
+    const Eigen::Vector3f p = (T_sensor_cloud * scan.point(i).position).cast<float>();
+    own.xyzi.insert(own.xyzi.end(), {p.x(), p.y(), p.z(), 0.0F});
+  }
+  return finite_points(own);
+}
+
 /// OwnBody::min_range() of a sample of the scans of `range`, m, at most `otherwise`; that value if
-/// the sensor moves less than 5 m or the scans are too few to tell. A body that reaches farther is
+/// the sensor moves less than 5 m or the scans are too few to tell; the largest one of several
+/// sensors. A body that reaches farther is
 /// judged like other things; otherwise the road around it would be lost. Throws IoError.
 double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
   constexpr std::size_t kScans = 24;
@@ -42,14 +57,21 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
                                   .norm());
   }
   if (motion < kLeastMotion) return otherwise;
-  std::vector<PointBuffer> scans;
+  std::vector<std::vector<PointBuffer>> scans(std::max<std::size_t>(1, recording.sensors().size()));
   RecordedScan scan;
   for (const std::size_t i : chosen) {
     recording.read_scan(i, scan);
-    scans.push_back(finite_points(scan));
+    for (std::size_t sensor = 0; sensor < scans.size(); ++sensor) {
+      scans[sensor].push_back(points_of_sensor(recording, scan, sensor));
+    }
   }
-  const OwnBody body = estimate_own_body(scans);
-  return body.known ? std::min(body.min_range(), otherwise) : otherwise;
+  double range_of_bodies = 0.0;
+  for (const std::vector<PointBuffer>& own : scans) {
+    const OwnBody body = estimate_own_body(own);
+    if (!body.known) return otherwise;
+    range_of_bodies = std::max(range_of_bodies, body.min_range());
+  }
+  return std::min(range_of_bodies, otherwise);
 }
 
 /// So that a broken file or pose is noticed before anything is written.
@@ -218,6 +240,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   outputs = outputs_of(given);
   const ScanRange range = select_scans(sequence, settings.window);
   check_scans(sequence, range);
+  take_sensors(sequence, config);
   if (settings.find_own_body) {
     config.min_range = own_body_range(sequence, range, config.min_range);
     config.validate();

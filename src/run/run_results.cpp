@@ -154,7 +154,7 @@ void RunResults::write_final(const RecordedScan& scan, const ScanVerdict& verdic
   final_labels_.write(recording_.name(range_.first + verdict.scan));
   copy_points(scan, judged_.points);
   if (second_pass_ != nullptr) {
-    second_pass_->add(judged_.points, verdict);
+    second_pass_->add(judged_.points, verdict, scan.sensor);
   } else {
     if (returns_ != nullptr) returns_->add(judged_.points, verdict.labels, verdict.compared);
     complete_scan(scan, verdict);

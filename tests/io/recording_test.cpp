@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -98,6 +99,35 @@ TEST_CASE("Intensities 0 and 1 of scans with VIEWPOINT are labels, others are no
   write_text(folder / "pcd/1.pcd", labelled("0 1 0", "0 0 0 1 0 0 0"));
   write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
   CHECK_FALSE(Recording(folder.path()).has_labels());
+}
+
+TEST_CASE("points of several sensors have numbers in files beside the scans, or in a column") {
+  const TemporaryFolder folder;
+  write_text(folder / "poses.txt", "1 0 0 10 0 1 0 20 0 0 1 30\n");
+  RecordingOptions options;
+  SECTION("files") {
+    write_text(folder / "a1.pcd", pcd({4, 5, 6}));
+    write_text(folder / "sensors.txt", "1 0 0 1 0 1 0 0.5 0 0 1 2\n1 0 0 1 0 1 0 -0.5 0 0 1 2\n");
+    write_text(folder / "sensor/a1.id", std::string("\1\0\1", 3));
+    const Recording recording(folder.path());
+    REQUIRE(recording.sensors().size() == 2);
+    CHECK(recording.sensors()[1].translation().isApprox(Eigen::Vector3d(1.0, -0.5, 2.0)));
+    CHECK((recording.read_scan(0).sensor == std::vector<std::uint8_t>{1, 0, 1}));
+    CHECK(tells(recording, "points are of 2 sensors"));
+    write_text(folder / "sensor/a1.id", "\1\1");
+    CHECK_THROWS_WITH(recording.read_scan(0),
+                      ContainsSubstring("expected one for each of 3 points"));
+    options.sensor_origin.x() = 1.0;
+    CHECK_THROWS_AS(Recording(folder.path(), options), ConfigError);
+  }
+  SECTION("a column, which counts the beams of all") {
+    write_text(folder / "a1.csv", "x,y,z,laser_number\n4,5,6,31\n4,5,7,32\n4,5,8,63\n4,5,9,-1\n");
+    CHECK(Recording(folder.path()).read_scan(0).sensor.empty());
+    options.sensors.assign(2, Pose::Identity());
+    options.sensor_beams = 32;
+    const Recording recording(folder.path(), options);
+    CHECK((recording.read_scan(0).sensor == std::vector<std::uint8_t>{0, 1, 1, 7}));
+  }
 }
 
 TEST_CASE(

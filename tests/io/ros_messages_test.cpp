@@ -115,6 +115,7 @@ TEST_CASE("Livox messages are read as clouds") {
     CHECK(scan.xyzi[6] == 4.0F);
     CHECK(scan.xyzi[7] == 99.0F);
     CHECK(scan.ring[1] == 1);
+    CHECK((scan.sensor == std::vector<std::uint8_t>{1, 1}));
     CHECK(scan.time[1] == 50000000.0);
   }
 }

@@ -1,3 +1,4 @@
+import pickle
 import threading
 
 import dynains
@@ -189,6 +190,28 @@ def test_poses_may_be_lists_but_nothing_else_than_numbers():
     for pose in "north", [[1, 0], [0]]:
         with pytest.raises(TypeError, match=r"^a pose is (str|list), expected \(4, 4\) numbers"):
             remover.push(np.ones((5, 3)), pose)
+
+
+def test_points_of_several_sensors(street):
+    config = dynains.Config()
+    behind = np.eye(4)
+    behind[0, 3] = -1.0
+    config.sensors = [np.eye(4), behind]
+    assert config != dynains.Config()
+    assert pickle.loads(pickle.dumps(config)) == config
+    remover = dynains.DynaInsRemover(config)
+    points = street[0].points
+    sensors = np.arange(len(points)) % 2
+    frame = remover.push(points, street[0].T_world_sensor, sensors=sensors)
+    assert frame.newest.labels.shape == (len(points),)
+    assert frame.newest.epoch > 0
+    np.testing.assert_allclose(frame.newest.T_world_compared, street[0].T_world_sensor)
+    for wrong in sensors + 1, sensors[1:]:
+        with pytest.raises(dynains.CloudError):
+            remover.push(points, street[1].T_world_sensor, sensors=wrong)
+    behind[0, 0] = 2.0
+    with pytest.raises(dynains.ConfigError, match=r"sensors\[1\]"):
+        config.sensors = [np.eye(4), behind]
 
 
 def test_push_lets_other_threads_run(street, no_switching):

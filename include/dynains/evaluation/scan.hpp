@@ -23,8 +23,9 @@ enum Row : std::size_t {
 
 /// Views of one scan. Each span has one value per point; spans may be empty where stated.
 struct LabelledScan {
-  const float* xyz = nullptr;  ///< x y z of each point, m, sensor frame
-  std::size_t stride = 3;      ///< floats per point, at least 3
+  const float* xyz = nullptr;             ///< x y z of each point, m, sensor frame
+  std::size_t stride = 3;                 ///< floats per point, at least 3
+  const std::uint8_t* sensors = nullptr;  ///< of each point; null: all are of one
   Pose T_world_sensor = Pose::Identity();
   Span<const std::uint32_t> truth;  ///< SemanticKITTI labels
   /// Bit e is set if the map of estimate e contains the point. Empty if no map contains a point.

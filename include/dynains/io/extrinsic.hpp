@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <string>
+#include <vector>
 
 #include "dynains/pose.hpp"
 
@@ -17,6 +18,10 @@ Pose read_extrinsic(const std::string& text);
 /// Position of the sensor in the frame of the clouds, m. `text` is `x y z`, with blanks or commas,
 /// or a pose as for read_extrinsic(). Throws ConfigError and IoError.
 Eigen::Vector3d read_sensor_origin(const std::string& text);
+
+/// Poses of several sensors in the frame of the clouds, m: the rows of a file as of
+/// read_trajectory(). Throws IoError.
+std::vector<Pose> read_sensor_poses(const std::string& file);
 
 /// `x y z qx qy qz qw` of a pose, with six decimals.
 std::string extrinsic_text(const Pose& T_body_sensor);

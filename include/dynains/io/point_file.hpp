@@ -63,6 +63,8 @@ struct PointFile {
   std::vector<std::uint16_t> ring;         ///< ring, channel, line, scalar_ring
   std::vector<double> time;                ///< time, t, timestamp, offset_time, scalar_time
   std::vector<std::uint32_t> label;        ///< label, class, scalar_label
+  /// sensor, lidar_id, lidar_index, d, laser_number; 255 for values that are no numbers of sensors
+  std::vector<std::uint8_t> sensor;
   /// Pose of the sensor: VIEWPOINT of PCD, else identity.
   Pose viewpoint = Pose::Identity();
 };

@@ -59,6 +59,10 @@ struct RecordingOptions {
   /// Position of the sensor in the frame of the clouds, m: not zero for clouds that were moved into
   /// a body frame, such as base_link, before they were recorded.
   Eigen::Vector3d sensor_origin = Eigen::Vector3d::Zero();
+  /// Poses of several sensors in the frame of the clouds, m; empty: sensors.txt in the folder of
+  /// the recording, or one sensor.
+  std::vector<Pose> sensors;
+  int sensor_beams = 0;  ///< beams of one sensor, if `laser_number` counts those of all; 0: none
   /// For logs: frame of the sensor; its transform to the frame of the clouds gives the origin.
   std::string sensor_frame;
   double point_time_unit = 0.0;  ///< s per unit of the times of points; 0: found by their span
@@ -77,9 +81,10 @@ struct RecordingOptions {
 
 /// One scan. Each column has one value per point, or is empty if the recording lacks it.
 struct RecordedScan {
-  std::vector<float> xyzi;          ///< x y z intensity, interleaved; sensor frame, m
-  std::vector<std::uint16_t> ring;  ///< number of the beam
-  std::vector<double> time;         ///< in the unit of the file
+  std::vector<float> xyzi;           ///< x y z intensity, interleaved; sensor frame, m
+  std::vector<std::uint16_t> ring;   ///< number of the beam
+  std::vector<double> time;          ///< in the unit of the file
+  std::vector<std::uint8_t> sensor;  ///< index in Recording::sensors(); not written
 
   std::size_t size() const { return xyzi.size() / 4; }
 
@@ -148,6 +153,9 @@ struct ScanAddress;
 /// clouds; without such transforms, the poses are used as poses of the sensor. If the clouds are in
 /// the fixed frame of the poses, PointFrame is kWorld.
 ///
+/// Sensors of points (see Recording::sensors()) are in sensor/NAME.id (uint8 per point) in the
+/// folder of sensors.txt, or in a column, see PointFile.
+///
 /// With a sensor origin, points and poses are in a frame at the sensor with the axes of the clouds.
 ///
 /// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans
@@ -179,6 +187,8 @@ class Recording {
   bool is_deskewed() const { return options_.deskew; }
   /// Position of the sensor in the frame of the clouds, m.
   const Eigen::Vector3d& sensor_origin() const { return options_.sensor_origin; }
+  /// Poses of several sensors in the frame of the clouds, m; empty for one.
+  const std::vector<Pose>& sensors() const { return options_.sensors; }
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
   const std::optional<std::string>& early_end() const { return early_end_; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
@@ -274,6 +284,8 @@ class Recording {
   void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
   void place_scans(const std::filesystem::path& poses);
   void find_columns();
+  void find_sensors();
+  void read_sensors(std::size_t i, RecordedScan& scan) const;
   bool has_labels_as_intensity() const;
   Pose pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
   PointFrame guess_frame() const;

@@ -32,8 +32,8 @@ class SecondPass {
 
   /// Takes the first verdict on a scan, in the order of the scans: FrameResult::finished. `points`:
   /// m, sensor frame, all of the scan. Throws UsageError if the sizes differ, if the scan is not
-  /// the next one, or after test().
-  void add(PointsView points, const ScanVerdict& verdict);
+  /// the next one, or after test(). `sensor_of`: by point; empty: the first sensor.
+  void add(PointsView points, const ScanVerdict& verdict, Span<const std::uint8_t> sensor_of = {});
   /// Tests all places. Ends without a result if `keep_going()` returns false; then revise() changes
   /// nothing.
   void test(const std::function<bool()>& keep_going = [] { return true; });

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct SecondPassConfig {
   StaticPolicy static_policy = StaticPolicy::kAlways;
   /// Bytes of places and ground in memory, unless those near the sensor take more.
   std::size_t memory = std::size_t{160} << 20U;
+  /// By sensor, its pose in the frame of the points, m: RemoverConfig::sensors.
+  std::vector<Pose> sensors = {Pose::Identity()};
   /// Configuration of the first pass: its margins also hold for the second pass, and its lookback
   /// and lookahead determine which scans it has compared.
   FreeSpaceConfig evidence;
@@ -43,7 +46,8 @@ class Visit {
   Visit(ByteStore& store, const SecondPassConfig& config);
 
   /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.
-  void add(PointsView points, const ScanVerdict& verdict);
+  /// `sensor_of`: by point; empty: the first sensor.
+  void add(PointsView points, const ScanVerdict& verdict, Span<const std::uint8_t> sensor_of);
   /// Moves all data into the store.
   void rest();
   /// Tests all places. Returns false, without a result, as soon as `keep_going()` does.
@@ -65,23 +69,29 @@ class Visit {
   };
   struct Reference {
     std::uint32_t scan;
+    std::size_t sensor;
     std::uint64_t offset;  // in the store
     std::size_t size;      // bytes
   };
+  void keep_reference(std::size_t sensor, PointsView points, Span<const PointLabel> labels);
+  void select_own(std::size_t sensor, PointsView points, Span<const PointLabel> labels,
+                  Span<const std::uint8_t> sensor_of);
   bool belongs_to_object(PointLabel label, const Eigen::Vector3d& point);
   bool restore(std::size_t i, bool stands, const Eigen::Vector3d& point, VerdictArrays& verdict);
 
   SecondPassConfig config_;
   ByteStore& store_;
   RecordingPlaces places_;
-  RecordingReferences references_;
-  Pose T_level_world_ = Pose::Identity();  // z up, origin and heading of the first sensor
+  std::deque<RecordingReferences> references_;  // by sensor
+  Pose T_level_world_ = Pose::Identity();       // z up, origin and heading of the first sensor
   Epochs epochs_;
   std::vector<Scan> scans_;
   std::uint32_t first_ = 0, last_ = 0;  // scans of the recording
   bool is_suspicious_ = false;
   std::vector<Reference> kept_;
   std::vector<std::uint8_t> packed_;
+  PointBuffer own_;  // points of one of several sensors, in its frame
+  std::vector<PointLabel> own_labels_;
 };
 
 }  // namespace dynains

@@ -67,6 +67,8 @@ void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns)
 void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
   const PointCloud2 cloud(in);
   resize(scan, cloud.size(), cloud.columns());
+  const PointCloud2::Field& sensor = cloud.field(Role::kSensor);
+  scan.sensor.resize(sensor.is_there ? cloud.size() : 0);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const std::uint8_t* const point = cloud.point(i);
     float* const xyzi = scan.xyzi.data() + 4 * i;
@@ -77,6 +79,7 @@ void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
     const PointCloud2::Field &ring = cloud.field(Role::kRing), &time = cloud.field(Role::kTime);
     if (ring.is_there) scan.ring[i] = ring_of(ring.value(point));
     if (time.is_there) scan.time[i] = time.value(point);
+    if (sensor.is_there) scan.sensor[i] = sensor_number(sensor.value(point));
   }
 }
 
@@ -88,17 +91,25 @@ PointColumns livox_columns() {
   return columns;
 }
 
-/// Number of points of a CustomMsg behind its header, checked against the size of the message.
-std::uint32_t read_livox_size(MessageReader& in) {
+struct LivoxCloud {
+  std::uint8_t lidar = 0;
+  std::uint32_t points = 0;
+};
+
+/// What follows the header of a CustomMsg: the number of points is checked against its size.
+LivoxCloud read_livox_cloud(MessageReader& in) {
+  LivoxCloud cloud;
   in.number<std::uint64_t>("a time base");
   in.number<std::uint32_t>("a number of points");
-  in.number<std::uint8_t>("a lidar id");
+  cloud.lidar = in.number<std::uint8_t>("a lidar id");
   in.take(3, "reserved bytes");
-  return in.length(kLivoxPoint, "points");
+  cloud.points = in.length(kLivoxPoint, "points");
+  return cloud;
 }
 
 void read_livox(MessageReader& in, RecordedScan& scan) {
-  const std::uint32_t points = read_livox_size(in);
+  const auto [lidar, points] = read_livox_cloud(in);
+  scan.sensor.assign(points, lidar);
   resize(scan, points, livox_columns());
   for (std::uint32_t i = 0; i < points; ++i) {
     scan.time[i] = in.number<std::uint32_t>("an offset time");
@@ -139,7 +150,9 @@ bool is_pose_type(const std::string& type) {
 CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& message) {
   MessageReader in(message);
   const Header header = read_header(in);
-  if (is_livox(type)) return {header.time, header.frame, read_livox_size(in), livox_columns()};
+  if (is_livox(type)) {
+    return {header.time, header.frame, read_livox_cloud(in).points, livox_columns()};
+  }
   const PointCloud2 cloud(in);
   return {header.time, header.frame, cloud.size(), cloud.columns()};
 }

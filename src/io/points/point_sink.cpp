@@ -35,6 +35,11 @@ constexpr Alias kAliases[] = {
     {"label", Role::kLabel},
     {"class", Role::kLabel},
     {"scalar_label", Role::kLabel},
+    {"sensor", Role::kSensor},
+    {"lidar_id", Role::kSensor},
+    {"lidar_index", Role::kSensor},
+    {"d", Role::kSensor},
+    {"laser_number", Role::kSensor},
 };
 
 }  // namespace
@@ -45,6 +50,11 @@ Role role_of(std::string_view name) {
     if (alias.name == lower) return alias.role;
   }
   return Role::kNone;
+}
+
+std::uint8_t sensor_number(double value) {
+  std::uint8_t number = 0;
+  return store_number(value, number) ? number : std::uint8_t{255};
 }
 
 bool PointSink::claim(Role role) {
@@ -79,6 +89,7 @@ void PointSink::resize(std::size_t count) {
   if (claimed(Role::kRing)) file_.ring.resize(count);
   if (claimed(Role::kTime)) file_.time.resize(count);
   if (claimed(Role::kLabel)) file_.label.resize(count);
+  if (claimed(Role::kSensor)) file_.sensor.resize(count);
 }
 
 bool PointSink::set(std::size_t i, Role role, double value) {
@@ -98,6 +109,9 @@ bool PointSink::set(std::size_t i, Role role, double value) {
       return true;
     case Role::kLabel:
       return store_number(value, file_.label[i]);
+    case Role::kSensor:
+      file_.sensor[i] = sensor_number(value);
+      return true;
     case Role::kNone:
       return true;
   }

@@ -13,13 +13,16 @@
 namespace dynains {
 
 /// Meaning of a column.
-enum class Role : std::uint8_t { kX, kY, kZ, kIntensity, kRing, kTime, kLabel, kNone };
+enum class Role : std::uint8_t { kX, kY, kZ, kIntensity, kRing, kTime, kLabel, kSensor, kNone };
 
 /// Meaning of the first columns without names.
 inline constexpr Role kUsualRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kIntensity};
 
 /// Meaning of a column with this name; case is ignored.
 Role role_of(std::string_view name);
+
+/// Number of a sensor; 255 for a value that is none.
+std::uint8_t sensor_number(double value);
 
 /// Collects points, value by value.
 class PointSink {

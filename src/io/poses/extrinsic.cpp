@@ -54,6 +54,8 @@ Eigen::Vector3d read_sensor_origin(const std::string& text) {
   return {(*position)[0], (*position)[1], (*position)[2]};
 }
 
+std::vector<Pose> read_sensor_poses(const std::string& file) { return read_trajectory(file).poses; }
+
 std::string extrinsic_text(const Pose& T_body_sensor) {
   const Eigen::Vector3d t = T_body_sensor.translation();
   detail::Quaternion q(T_body_sensor.linear());
