@@ -74,7 +74,8 @@ class Kerbside {
     const bool pram = random_.chance(0.5);
     const auto people = static_cast<int>(2 + random_.index(4));
     for (int i = 0; i < people; ++i) {
-      const double beside = 0.6 * (i % 2), behind = 0.8 * (i / 2);
+      const int row = i / 2;
+      const double beside = 0.6 * (i % 2), behind = 0.8 * row;
       std::vector<Vec2> goals;
       for (int step = 0; step <= 3; ++step) {
         goals.push_back(

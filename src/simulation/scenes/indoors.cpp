@@ -176,10 +176,8 @@ World room(const Config& config, Random random) {
   builder.place_anyway(slab_model(l + 0.4, 2 * w + 0.4, h, h + 0.2), {{l / 2, 0}, 0});
   furnish_room(builder, random, room);
   for (int i = 0; i < builder.count(0.04 * l * w + 0.3); ++i) {
-    std::vector<Vec2> goals;
-    for (int step = 0; step < 3; ++step) {
-      goals.push_back({random.uniform(0.15, 0.85) * l, random.uniform(-0.7, 0.7) * w});
-    }
+    std::vector<Vec2> goals(3);
+    for (Vec2& goal : goals) goal = {random.uniform(0.15, 0.85) * l, random.uniform(-0.7, 0.7) * w};
     const double pace = random.uniform(0.4, 1.1), mood = random.unit();
     builder.walker(std::move(goals), pace, pause_of(mood, 0.2, 0.4, 0.8, random.uniform(1, 8)));
   }

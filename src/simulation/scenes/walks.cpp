@@ -46,7 +46,8 @@ void add_group(Builder& builder, Random& random, double from, double to) {
   for (std::size_t k = 0; k <= company; ++k) {
     // Two walk side by side.
     const double beside = 0.65 * static_cast<double>(k % 2) * (lateral > 0 ? -1 : 1);
-    const double behind = -0.7 * static_cast<double>(k / 2);
+    const std::size_t row = k / 2;
+    const double behind = -0.7 * static_cast<double>(row);
     std::vector<Vec2> goals;
     for (int step = 0; step <= 3; ++step) {
       const double u = step / 3.0;
