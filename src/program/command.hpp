@@ -2,6 +2,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 
 namespace dynains::program {
 
@@ -18,6 +20,10 @@ void add_config_command(CLI::App& app);
 void add_eval_command(CLI::App& app);
 void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
+void add_grid_command(CLI::App& app);
+
+/// Prints where a grid was written, and PlacedGrid::summary().
+void print_grid(const std::filesystem::path& file, const nlohmann::ordered_json& summary);
 
 /// An interrupted run exits with 128 + the number of the signal.
 enum ExitCode {

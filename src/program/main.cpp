@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   add_eval_command(app);
   add_experiment_command(app);
   add_view_command(app);
+  add_grid_command(app);
   app.callback([&app] {
     if (app.get_subcommands().empty()) {
       throw dynains::UsageError("expected a command, for example run (see dynains --help)");

@@ -74,6 +74,7 @@ void print_summary(const RunOutcome& run) {
   print_results(run);
   if (run.alignment) print_alignment(*run.alignment);
   if (!run.log.empty()) std::cout << "log: " << run.log.string() << std::endl;
+  if (!run.grid.is_null()) print_grid(run.outputs.grid, run.grid);
   if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
 }
 

@@ -1,6 +1,7 @@
 #include "run.hpp"
 
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <thread>
@@ -13,6 +14,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/recording/second_pass.hpp"
 #include "estimate_poses.hpp"
+#include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
 #include "output_folder.hpp"
@@ -21,6 +23,7 @@
 #include "run_report.hpp"
 #include "run_sequence.hpp"
 #include "start_check.hpp"
+#include "write_grid.hpp"
 #include "write_view.hpp"
 
 namespace dynains::program {
@@ -119,13 +122,19 @@ struct OutsideOutputs {
     if (plan.settings.outputs.has_outside_map()) {
       map.emplace(map_file, out.owns(map_file), plan.inputs);
     }
+    const fs::path& grid_file = plan.settings.outputs.grid;
+    if (!grid_file.empty()) {
+      const fs::path image = grid_image(grid_file);
+      grid.emplace(grid_file, out.owns("/request/grid", grid_file), plan.inputs);
+      picture.emplace(image, out.owns("/request/grid_image", image), plan.inputs);
+    }
     const fs::path& log_file = plan.settings.outputs.log;
     if (log_file.empty()) return;
     check_log_output(plan);
     log.emplace(log_file, out.owns(log_file), plan.inputs);
   }
 
-  std::optional<OutputFile> map, log;
+  std::optional<OutputFile> map, log, grid, picture;
 };
 
 /// Writes the log of the results in `folder` to `file`.
@@ -141,6 +150,23 @@ void write_log(const fs::path& file, const RunPlan& plan, const fs::path& folder
   listener.warn(outcome.log.string() + ": " + std::to_string(*unjudged) +
                 " clouds have no verdict, for lack of a pose, by their stamps or by --start and "
                 "--end; they keep all points");
+}
+
+/// Writes the grid of the results in `folder`, unless a signal comes.
+void write_grid(const RunPlan& plan, const fs::path& folder, const OutsideOutputs& outside,
+                const RunListener& listener, RunOutcome& outcome) {
+  std::vector<std::size_t> scans(plan.range.size());
+  std::iota(scans.begin(), scans.end(), plan.range.first);
+  if (scans.size() == 1) listener.warn(kGridOfOneScan);
+  const PlacedGrid made =
+      grid_of_run(folder, plan.sequence, scans, plan.settings.outputs.grid_config, false,
+                  [](std::size_t) { return InterruptGuard::signal() == 0; });
+  if (InterruptGuard::signal() != 0) {
+    outcome.complete = false;
+    return;
+  }
+  grid::write_grid(outside.picture->path(), outside.grid->path(), made.grid, made.origin);
+  outcome.grid = made.summary();
 }
 
 /// Throws ConfigError if the scans disagree with the poses. Returns the agreement.
@@ -188,6 +214,7 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
   out.finish(outcome.report, [&] {
     if (outside.map) outside.map->put_in_place();
     if (outside.log) outside.log->put_in_place();
+    if (outside.grid) outside.picture->put_in_place([&] { outside.grid->put_in_place(); });
     if (session != nullptr) session->commit();
   });
 }
@@ -245,9 +272,13 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   if (outside.log && outcome.complete) {
     write_log(outside.log->path(), plan, outputs.folder, listener, outcome);
   }
+  if (outside.grid && outcome.complete) {
+    write_grid(plan, outputs.folder, outside, listener, outcome);
+  }
   nlohmann::ordered_json told = to_json(doubts, plan.sequence);
   told["warnings"] = warnings;
   outcome.report = make_report(plan, agreement, told, results, timing);
+  if (!outcome.grid.is_null()) outcome.report["grid"] = outcome.grid;
   if (second_pass) {
     outcome.report["second_pass"] = {{"places", second_pass->place_count()},
                                      {"removed_points", second_pass->revised().removed},

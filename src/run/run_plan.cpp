@@ -13,6 +13,7 @@
 #include "io/fingerprint.hpp"
 #include "io/points/finite_points.hpp"
 #include "recorded_scans.hpp"
+#include "write_grid.hpp"
 
 namespace dynains::program {
 namespace {
@@ -123,6 +124,17 @@ void complete_log(RunOutputs& outputs) {
 }
 
 /// Throws ConfigError.
+void complete_grid(RunOutputs& outputs) {
+  if (outputs.grid.empty()) return;
+  outputs.grid_config.validate();
+  const fs::path grid = grid_file(outputs.grid);
+  if (is_in_results(grid, whole_path(outputs.folder))) {
+    throw ConfigError("--grid " + outputs.grid.string() + ": choose a place outside of --out");
+  }
+  outputs.grid = grid;
+}
+
+/// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
   if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
     throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
@@ -134,6 +146,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   RunOutputs outputs = settings.outputs;
   complete_map(settings.config, outputs);
   complete_log(outputs);
+  complete_grid(outputs);
   check_passes(settings);
   // The second pass reads the beliefs of the first one.
   if (outputs.write_page || (settings.passes > 1 && outputs.map_attributes)) {
@@ -259,6 +272,10 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   if (!outputs.log.empty()) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
+  }
+  if (!outputs.grid.empty()) {
+    request["grid"] = outputs.grid.string();
+    request["grid_image"] = grid_image(outputs.grid).string();
   }
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range);

@@ -20,6 +20,7 @@
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
+#include "grid/grid_maker.hpp"
 #include "label_writer.hpp"
 #include "map_file.hpp"
 #include "output_listing.hpp"
@@ -51,6 +52,8 @@ struct RunOutputs {
   bool drop_not_judged = false;  ///< from clean/
   std::filesystem::path log;     ///< by whole_path(); empty: none
   bool mark_log = false;         ///< adds labels to its clouds, which keep all points
+  std::filesystem::path grid;    ///< description, by whole_path(); empty: none
+  grid::Config grid_config;
   bool write_poses = false;
   bool write_page = false;  ///< of dynains view
   bool write_beliefs = false;

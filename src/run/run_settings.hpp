@@ -112,6 +112,10 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
   visitor(Parameter{"drop_not_judged", self.outputs.drop_not_judged, Bounds(), "",
                     "clean scans and the log have no points that are not judged, as too near or "
                     "too far; the map never has them"});
+  visitor(plain_text("grid", self.outputs.grid, "FILE.yaml",
+                     "also write an occupancy grid for navigation, see `dynains grid`; its image "
+                     "lies beside it"));
+  grid::Config::visit(self.outputs.grid_config, visitor);
   visitor(Parameter{"write_beliefs", self.outputs.write_beliefs, Bounds(), "",
                     "also write the probability that a point moves, to the folder beliefs"});
   visitor(Parameter{"one_thread", self.outputs.one_thread, Bounds(), "",

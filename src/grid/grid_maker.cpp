@@ -1,0 +1,206 @@
+#include "grid/grid_maker.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace dynains::grid {
+namespace {
+
+constexpr double kBeamReach = 30.0;  // m, that beams count
+constexpr std::int64_t kGap = 3;     // cells of a wall without points; no robot passes it
+
+/// The part of a beam that is lower than `low`, as shares of its way. `from`, `to`: m over ground.
+std::array<double, 2> low_part(double from, double to, double low) {
+  const double crossing = (low - from) / (to - from);
+  if (from < low) return {0.0, to < low ? 1.0 : crossing};
+  return {to < low ? crossing : 1.0, 1.0};
+}
+
+/// The smallest grid with all cells that are known.
+OccupancyGrid known_part(const OccupancyGrid& whole) {
+  Eigen::AlignedBox<double, 2> known;
+  for (std::size_t i = 0; i < whole.cells.size(); ++i) {
+    if (whole.cells[i] == CellState::kUnknown) continue;
+    const auto cell = static_cast<std::int64_t>(i);
+    known.extend(Eigen::Vector2d(static_cast<double>(cell % whole.columns.width),
+                                 static_cast<double>(cell / whole.columns.width)));
+  }
+  OccupancyGrid part;
+  if (known.isEmpty()) return part;
+  const auto x = static_cast<std::int64_t>(known.min().x()),
+             y = static_cast<std::int64_t>(known.min().y());
+  part.columns = whole.columns;
+  part.columns.origin += whole.columns.edge * known.min();
+  part.columns.width = static_cast<std::int64_t>(known.sizes().x()) + 1;
+  part.columns.height = static_cast<std::int64_t>(known.sizes().y()) + 1;
+  for (std::int64_t row = 0; row < part.columns.height; ++row) {
+    const auto begin =
+        whole.cells.begin() + static_cast<std::ptrdiff_t>(whole.columns.index(x, y + row));
+    part.cells.insert(part.cells.end(), begin, begin + part.columns.width);
+  }
+  return part;
+}
+
+}  // namespace
+
+void Config::validate() const {
+  validate_parameters("grid", *this);
+  if (min_height < max_height) return;
+  throw ConfigError("grid.min_height = " + std::to_string(min_height) +
+                    " must be less than max_height = " + std::to_string(max_height));
+}
+
+std::size_t OccupancyGrid::count(CellState state) const {
+  return static_cast<std::size_t>(std::count(cells.begin(), cells.end(), state));
+}
+
+GridMaker::GridMaker(const Config& config, const Floors& floors, double spacing)
+    : config_((config.validate(), config)),
+      reach_(static_cast<std::int64_t>(std::max(1.0, std::round(spacing / config.resolution)))),
+      floors_(floors) {
+  const Columns& coarse = floors.columns();
+  columns_.edge = config.resolution;
+  columns_.origin = (coarse.origin.array() / columns_.edge).floor() * columns_.edge;
+  const auto cells = [&](std::int64_t count) {
+    return static_cast<std::int64_t>(
+               std::ceil(static_cast<double>(count) * coarse.edge / columns_.edge)) +
+           1;
+  };
+  columns_.width = cells(coarse.width);
+  columns_.height = cells(coarse.height);
+  cells_.resize(columns_.size());
+}
+
+GridMaker::Cell* GridMaker::cell_at(const Eigen::Vector3d& position) {
+  const std::int64_t x = columns_.along(0, position.x()), y = columns_.along(1, position.y());
+  return columns_.contains(x, y) ? &cells_[columns_.index(x, y)] : nullptr;
+}
+
+void GridMaker::add(const Eigen::Vector3d& point, bool is_moving) {
+  Cell* const cell = cell_at(point);
+  const std::optional<Floors::Height> height = height_of(point);
+  if (cell == nullptr || !height || height->over_floor > config_.max_height) return;
+  const bool is_ground = height->over_floor < config_.min_height;
+  cell->is_free = cell->is_free || (is_ground && !is_moving);
+  // The upper end of a step does not show that the step is none.
+  const bool is_upper = height->over_lowest >= 2.0 * config_.min_height;
+  if (is_ground && is_upper && !is_moving) return;
+  std::uint8_t& count = is_moving || is_ground ? cell->clear : cell->obstacle;
+  if (count == std::numeric_limits<std::uint8_t>::max()) {
+    cell->obstacle /= 2;
+    cell->clear /= 2;
+  }
+  ++count;
+  if (&count == &cell->obstacle) note_scan(point);
+}
+
+void GridMaker::note_scan(const Eigen::Vector3d& point) {
+  const std::int64_t x = columns_.along(0, point.x()), y = columns_.along(1, point.y());
+  for (std::int64_t row = y - reach_; row <= y + reach_; ++row) {
+    for (std::int64_t column = x - reach_; column <= x + reach_; ++column) {
+      if (!columns_.contains(column, row)) continue;
+      Cell& cell = cells_[columns_.index(column, row)];
+      const auto scan = static_cast<std::uint8_t>(scan_);
+      if (cell.scans == kFewestScans || (cell.scans > 0 && cell.latest == scan)) continue;
+      ++cell.scans;
+      cell.latest = scan;
+    }
+  }
+}
+
+void GridMaker::add_beams(const Eigen::Vector3d& sensor, Span<const Eigen::Vector3d> ends) {
+  const std::optional<Floors::Height> from = height_of(sensor);
+  if (!from) return;
+  const double low = 0.5 * config_.max_height;
+  const auto ranges = static_cast<std::size_t>(kBeamReach / config_.resolution);
+  const auto azimuths = static_cast<std::size_t>(2.0 * M_PI * static_cast<double>(ranges));
+  begun_.assign(azimuths * (ranges + 1), 0);
+  for (const Eigen::Vector3d& end : ends) {
+    const std::optional<Floors::Height> to = height_of(end);
+    if (!to) continue;
+    const double dx = end.x() - sensor.x(), dy = end.y() - sensor.y();
+    const double range = std::hypot(dx, dy) / config_.resolution;  // cells
+    const auto [begin, finish] = low_part(from->over_floor, to->over_floor, low);
+    const double turn = std::atan2(dy, dx) / (2.0 * M_PI);
+    const auto azimuth =
+        static_cast<std::size_t>((turn < 0.0 ? turn + 1.0 : turn) * static_cast<double>(azimuths));
+    std::int32_t* const row = &begun_[std::min(azimuth, azimuths - 1) * (ranges + 1)];
+    // Without the cell of the return.
+    const double last = std::min(finish * range, range - 1.0);
+    const auto index = [&](double cell) {
+      return std::min(static_cast<std::size_t>(cell), ranges);
+    };
+    if (last <= begin * range) continue;
+    ++row[index(begin * range)];
+    --row[index(last)];
+  }
+  for (std::size_t a = 0; a < azimuths; ++a) {
+    const double angle =
+        2.0 * M_PI * (static_cast<double>(a) + 0.5) / static_cast<double>(azimuths);
+    const Eigen::Vector3d step =
+        config_.resolution * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
+    std::int32_t beams = 0;
+    for (std::size_t r = 0; r < ranges; ++r) {
+      beams += begun_[a * (ranges + 1) + r];
+      if (beams == 0) continue;
+      Cell* const cell = cell_at(sensor + (static_cast<double>(r) + 0.5) * step);
+      if (cell != nullptr) cell->is_free = true;
+    }
+  }
+}
+
+OccupancyGrid GridMaker::grid() const {
+  OccupancyGrid grid{columns_, std::vector<CellState>(columns_.size(), CellState::kUnknown)};
+  for (std::int64_t y = 0; y < columns_.height; ++y) {
+    for (std::int64_t x = 0; x < columns_.width; ++x) {
+      const std::size_t i = columns_.index(x, y);
+      const Cell& cell = cells_[i];
+      const Eigen::Vector2d middle =
+          columns_.origin + columns_.edge * Eigen::Vector2d(static_cast<double>(x) + 0.5,
+                                                            static_cast<double>(y) + 0.5);
+      if (is_obstacle(cell)) {
+        grid.cells[i] = CellState::kOccupied;
+      } else if (cell.is_free || floors_.is_seen(middle)) {
+        grid.cells[i] = CellState::kFree;
+      }
+    }
+  }
+  close_gaps(grid);
+  return known_part(grid);
+}
+
+/// Cells on the line between two obstacles near each other become occupied, so that walls have no
+/// holes between their points.
+void GridMaker::close_gaps(OccupancyGrid& grid) const {
+  const std::vector<CellState> before = grid.cells;
+  const auto is_occupied = [&](std::int64_t x, std::int64_t y) {
+    return columns_.contains(x, y) && before[columns_.index(x, y)] == CellState::kOccupied;
+  };
+  const std::int64_t most = std::max(kGap, reach_ + reach_ / 2) + 1;
+  const auto connect = [&](std::int64_t x, std::int64_t y, std::int64_t dx, std::int64_t dy) {
+    const std::int64_t steps = std::max(std::abs(dx), std::abs(dy));
+    for (std::int64_t k = 1; k < steps; ++k) {
+      const auto along = [&](std::int64_t d) {
+        return static_cast<std::int64_t>(
+            std::llround(static_cast<double>(k * d) / static_cast<double>(steps)));
+      };
+      grid.cells[columns_.index(x + along(dx), y + along(dy))] = CellState::kOccupied;
+    }
+  };
+  for (std::int64_t y = 0; y < columns_.height; ++y) {
+    for (std::int64_t x = 0; x < columns_.width; ++x) {
+      if (!is_occupied(x, y)) continue;
+      for (std::int64_t dy = 0; dy <= most; ++dy) {
+        for (std::int64_t dx = dy == 0 ? 2 : -most; dx <= most; ++dx) {
+          if (is_occupied(x + dx, y + dy)) connect(x, y, dx, dy);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace dynains::grid

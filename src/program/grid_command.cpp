@@ -1,0 +1,118 @@
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "dynains/errors.hpp"
+#include "grid/grid_file.hpp"
+#include "parameter_flags.hpp"
+#include "progress.hpp"
+#include "recording_options.hpp"
+#include "run/input_files.hpp"
+#include "run/interrupt.hpp"
+#include "run/output_folder.hpp"
+#include "run/write_grid.hpp"
+#include "run/write_view.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct GridOptions {
+  explicit GridOptions(CLI::App& command)
+      : source_option(command.add_option(
+            "MAP", source, "static map (.ply, .pcd, .las), or folder of `dynains run`")),
+        sequence(command, "recording of the run", false) {
+    source_option->required()->type_name("");
+  }
+
+  std::string source;
+  CLI::Option* source_option;  // the first positional argument
+  RecordingFlags sequence;
+  std::string out = "map.yaml";
+  grid::Config config;
+  bool keep_moving = false;
+  bool force = false;
+  bool quiet = false;
+};
+
+/// Throws Interrupted.
+PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
+                           const Recording& recording) {
+  const std::vector<std::size_t> scans = scans_of_run(out, recording);
+  if (scans.size() == 1) print_warning(kGridOfOneScan);
+  std::optional<Progress> progress;
+  PlacedGrid made = grid_of_run(out.path(), recording, scans, options.config, options.keep_moving,
+                                [&](std::size_t done) {
+                                  if (done == 0)
+                                    progress.emplace(2 * scans.size(), "scans", options.quiet);
+                                  if (done > 0) progress->update(done);
+                                  return InterruptGuard::signal() == 0;
+                                });
+  if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+  return made;
+}
+
+void write(GridOptions& options) {
+  const fs::path file = grid_file(options.out);
+  options.config.validate();
+  std::optional<ResultFolder> run;
+  std::optional<Recording> recording;
+  InputFiles inputs;
+  if (fs::is_directory(options.source)) {
+    run.emplace(open_finished_run(options.source));
+    recording.emplace(options.sequence.open_of_run(*run, "dynains grid " + options.source));
+    inputs = InputFiles(*recording);
+    inputs.add(run->path());
+  } else if (options.keep_moving) {
+    throw ConfigError(
+        "--keep-moving needs a folder of `dynains run`: a map has nothing that moves");
+  }
+  inputs.add(options.source);
+  OutputFile image(grid_image(file), options.force, inputs);
+  OutputFile description(file, options.force, inputs);
+
+  const InterruptGuard interrupt;
+  const PlacedGrid made = recording ? grid_of_results(options, *run, *recording)
+                                    : grid_of_map(options.source, options.config);
+  grid::write_grid(image.path(), description.path(), made.grid, made.origin);
+  image.put_in_place([&] { description.put_in_place(); });
+  if (!options.quiet) print_grid(description.target(), made.summary());
+}
+
+}  // namespace
+
+void print_grid(const fs::path& file, const nlohmann::ordered_json& summary) {
+  const auto percent = [&](const char* field) { return 100.0 * summary[field].get<double>(); };
+  std::cout << std::fixed << std::setprecision(1) << "grid: " << file.string() << " ("
+            << summary["width"] << " x " << summary["height"] << " cells: " << percent("free")
+            << " % free, " << percent("occupied") << " % occupied)" << std::endl;
+}
+
+void add_grid_command(CLI::App& app) {
+  CLI::App& command = *app.add_subcommand(
+      "grid", "Write an occupancy grid for nav2 of the static map or the results of a run");
+  const auto options = std::make_shared<GridOptions>(command);
+  command
+      .add_option("-o,--out", options->out,
+                  "description of the grid; its image, .pgm, lies beside it")
+      ->capture_default_str()
+      ->type_name("FILE.yaml");
+  grid::Config::visit(options->config, SettingFlags{command});
+  command.add_flag("--keep-moving", options->keep_moving,
+                   "what moved counts as if it were static, to see what removal changes");
+  command.add_flag("--force", options->force, "replace the grid if it exists");
+  command.add_flag("-q,--quiet", options->quiet, "print errors only");
+  command.footer(
+      "Occupied are static points at least --min-height and at most --max-height above the ground "
+      "around them. Free is\nwhere the ground was seen or, for results of a run, where beams have "
+      "passed low. SEQ and its flags are those of\nthe run unless you give them.");
+  command.callback([options] { write(*options); });
+}
+
+}  // namespace dynains::program

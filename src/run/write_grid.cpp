@@ -1,0 +1,137 @@
+#include "write_grid.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+
+#include "dynains/errors.hpp"
+#include "dynains/io/point_file.hpp"
+#include "dynains/recording/verdict_arrays.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+#include "label_writer.hpp"
+#include "output_folder.hpp"
+
+namespace dynains::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A place near a position: whole metres, so that cells of all grids of a map coincide.
+Eigen::Vector3d place_near(const Eigen::Vector3d& position) { return position.array().floor(); }
+
+/// The scans of a run with their verdicts, relative to a place near the first one.
+class JudgedScans {
+ public:
+  JudgedScans(const fs::path& folder, const Recording& recording, bool keep_moving)
+      : recording_(recording),
+        files_(folder / "labels", folder / "causes"),
+        keep_moving_(keep_moving) {}
+
+  /// Calls `visit(position, label)` for the points of scan i that are judged.
+  template <class Visit>
+  void visit(std::size_t i, const Pose& T_place_sensor, Visit&& visit) {
+    recording_.read_scan(i, scan_);
+    files_.read(recording_.name(i), scan_, verdict_);
+    for (std::size_t k = 0; k < scan_.size(); ++k) {
+      PointLabel label = verdict_.labels[k];
+      if (label == PointLabel::kInvalid || label == PointLabel::kOutOfRange) continue;
+      if (label == PointLabel::kDynamic && keep_moving_) label = PointLabel::kStatic;
+      visit(T_place_sensor * scan_.point(k).position, label);
+    }
+  }
+
+ private:
+  const Recording& recording_;
+  LabelFiles files_;
+  bool keep_moving_;
+  RecordedScan scan_;
+  VerdictArrays verdict_;
+};
+
+/// Distance between the points of surfaces, m: the edge of voxels that hold about one.
+double spacing_of(const std::vector<Eigen::Vector3d>& points) {
+  constexpr double kFinest = 0.02, kCoarsest = 0.5;  // m
+  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
+  double edge = kFinest;
+  for (; edge < kCoarsest; edge *= 1.2) {
+    VoxelHashTable<> voxels;
+    for (const Eigen::Vector3d& point : points) voxels.insert(voxel_at(point, kDouble * edge));
+    if (points.size() >= 2 * voxels.size()) break;
+  }
+  return edge;
+}
+
+}  // namespace
+
+fs::path grid_file(const fs::path& name) {
+  if (name.extension() == ".yaml") return whole_path(name);
+  throw ConfigError("a grid goes to a file whose name ends in .yaml, not to " + name.string());
+}
+
+fs::path grid_image(const fs::path& file) { return fs::path(file).replace_extension(".pgm"); }
+
+nlohmann::ordered_json PlacedGrid::summary() const {
+  const auto share = [&](grid::CellState state) {
+    return static_cast<double>(grid.count(state)) / static_cast<double>(grid.cells.size());
+  };
+  return {{"width", grid.columns.width},
+          {"height", grid.columns.height},
+          {"free", share(grid::CellState::kFree)},
+          {"occupied", share(grid::CellState::kOccupied)}};
+}
+
+PlacedGrid grid_of_run(const fs::path& folder, const Recording& recording,
+                       const std::vector<std::size_t>& scans, const grid::Config& config,
+                       bool keep_moving, const std::function<bool(std::size_t done)>& progress) {
+  const Eigen::Vector3d place = place_near(recording.T_world_sensor(scans.front()).translation());
+  const auto pose = [&](std::size_t i) {
+    Pose T_place_sensor = recording.T_world_sensor(i);
+    T_place_sensor.translation() -= place;
+    return T_place_sensor;
+  };
+  JudgedScans judged(folder, recording, keep_moving);
+  grid::Floors floors(recording.folder().string());
+  std::size_t done = 0;
+  progress(done);
+  for (const std::size_t i : scans) {
+    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label) {
+      if (label != PointLabel::kDynamic) floors.add(point, label == PointLabel::kGround);
+    });
+    if (!progress(++done)) return {};
+  }
+  floors.finish(config.min_height, config.resolution);
+  grid::GridMaker maker(config, floors);
+  std::vector<Eigen::Vector3d> ends;
+  for (const std::size_t i : scans) {
+    ends.clear();
+    maker.begin_scan();
+    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label) {
+      maker.add(point, label == PointLabel::kDynamic);
+      ends.push_back(point);
+    });
+    maker.add_beams(pose(i).translation(), ends);
+    if (!progress(++done)) return {};
+  }
+  return {maker.grid(), place.head<2>()};
+}
+
+PlacedGrid grid_of_map(const fs::path& map, const grid::Config& config) {
+  std::vector<Eigen::Vector3d> points = read_points(map).positions;
+  points.erase(std::remove_if(points.begin(), points.end(),
+                              [](const Eigen::Vector3d& point) { return !point.allFinite(); }),
+               points.end());
+  if (points.empty()) throw IoError(map.string() + ": has no points");
+  const Eigen::Vector3d place = place_near(points.front());
+  for (Eigen::Vector3d& point : points) point -= place;
+  grid::Floors floors(map.string());
+  floors.add_map(points, config.min_height);
+  floors.finish(config.min_height, config.resolution);
+  grid::GridMaker maker(config, floors, spacing_of(points));
+  for (const Eigen::Vector3d& point : points) {
+    maker.begin_scan();
+    maker.add(point, false);
+  }
+  return {maker.grid(), place.head<2>()};
+}
+
+}  // namespace dynains::program
