@@ -356,9 +356,23 @@ def draw_page(workshop):
     reduce_colours(path, 48)
 
 
+def draw_grid(workshop):
+    """The occupancy grid of a street, of all points and without what moved."""
+    results = workshop.street().results
+    figure, axes = plt.subplots(1, 2, figsize=(10.2, 3.2))
+    for panel, name, flags in ((axes[0], "with what moved", ["--keep-moving"]), (axes[1], "static", [])):
+        file = workshop.work / f"grid_{len(flags)}.yaml"
+        workshop.dynains("grid", results, "--out", file, "--resolution", "0.1", "--force", "-q", *flags)
+        panel.imshow(Image.open(file.with_suffix(".pgm")), cmap="gray", interpolation="none")
+        panel.set_title(name, fontsize=9)
+        panel.axis("off")
+    figure.tight_layout(pad=0.4)
+    workshop.save(figure, "grid")
+
+
 def main():
     drawings = {"pipeline": draw_pipeline, "beam": draw_beam, "belief": draw_belief,
-                "errors": draw_errors, "map": draw_map, "page": draw_page, "real": draw_real}
+                "errors": draw_errors, "map": draw_map, "grid": draw_grid, "page": draw_page, "real": draw_real}
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bin", required=True, help="folder of the programs")

@@ -6,51 +6,46 @@
 #include <limits>
 #include <numeric>
 #include <string>
-#include <utility>
 
 #include "dynains/errors.hpp"
 
 namespace dynains::grid {
 namespace {
 
+constexpr double kMargin = 2.0;     // m, around the ground
 constexpr double kMostCells = 4e8;  // some 2 GB
 
-/// Columns of this edge around the points, with a margin (m).
+/// Columns of this edge around a box, with a margin (m).
 Columns columns_around(const Eigen::AlignedBox2d& box, double edge, double margin) {
-  Columns columns;
-  columns.edge = edge;
   const Eigen::Array2d low = ((box.min().array() - margin) / edge).floor();
-  const Eigen::Array2d high = ((box.max().array() + margin) / edge).floor() + 1.0;
-  columns.origin = low * edge;
-  columns.width = static_cast<std::int64_t>(high.x() - low.x());
-  columns.height = static_cast<std::int64_t>(high.y() - low.y());
-  return columns;
+  const Eigen::Array2d size = ((box.max().array() + margin) / edge).floor() + 1.0 - low;
+  return {edge, low * edge, static_cast<std::int64_t>(size.x()),
+          static_cast<std::int64_t>(size.y())};
 }
 
-/// Sets of numbers that are joined two by two.
-class JoinedSets {
- public:
-  explicit JoinedSets(std::size_t size) : parent_(size), size_(size, 1) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
+/// Columns around take the value of the nearest that has one, at most `reach` columns away along
+/// the axes. `value`: by column, or kNoIndex.
+void spread(const Columns& columns, std::int64_t reach, std::vector<std::uint32_t>& value) {
+  std::vector<std::size_t> border, next;
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    if (value[i] != kNoIndex) border.push_back(i);
   }
-  std::uint32_t root(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
+  constexpr std::array<std::array<int, 2>, 4> kSides = {{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  for (std::int64_t step = 0; step < reach; ++step, border.swap(next)) {
+    next.clear();
+    for (const std::size_t i : border) {
+      const auto x = static_cast<std::int64_t>(i) % columns.width;
+      const auto y = static_cast<std::int64_t>(i) / columns.width;
+      for (const auto& [dx, dy] : kSides) {
+        if (!columns.contains(x + dx, y + dy)) continue;
+        const std::size_t other = columns.index(x + dx, y + dy);
+        if (value[other] != kNoIndex) continue;
+        value[other] = value[i];
+        next.push_back(other);
+      }
+    }
   }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a == b) return;
-    if (size_[a] < size_[b]) std::swap(a, b);
-    parent_[b] = a;
-    size_[a] += size_[b];
-  }
-  std::size_t size_of(std::uint32_t i) { return size_[root(i)]; }
-
- private:
-  std::vector<std::uint32_t> parent_;
-  std::vector<std::size_t> size_;
-};
+}
 
 }  // namespace
 
@@ -130,27 +125,29 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
 /// The floors of surfaces that are large, or the largest ones there are.
 std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors,
                                                   double step) const {
-  constexpr double kSlope = 0.3;    // of the steepest ramp
-  constexpr std::int64_t kGap = 4;  // columns without floor around each one
-  const double rise = step + kSlope * kEdge;
-  std::vector<std::uint32_t> source(columns_.size(), kNoIndex), next(floors.size(), kNoIndex);
-  for (std::uint32_t i = 0; i < floors.size(); ++i) {
-    next[i] = std::exchange(source[column_of(floors[i])], i);  // the one below
+  constexpr double kCell = 1.0;            // m: a gap without ground that does not end a surface
+  constexpr std::size_t kLeastCells = 10;  // the roof of a car is smaller
+  VoxelHashTable<> numbers;
+  std::vector<VoxelKey> keys;
+  std::vector<std::uint32_t> cell_of;
+  for (const Floor& floor : floors) {
+    const auto index = [](double position, double edge) {
+      return detail::floor_to<std::int64_t>(position / edge);
+    };
+    const VoxelKey key =
+        voxel_key(index(static_cast<double>(floor.x) * kEdge, kCell),
+                  index(static_cast<double>(floor.y) * kEdge, kCell), index(floor.height, step));
+    cell_of.push_back(numbers.insert(key));
+    if (numbers.size() > keys.size()) keys.push_back(key);
   }
-  JoinedSets surfaces(floors.size());
-  spread(columns_, kGap, source, [&](std::uint32_t top_a, std::uint32_t top_b) {
-    for (std::uint32_t i = top_a; i != kNoIndex; i = next[i]) {
-      for (std::uint32_t k = top_b; k != kNoIndex; k = next[k]) {
-        if (std::abs(floors[i].height - floors[k].height) <= rise) surfaces.join(i, k);
-      }
-    }
+  std::vector<std::size_t> size(keys.size());
+  ComponentSearch().for_each(keys, numbers, [&](const std::vector<std::uint32_t>& members) {
+    for (const std::uint32_t cell : members) size[cell] = members.size();
   });
-  std::size_t least = 0;
-  for (std::uint32_t i = 0; i < floors.size(); ++i) least = std::max(least, surfaces.size_of(i));
-  least = std::min(least, static_cast<std::size_t>(kLeastArea / (kEdge * kEdge)));
+  const std::size_t least = std::min(kLeastCells, *std::max_element(size.begin(), size.end()));
   std::vector<Floor> large;
-  for (std::uint32_t i = 0; i < floors.size(); ++i) {
-    if (surfaces.size_of(i) >= least) large.push_back(floors[i]);
+  for (std::size_t i = 0; i < floors.size(); ++i) {
+    if (size[cell_of[i]] >= least) large.push_back(floors[i]);
   }
   return large;
 }
@@ -166,7 +163,7 @@ void Floors::finish(double step, double resolution) {
   for (const Floor& floor : all) {
     box.extend(kEdge * Eigen::Vector2d(static_cast<double>(floor.x), static_cast<double>(floor.y)));
   }
-  columns_ = columns_around(box, kEdge, kReach);
+  columns_ = columns_around(box, kEdge, kMargin);
   const double cells = static_cast<double>(columns_.size()) * std::pow(kEdge / resolution, 2);
   if (cells > kMostCells) {
     throw IoError(place_ + ": a grid of " + std::to_string(static_cast<int>(box.sizes().x())) +
@@ -190,7 +187,7 @@ void Floors::finish(double step, double resolution) {
   numbers_ = VoxelHashTable<>();
   keys_ = {};
   bins_ = {};
-  spread(columns_, kReachColumns, source_, [](std::uint32_t, std::uint32_t) {});
+  spread(columns_, static_cast<std::int64_t>(kReach / kEdge), source_);
 }
 
 std::optional<Floors::Height> Floors::height_of(const Eigen::Vector3d& point, double step,

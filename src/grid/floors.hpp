@@ -50,8 +50,6 @@ class Floors {
  private:
   static constexpr double kEdge = 0.25;   // m, of a column; ground differs little within it
   static constexpr double kReach = 10.0;  // m, from a place without ground to the nearest ground
-  static constexpr auto kReachColumns = static_cast<std::int64_t>(kReach / kEdge);
-  static constexpr double kLeastArea = 10.0;  // m^2, of a surface; the roof of a car is smaller
 
   static constexpr double kBin = 0.05;  // m, of heights in a column
 

@@ -20,31 +20,6 @@ std::array<double, 2> low_part(double from, double to, double low) {
   return {to < low ? crossing : 1.0, 1.0};
 }
 
-/// The smallest grid with all cells that are known.
-OccupancyGrid known_part(const OccupancyGrid& whole) {
-  Eigen::AlignedBox<double, 2> known;
-  for (std::size_t i = 0; i < whole.cells.size(); ++i) {
-    if (whole.cells[i] == CellState::kUnknown) continue;
-    const auto cell = static_cast<std::int64_t>(i);
-    known.extend(Eigen::Vector2d(static_cast<double>(cell % whole.columns.width),
-                                 static_cast<double>(cell / whole.columns.width)));
-  }
-  OccupancyGrid part;
-  if (known.isEmpty()) return part;
-  const auto x = static_cast<std::int64_t>(known.min().x()),
-             y = static_cast<std::int64_t>(known.min().y());
-  part.columns = whole.columns;
-  part.columns.origin += whole.columns.edge * known.min();
-  part.columns.width = static_cast<std::int64_t>(known.sizes().x()) + 1;
-  part.columns.height = static_cast<std::int64_t>(known.sizes().y()) + 1;
-  for (std::int64_t row = 0; row < part.columns.height; ++row) {
-    const auto begin =
-        whole.cells.begin() + static_cast<std::ptrdiff_t>(whole.columns.index(x, y + row));
-    part.cells.insert(part.cells.end(), begin, begin + part.columns.width);
-  }
-  return part;
-}
-
 }  // namespace
 
 void Config::validate() const {
@@ -170,7 +145,7 @@ OccupancyGrid GridMaker::grid() const {
     }
   }
   close_gaps(grid);
-  return known_part(grid);
+  return grid;
 }
 
 /// Cells on the line between two obstacles near each other become occupied, so that walls have no
