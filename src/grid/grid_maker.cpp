@@ -61,30 +61,41 @@ void GridMaker::add(const Eigen::Vector3d& point, bool is_moving) {
   if (cell == nullptr || !height || height->over_floor > config_.max_height) return;
   const bool is_ground = height->over_floor < config_.min_height;
   cell->is_free = cell->is_free || (is_ground && !is_moving);
-  // The upper end of a step does not show that the step is none.
-  const bool is_upper = height->over_lowest >= 2.0 * config_.min_height;
-  if (is_ground && is_upper && !is_moving) return;
-  std::uint8_t& count = is_moving || is_ground ? cell->clear : cell->obstacle;
-  if (count == std::numeric_limits<std::uint8_t>::max()) {
-    cell->obstacle /= 2;
-    cell->clear /= 2;
+  if (!is_moving && !is_ground) {
+    return add_obstacle(columns_.along(0, point.x()), columns_.along(1, point.y()));
   }
-  ++count;
-  if (&count == &cell->obstacle) note_scan(point);
+  // The upper end of a step does not show that the step is none.
+  if (!is_moving && height->over_lowest >= 2.0 * config_.min_height) return;
+  if (cell->latest_obstacle != static_cast<std::uint8_t>(scan_)) {
+    count(cell->clear, cell->latest_clear, *cell);
+  }
 }
 
-void GridMaker::note_scan(const Eigen::Vector3d& point) {
-  const std::int64_t x = columns_.along(0, point.x()), y = columns_.along(1, point.y());
+void GridMaker::add_obstacle(std::int64_t x, std::int64_t y) {
+  cells_[columns_.index(x, y)].has_obstacle = true;
   for (std::int64_t row = y - reach_; row <= y + reach_; ++row) {
     for (std::int64_t column = x - reach_; column <= x + reach_; ++column) {
       if (!columns_.contains(column, row)) continue;
       Cell& cell = cells_[columns_.index(column, row)];
-      const auto scan = static_cast<std::uint8_t>(scan_);
-      if (cell.scans == kFewestScans || (cell.scans > 0 && cell.latest == scan)) continue;
-      ++cell.scans;
-      cell.latest = scan;
+      if (cell.latest_obstacle == static_cast<std::uint8_t>(scan_)) continue;
+      // The scan does not show that the cell is clear.
+      const bool was_clear = cell.latest_clear == static_cast<std::uint8_t>(scan_);
+      if (was_clear && cell.clear > 0) --cell.clear;
+      count(cell.obstacle, cell.latest_obstacle, cell);
     }
   }
+}
+
+/// Counts the scan at hand once.
+void GridMaker::count(std::uint8_t& scans, std::uint8_t& latest, Cell& cell) const {
+  const auto scan = static_cast<std::uint8_t>(scan_);
+  if (latest == scan) return;
+  latest = scan;
+  if (scans == std::numeric_limits<std::uint8_t>::max()) {
+    cell.obstacle /= 2;
+    cell.clear /= 2;
+  }
+  ++scans;
 }
 
 void GridMaker::add_beams(const Eigen::Vector3d& sensor, Span<const Eigen::Vector3d> ends) {

@@ -67,21 +67,24 @@ class GridMaker {
   OccupancyGrid grid() const;
 
  private:
-  /// Points, halved together so that they fit: their ratio counts.
+  /// Numbers of scans, halved together so that they fit: their ratio counts.
   struct Cell {
-    std::uint8_t obstacle = 0, clear = 0;
-    std::uint8_t scans = 0;   // with obstacles in this cell or one around it, up to 3
-    std::uint8_t latest = 0;  // of these scans, modulo 256
-    bool is_free = false;     // ground was seen, or a beam crossed it
+    std::uint8_t obstacle = 0;  // with obstacles in this cell or one around it
+    std::uint8_t clear = 0;     // of the others, with ground or what moved in this cell
+    std::uint8_t latest_obstacle = 0, latest_clear = 0;  // of these scans, modulo 256
+    bool has_obstacle = false;                           // itself
+    bool is_free = false;                                // ground was seen, or a beam crossed it
   };
 
   std::optional<Floors::Height> height_of(const Eigen::Vector3d& point) const {
     return floors_.height_of(point, config_.min_height, config_.max_height);
   }
   Cell* cell_at(const Eigen::Vector3d& position);
-  void note_scan(const Eigen::Vector3d& point);
+  void add_obstacle(std::int64_t x, std::int64_t y);
+  void count(std::uint8_t& scans, std::uint8_t& latest, Cell& cell) const;
   bool is_obstacle(const Cell& cell) const {
-    return cell.obstacle > cell.clear && cell.scans >= std::min(kFewestScans, scan_);
+    return cell.has_obstacle && cell.obstacle > cell.clear &&
+           cell.obstacle >= std::min(kFewestScans, scan_);
   }
   void close_gaps(OccupancyGrid& grid) const;
 

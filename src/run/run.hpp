@@ -32,7 +32,7 @@ struct RunOutcome {
   bool complete = true;  ///< false after a signal
   int signal = 0;        ///< that ended the run
   nlohmann::ordered_json report;
-  nlohmann::ordered_json grid;  ///< PlacedGrid::summary(); null: none was written
+  nlohmann::ordered_json grid;                ///< PlacedGrid::summary(); null: none was written
   std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
   std::filesystem::path page;                 ///< empty: none was asked for
   std::filesystem::path log;                  ///< empty: none was written

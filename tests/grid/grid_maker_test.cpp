@@ -69,7 +69,7 @@ TEST_CASE("a wall is occupied without holes, the ground free, and all else unkno
     INFO(y);
     // The cell of the wall, or one beside it, as the line between two points runs.
     bool is_hit = false;
-    for (const double beside : {-0.05, 0.0, 0.05}) {
+    for (const double beside : {-0.04, 0.0, 0.04}) {
       is_hit = is_hit || state_at(grid, 6.0 + 0.1 * y + beside, y) == CellState::kOccupied;
     }
     CHECK(is_hit);
