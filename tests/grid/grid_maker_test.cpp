@@ -68,9 +68,11 @@ TEST_CASE("a wall is occupied without holes, the ground free, and all else unkno
   for (double y = 1.05; y < 6.9; y += 0.01) {
     INFO(y);
     // The cell of the wall, or one beside it, as the line between two points runs.
+    const Columns& columns = grid.columns;
+    const std::int64_t x = columns.along(0, 6.0 + 0.1 * y), row = columns.along(1, y);
     bool is_hit = false;
-    for (const double beside : {-0.04, 0.0, 0.04}) {
-      is_hit = is_hit || state_at(grid, 6.0 + 0.1 * y + beside, y) == CellState::kOccupied;
+    for (std::int64_t column = x - 1; column <= x + 1; ++column) {
+      is_hit = is_hit || grid.cells[columns.index(column, row)] == CellState::kOccupied;
     }
     CHECK(is_hit);
   }
