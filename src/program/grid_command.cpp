@@ -68,14 +68,14 @@ void write(GridOptions& options) {
     run.emplace(open_finished_run(options.source));
     recording.emplace(options.sequence.open_of_run(*run, "dynains grid " + options.source));
     inputs = InputFiles(*recording);
-    inputs.add(run->path());
+    inputs.add_results(run->path());
   } else if (options.keep_moving) {
     throw ConfigError(
         "--keep-moving needs a folder of `dynains run`: a map has nothing that moves");
   }
-  inputs.add(options.source);
-  OutputFile image(grid_image(file), options.force, inputs);
-  OutputFile description(file, options.force, inputs);
+  if (!run) inputs.add(options.source);
+  OutputFile image(grid_image(file), existing_by(options.force), inputs);
+  OutputFile description(file, existing_by(options.force), inputs);
 
   const InterruptGuard interrupt;
   const PlacedGrid made = recording ? grid_of_results(options, *run, *recording)

@@ -125,8 +125,8 @@ struct OutsideOutputs {
     const fs::path& grid_file = plan.settings.outputs.grid;
     if (!grid_file.empty()) {
       const fs::path image = grid_image(grid_file);
-      grid.emplace(grid_file, out.owns("/request/grid", grid_file), plan.inputs);
-      picture.emplace(image, out.owns("/request/grid_image", image), plan.inputs);
+      grid.emplace(grid_file, out.owns(grid_file), plan.inputs);
+      picture.emplace(image, out.owns(image), plan.inputs);
     }
     const fs::path& log_file = plan.settings.outputs.log;
     if (log_file.empty()) return;
@@ -208,7 +208,7 @@ void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
     write_page(outputs.folder / kViewPage, outputs.folder, plan.sequence, plan.range,
                plan.settings.config.map.map_voxel, kDefaultViewPoints);
   }
-  for (const auto* const file : {&outside.map, &outside.log}) {
+  for (const auto* const file : {&outside.map, &outside.log, &outside.grid, &outside.picture}) {
     if (*file) outcome.report["written"][(*file)->listed_target()] = content_of((*file)->path());
   }
   out.finish(outcome.report, [&] {

@@ -273,10 +273,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
     request["write_log"] = outputs.log.string();
     request["mark"] = outputs.mark_log;
   }
-  if (!outputs.grid.empty()) {
-    request["grid"] = outputs.grid.string();
-    request["grid_image"] = grid_image(outputs.grid).string();
-  }
+  if (!outputs.grid.empty()) request["grid"] = outputs.grid.string();
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
   OutputListing listing = outputs.listing(sequence, range);
   InputFiles inputs(sequence, settings.config_file);
