@@ -467,6 +467,17 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   }
   write_text(file, raw_scan<float>(4));
   CHECK(Recording(folder.path()).read_scan(0).xyzi[4 * 101] == 5.05F);
+  // The beams of a non-repeating sensor take turns: each second point is near, the next one is not.
+  std::string alternating;
+  for (int i = 0; i < 600; ++i) {
+    const double angle = 0.005 * i + (i % 2) * M_PI;
+    const float values[] = {
+        static_cast<float>(9.0 * std::cos(angle)), static_cast<float>(7.0 * std::sin(angle)),
+        -1.5F + 0.01F * static_cast<float>(i % 40), 0.1F * static_cast<float>(i % 7)};
+    alternating.append(reinterpret_cast<const char*>(values), sizeof(values));
+  }
+  write_text(file, alternating);
+  CHECK(Recording(folder.path()).read_scan(0).size() == 600);
   write_text(file, raw_scan<float>(5, 21));
   CHECK_THAT(message_of<IoError>([&] { Recording(folder.path()).point_count(0); }),
              ContainsSubstring("truncated at byte 420: expected a multiple of 16 bytes") &&

@@ -11,7 +11,6 @@
 #include "../logs/raw_file.hpp"
 #include "../text.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/median.hpp"
 
 namespace dynains {
 namespace {
@@ -48,19 +47,31 @@ double plausible_share(const std::vector<std::uint8_t>& bytes, const BinLayout& 
   return count == 0 ? 1.0 : static_cast<double>(plausible) / static_cast<double>(count);
 }
 
-/// Median distance from a point to the next one in the file; 0 if there is none.
-double median_step(const std::vector<std::uint8_t>& bytes, const BinLayout& layout) {
+/// Mean difference of values of one column in two points, by the logarithms of their sizes. It is
+/// least for the true number of columns, since others mix columns (energy distance, Szekely and
+/// Rizzo 2013), and does not depend on the order of points. 0 for fewer than two points.
+double spread_of_columns(const std::vector<std::uint8_t>& bytes, const BinLayout& layout) {
+  constexpr double kUnit = 0.1;                           // values below it hardly differ
+  constexpr std::uint64_t kFactor = 0x9E3779B97F4A7C15U;  // of a hash: any other point of the file
+  const auto columns = static_cast<std::size_t>(layout.columns);
   const std::size_t count = bytes.size() / point_size(layout);
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < count; ++i) {
-    double squared = 0.0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double step = value_at(bytes, layout, i, axis) - value_at(bytes, layout, i - 1, axis);
-      squared += step * step;
+  const auto size_of = [&](std::size_t i, std::size_t column) {
+    const double value = value_at(bytes, layout, i, column);
+    return std::log1p(std::abs(value) / kUnit);
+  };
+  double sum = 0.0;
+  std::size_t pairs = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t other = ((i + 1) * kFactor >> 32) % count;
+    if (other == i) continue;
+    for (std::size_t column = 0; column < columns; ++column) {
+      const double difference = std::abs(size_of(i, column) - size_of(other, column));
+      if (!std::isfinite(difference)) continue;
+      sum += difference;
+      ++pairs;
     }
-    if (std::isfinite(squared)) steps.push_back(std::sqrt(squared));
   }
-  return median(std::move(steps));
+  return pairs == 0 ? 0.0 : sum / static_cast<double>(pairs);
 }
 
 std::string option_of(const BinLayout& layout) {
@@ -123,7 +134,6 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
 void check_bin_content(const std::filesystem::path& file) {
   constexpr std::uint64_t kMostBytes = 240 * 1024;  // a multiple of the size of every point
   constexpr std::size_t kLeastPoints = 100;
-  constexpr double kClearly = 0.2;  // of the step with four columns
   const BinLayout usual;
   const BinLayout doubles{4, true};
   RawFile raw(file);
@@ -134,16 +144,24 @@ void check_bin_content(const std::filesystem::path& file) {
                    std::to_string(value_at(bytes, doubles, 0, 0)) +
                    "; --bin-columns 3d (x y z) or 4d (x y z intensity) reads it");
   }
-  const double step = median_step(bytes, usual);
+  // Spreads of few values differ by chance.
+  const auto values = static_cast<double>(bytes.size() / value_size(usual));
+  const double clearly = 1.0 - std::max(0.1, 4.0 / std::sqrt(values));
+  const double spread = spread_of_columns(bytes, usual);
+  const BinLayout* best = nullptr;
+  double least = spread;
   for (const BinLayout& other : kOthers) {
-    const double step_of_other = median_step(bytes, other);
-    if (raw.size() % point_size(other) != 0 || !(step_of_other > 0.0)) continue;
-    if (!(step_of_other < kClearly * step)) continue;
-    fail(file, "does not seem to hold float32 x y z intensity: points are " + std::to_string(step) +
-                   " m from the next one in the file, and " + std::to_string(step_of_other) +
-                   " m if they have " + to_text(other) + ", " + option_of(other) +
-                   "; --bin-columns tells which");
+    if (raw.size() % point_size(other) != 0 || plausible_share(bytes, other) < 0.9) continue;
+    const double spread_of_other = spread_of_columns(bytes, other);
+    if (!(spread_of_other < clearly * least)) continue;
+    best = &other;
+    least = spread_of_other;
   }
+  if (best == nullptr) return;
+  fail(file, "does not seem to hold float32 x y z intensity: values of one column differ by " +
+                 std::to_string(std::lround(100.0 * (1.0 - least / spread))) +
+                 " % less if points have " + to_text(*best) + ", " + option_of(*best) +
+                 "; --bin-columns tells which");
 }
 
 }  // namespace dynains

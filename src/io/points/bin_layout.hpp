@@ -32,8 +32,8 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
                      std::vector<float>& xyzi, std::vector<std::uint16_t>* ring = nullptr);
 
 /// Throws IoError if the content of the file does not look like float32 x y z intensity, and for
-/// another layout: numbers are as points have them only as float64, or neighbours in the file are
-/// neighbours in space only with another number of columns.
+/// another layout: numbers are as points have them only as float64, or values of one column are
+/// clearly more alike with another number of columns. The order of points does not matter.
 void check_bin_content(const std::filesystem::path& file);
 
 }  // namespace dynains
