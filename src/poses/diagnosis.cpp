@@ -17,6 +17,7 @@
 #include "openings.hpp"
 #include "pose_fit.hpp"
 #include "readings.hpp"
+#include "scan_registration.hpp"
 
 namespace dynains {
 namespace {
@@ -33,13 +34,6 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 /// Whether the gap of `a` is clearly smaller than that of `b`.
 bool is_clearly_better(const Agreement& a, const Agreement& b) {
   return a.gap < 0.85 * b.gap - 0.01;
-}
-
-/// Whether scans agree: share >= kLeastAgreement, or (few beams, fast motion) share >= 0.2 and a
-/// clearly smaller gap than `standing`, the agreement without motion.
-bool fits(const Agreement& agreement, const Agreement& standing) {
-  return agreement.share >= kLeastAgreement ||
-         (agreement.share >= 0.2 && is_clearly_better(agreement, standing));
 }
 
 /// Two scans, some scans apart.
@@ -240,15 +234,19 @@ double coarse_step(const std::vector<Pose>& poses) {
     std::sort(values.begin(), values.end());
     values.erase(std::unique(values.begin(), values.end()), values.end());
     if (values.size() < kFewest) continue;
-    double step = kNever;
-    for (std::size_t i = 1; i < values.size(); ++i)
+    double step = kNever, widest = 0.0;
+    for (std::size_t i = 1; i < values.size(); ++i) {
       step = std::min(step, values[i] - values[i - 1]);
+      widest = std::max(widest, values[i] - values[i - 1]);
+    }
+    // Poses at an even speed lie on a grid, too.
+    const bool is_even = values.size() == poses.size() && widest < (1.0 + kNear) * step;
     const bool is_grid = std::all_of(values.begin(), values.end(), [&](double value) {
       const double steps = (value - values[0]) / step;
       return std::abs(steps - std::round(steps)) < kNear;
     });
     const double way = (values.back() - values[0]) / static_cast<double>(poses.size());
-    if (is_grid && step > 0.1 * way) coarsest = std::max(coarsest, step);
+    if (is_grid && !is_even && step > 0.1 * way) coarsest = std::max(coarsest, step);
   }
   return coarsest;
 }
@@ -388,25 +386,35 @@ bool is_inexact(const Recording& recording, const MotionError& steps) {
   return steps.translation > translation || steps.rotation > rotation;
 }
 
-/// By landmarks alone.
-PoseVerdict verdict_of_agreement(const Evidence& evidence) {
-  const Agreement &given = evidence.as_given, &standing = evidence.standing;
-  if (!fits(given, standing) || is_clearly_better(standing, given)) return PoseVerdict::kDisagree;
-  return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+/// Whether most of the pairs for which another motion is found (none, or that of a registration
+/// from the given one) fit clearly better to the surfaces of each other under it. Motions along
+/// surfaces fit equally well.
+bool are_refuted(const Evidence& evidence) {
+  constexpr double kClearly = 0.6;  // ratio
+  constexpr double kLeastFit = 0.3;
+  const BodyMotion given = given_motion(evidence.recording);
+  std::size_t refuted = 0;
+  for (const Pair& pair : evidence.pairs) {
+    const auto T_given = given(motion_of_pair(pair));
+    if (!T_given) continue;
+    const auto fit_under = [&](const Pose& T) {
+      return fit_of(pair.a.surfaces(), pair.b.points(), T);
+    };
+    double best = fit_under(Pose::Identity());
+    const auto found =
+        register_scans(pair.a.surfaces(), pair.b.points(), {*T_given, Pose::Identity()});
+    if (found) best = std::max(best, fit_under(found->T_a_b));
+    refuted += best > kLeastFit && fit_under(*T_given) < kClearly * best ? 1 : 0;
+  }
+  return 2 * refuted > evidence.pairs.size();
 }
 
-/// `neighbours` is their agreement without motion.
-void judge_by_landmarks(const Evidence& evidence, const Agreement& neighbours, Diagnosis& d) {
-  d.verdict = verdict_of_agreement(evidence);
-  // Few objects in sight, as on a motorway, or few points: nothing explains scans clearly better,
-  // and poses that stand are those of a sensor whose scans far apart agree as neighbours do.
-  constexpr double kPassable = 0.4;  // share
+/// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd.
+PoseVerdict verdict_of_agreement(const Evidence& evidence) {
   const Agreement &given = evidence.as_given, &standing = evidence.standing;
-  const bool is_as_good = given.gap < standing.gap || !(is_clearly_better(standing, given) ||
-                                                        is_clearly_better(neighbours, standing));
-  if (d.verdict == PoseVerdict::kDisagree && given.share >= kPassable && is_as_good) {
-    d.verdict = PoseVerdict::kNoMotion;
-  }
+  const bool is_doubtful = given.share < kLeastAgreement || is_clearly_better(standing, given);
+  if (is_doubtful && are_refuted(evidence)) return PoseVerdict::kDisagree;
+  return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
 }
 
 void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
@@ -488,9 +496,13 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   if (are_enough(evidence.motions, kFewestPairs)) {
     judge_by_motions(evidence, d);
   } else {
-    judge_by_landmarks(evidence, sampled.neighbours, d);
+    d.verdict = verdict_of_agreement(evidence);
   }
-  if (d.verdict == PoseVerdict::kDisagree) d.flaws.period = period_of_views(recording, sample);
+  const bool is_apart = std::max(d.as_given.share, d.standing.share) < kLeastAgreement;
+  if (d.verdict == PoseVerdict::kDisagree || (d.verdict == PoseVerdict::kNoMotion && is_apart)) {
+    d.flaws.period = period_of_views(recording, sample);
+    if (d.flaws.period > 0) d.verdict = PoseVerdict::kDisagree;
+  }
   return d;
 }
 

@@ -66,6 +66,7 @@ struct Landmarks::Tree {
   }
 
   std::vector<Eigen::Vector3d> points;
+  SurfaceGrid surfaces;
   using Distance = nanoflann::L2_Simple_Adaptor<double, Tree>;
   std::optional<nanoflann::KDTreeSingleIndexAdaptor<Distance, Tree, 3>> index;
 };
@@ -77,6 +78,13 @@ Landmarks::Landmarks(Landmarks&&) noexcept = default;
 Landmarks& Landmarks::operator=(Landmarks&&) noexcept = default;
 
 const std::vector<Eigen::Vector3d>& Landmarks::points() const { return tree_->points; }
+
+const SurfaceGrid& Landmarks::surfaces() const {
+  if (tree_->surfaces.empty()) {
+    for (const Eigen::Vector3d& p : tree_->points) tree_->surfaces.insert(p);
+  }
+  return tree_->surfaces;
+}
 
 double Landmarks::distance_to(const Eigen::Vector3d& p) const {
   NearestWithin nearest{kFarthestGap * kFarthestGap};

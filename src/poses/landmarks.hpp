@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "cell_surfaces.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -37,6 +38,8 @@ class Landmarks {
   /// occlusion. `most`: compared points, about.
   Agreement compare(const Landmarks& other, const Pose& T_this_other,
                     std::size_t most = 1200) const;
+  /// Surfaces through the points; the first call builds them.
+  const SurfaceGrid& surfaces() const;
   /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
   double distance_to(const Eigen::Vector3d& p) const;
 

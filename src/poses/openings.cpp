@@ -7,6 +7,7 @@
 
 #include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
+#include "dynains/sensor/mounting.hpp"
 #include "io/points/finite_points.hpp"
 
 namespace dynains {
@@ -70,9 +71,18 @@ std::optional<bool> follow_sensor(const Recording& recording, double least_way) 
 }
 
 bool has_wrong_origin(const Recording& recording) {
-  constexpr double kClearly = 1.3;  // ratio
+  constexpr double kClearly = 1.3;     // ratio
+  constexpr double kOverGround = 0.3;  // m; seen from a point on it, level ground is one beam
   if (recording.sensor_origin().isZero(0.0) || recording.size() == 0) return false;
-  const PointBuffer points = finite_points(recording.read_scan(recording.size() / 2));
+  const PointBuffer all = finite_points(recording.read_scan(recording.size() / 2));
+  const Mounting mounting = estimate_mounting(all);
+  if (!mounting.known) return false;
+  PointBuffer points;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Eigen::Vector3d p = Eigen::Vector3f(all.x[i], all.y[i], all.z[i]).cast<double>();
+    if (mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
+    points.push_back(all.x[i], all.y[i], all.z[i]);
+  }
   return sharpness(points, -recording.sensor_origin()) >
          kClearly * sharpness(points, Eigen::Vector3d::Zero());
 }

@@ -142,10 +142,11 @@ std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainS
   }
   if (!forth) return std::nullopt;
   const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
-  const auto found =
-      is_open
-          ? complete(a, b, *forth, given, farthest)
-          : checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
+  auto found = is_open ? complete(a, b, *forth, given, farthest) : std::nullopt;
+  // Samples of smooth walls keep their place beside the sensor: no motion is no finding there.
+  if (!found && !(is_open && is_exact(forth->T_a_b, Pose::Identity()))) {
+    found = checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
+  }
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
   return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
 }

@@ -33,7 +33,7 @@ double gap_of(const Landmarks& a, const Points& points, const Pose& T, double mo
 }
 
 /// The `points` of another scan that do not keep their place beside `a`, as traffic ahead and
-/// samples of smooth walls do; all if those are few.
+/// smooth walls do: only these tell the way. None if they are few.
 Points decisive_of(const Points& points, const Landmarks& a, const Pose& standing) {
   constexpr double kLeastShare = 0.15;  // of the points
   Points decisive;
@@ -41,9 +41,10 @@ Points decisive_of(const Points& points, const Landmarks& a, const Pose& standin
     if (a.distance_to(standing * p) > kDistinct) decisive.push_back(p);
   }
   const double least_count = kLeastShare * static_cast<double>(points.size());
-  const bool are_few =
-      static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestLandmarks;
-  return are_few ? points : decisive;
+  if (static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestLandmarks) {
+    decisive.clear();
+  }
+  return decisive;
 }
 
 /// The index of the least gap; empty if it is at an end, or if another minimum is nearly as low.
@@ -76,6 +77,7 @@ std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pos
   const Pose standing = moved(T_a_b, -way * direction);
   const Points decisive_a = decisive_of(of_a, b, standing.inverse());
   const Points decisive_b = decisive_of(of_b, a, standing);
+  if (decisive_a.empty() || decisive_b.empty()) return std::nullopt;
   std::vector<double> gaps;
   const auto steps = static_cast<int>(std::ceil(farthest / kCoarse));
   for (int k = -steps; k <= steps; ++k) {

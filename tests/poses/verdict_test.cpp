@@ -1,11 +1,14 @@
 // Verdicts on right and wrong poses of written recordings.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "dynains/io/kitti.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "poses/in_two_threads.hpp"
 #include "poses/scan_registration.hpp"
@@ -119,6 +122,66 @@ TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it move
   };
   CHECK(standing(0.0).verdict == PoseVerdict::kNoMotion);
   CHECK(standing(10.0).verdict == PoseVerdict::kDisagree);
+}
+
+/// Writes 30 scans of 16 beams, 0.8 m over the floor of an empty box of this size (m), by a sensor
+/// that moves along x by `step` (m) from scan to scan. Clouds are in a frame on the floor if
+/// `is_on_floor`, which the poses are of. `drift`: m a scan along y, of the poses alone.
+void write_box(const std::filesystem::path& folder, const Eigen::Vector3d& size, double step,
+               bool is_on_floor, double drift = 0.0) {
+  constexpr int kScans = 30, kBeams = 16, kColumns = 900;
+  constexpr double kHeight = 0.8;
+  const Eigen::Vector3d high(0.5 * size.x(), 0.5 * size.y(), size.z() - kHeight);
+  const Eigen::Vector3d low(-high.x(), -high.y(), -kHeight);
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  std::filesystem::create_directories(folder / "velodyne");
+  std::vector<Pose> poses;
+  for (int scan = 0; scan < kScans; ++scan) {
+    const Eigen::Vector3d place(step * scan, 0.0, 0.0);
+    std::vector<float> xyzi;
+    for (int k = 0; k < kBeams * kColumns; ++k) {
+      const double elevation = (-25.0 + 2.5 * (k % kBeams)) * M_PI / 180.0;
+      const double azimuth = 2.0 * M_PI * (k / kBeams) / kColumns;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      double range = 1e9;
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        const double wall = ray[axis] > 0.0 ? high[axis] : low[axis];
+        if (ray[axis] != 0.0) range = std::min(range, (wall - place[axis]) / ray[axis]);
+      }
+      if (range > 40.0) continue;
+      Eigen::Vector3d p = (range + noise(random)) * ray;
+      if (is_on_floor) p.z() += kHeight;
+      for (const double value : {p.x(), p.y(), p.z(), 0.3}) {
+        xyzi.push_back(static_cast<float>(value));
+      }
+    }
+    write_scan(folder / "velodyne" / (simulation::scan_name(std::size_t(scan)) + ".bin"), xyzi);
+    poses.emplace_back(Eigen::Translation3d(place.x(), drift * scan, 0.0));
+  }
+  write_poses(folder / "poses.txt", poses);
+}
+
+TEST_CASE("Right poses in a smooth corridor are sound, and those that leave it are not") {
+  const TemporaryFolder folder;
+  const Eigen::Vector3d corridor(300.0, 2.2, 2.6);
+  const double step = GENERATE(0.1, 1.0);  // m
+  write_box(folder.path(), corridor, step, false);
+  const Diagnosis d = diagnose(Recording(folder.path()));
+  CHECK(d.verdict == PoseVerdict::kNoMotion);
+  CHECK(d.flaws.step == 0.0);
+  CHECK_FALSE(d.flaws.has_equal_orientations);
+  write_box(folder.path(), corridor, step, false, 0.3);
+  CHECK_FALSE(diagnose(Recording(folder.path())).sound());
+}
+
+TEST_CASE("The right origin of clouds in a frame on a level floor is kept") {
+  const TemporaryFolder folder;
+  write_box(folder.path(), {14.0, 11.0, 3.2}, 0.1, true);
+  RecordingOptions options;
+  options.sensor_origin = Eigen::Vector3d(0.0, 0.0, 0.8);
+  CHECK(diagnose(Recording(folder.path(), options)).verdict == PoseVerdict::kAgree);
 }
 
 TEST_CASE("A plane that contains the beam through it is no surface") {
