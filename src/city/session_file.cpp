@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 using Vector = std::array<double, 3>;
 
-constexpr char kMagic[9] = "DYNSESS4";
+constexpr char kMagic[9] = "DYNSESS5";
 constexpr std::uint64_t kNumber = sizeof(std::uint64_t);
 
 std::uint64_t checksum(const char* data, std::size_t size) {

@@ -1,6 +1,6 @@
 // The file of a session. Numbers are little endian, checksums FNV-1a of 64 bits. In this order:
 //
-//  "DYNSESS4"
+//  "DYNSESS5"
 //  blocks, each with the uint64 checksum of its bytes behind it; the last one is the JSON:
 //    tiles: for each point float x, y (m, from the corner of the tile), z (m, world); uint32 number
 //    of its scan, label of the recording or 0, 1 for ground, else 0

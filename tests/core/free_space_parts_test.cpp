@@ -351,6 +351,22 @@ TEST_CASE("the beam spacing of a sensor is measured from one scan") {
   CHECK(estimate_sensor_model(PointsView(points).subview(0, 500)).known());
 }
 
+TEST_CASE("the beams of a sensor without rings are as far apart as their density says") {
+  // A third of a turn, 40 deg high, with 5,000 beams in random directions.
+  Random random(4);
+  PointBuffer points;
+  for (int i = 0; i < 5000; ++i) {
+    const double sine = random.uniform(std::sin(-10.0 * M_PI / 180.0), 0.5);
+    add_beam(random.uniform(-60.0, 60.0), std::asin(sine) * 180.0 / M_PI, points);
+  }
+  const SensorModel sensor = estimate_sensor_model(points);
+  const double spacing =
+      std::sqrt(120.0 * (0.5 - std::sin(-10.0 * M_PI / 180.0)) * 180.0 / M_PI / 5000.0);
+  CHECK(sensor.azimuth_step == Approx(spacing).epsilon(0.02));
+  CHECK(sensor.elevation_gap == sensor.azimuth_step);
+  CHECK(sensor.elevation_gap_wide == sensor.azimuth_step);
+}
+
 TEST_CASE("dense and wide gaps of unevenly spaced beams are distinguished") {
   // 24 gaps: ten of 0.3 deg, eight of 0.6 deg, six of 1.2 deg. Each beam is measured twice.
   PointBuffer points;

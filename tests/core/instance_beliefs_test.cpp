@@ -394,31 +394,63 @@ GroundSplit wall(float range) {
   return split;
 }
 
+TEST_CASE("a scan is not tested against its own beams in a reference of several scans") {
+  ReferenceScans views{FreeSpaceConfig()};
+  SensorModel sensor = SensorModel::typical();
+  sensor.azimuth_step = 1.0;
+  sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
+  views.adapt({&sensor, 1});
+  views.add(0, 0, 0, Eigen::Isometry3d::Identity(), wall(10.0F), {});
+  PointBuffer points;
+  points.push_back(5.0F, 0.0F, 0.0F);
+  points.push_back(10.0F, 0.0F, 0.0F);
+  points.grow(2 + detail::kPackWidth);
+  ReferenceTest memory;
+  for (const std::uint64_t scan : {0U, 1U, 2U}) {
+    const Visibility& visibility =
+        views.test(points, 2, scan, Eigen::Isometry3d::Identity(), views.newest(), memory);
+    CHECK(visibility.bits(0, 2).free == (scan < 2 ? 0U : 1U));
+    CHECK(visibility.bits(0, 2).hit == (scan < 2 ? 0U : 2U));
+  }
+}
+
 TEST_CASE("a reference is found as long as scans need it, and every scan finds its references") {
-  for (const auto& [step, lookback, lookahead] : {std::array{1, 12, 6}, std::array{2, 100, 30},
-                                                  std::array{3, 75, 0}, std::array{2, 20, 60}}) {
+  // A reference of a sparse sensor takes 6 scans, and so do its steps.
+  for (const auto& [given_step, lookback, lookahead, scans] :
+       {std::array{1, 12, 6, 1}, std::array{2, 100, 30, 1}, std::array{3, 75, 0, 1},
+        std::array{2, 20, 60, 1}, std::array{2, 100, 30, 6}, std::array{8, 75, 0, 6}}) {
+    const int step = std::max(given_step, scans);
     INFO("step " << step << ", lookback " << lookback << ", lookahead " << lookahead);
     FreeSpaceConfig config;
-    config.reference_step = step;
+    config.reference_step = given_step;
     config.lookback_scans = lookback;
     config.lookahead_scans = lookahead;
     ReferenceScans views(config);
     const ReferenceSpan& span = views.span();
     SensorModel sensor = SensorModel::typical();
     sensor.azimuth_step = 1.0;
-    sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
+    sensor.elevation_gap = scans > 1 ? 3.0 : 0.5;
+    sensor.elevation_gap_wide = 3.0;
+    REQUIRE(scans_to_see_things(sensor, 10) == scans);
     views.adapt({&sensor, 1});
+    REQUIRE(span.step == step);
     constexpr std::uint64_t kScans = 240, kBreak = 17;  // another epoch begins at kBreak
     const auto epoch_of = [](std::uint64_t scan) { return scan < kBreak ? 0U : 1U; };
     const auto since_begin = [](std::uint64_t scan) {
       return scan < kBreak ? scan : scan - kBreak;
     };
     for (std::uint64_t scan = 0; scan < kScans; ++scan) {
-      if (since_begin(scan) % static_cast<std::uint64_t>(step) == 0) {
+      const bool is_newest = since_begin(scan) % static_cast<std::uint64_t>(step) == 0;
+      REQUIRE((views.takes(since_begin(scan)) || !is_newest));
+      if (views.takes(since_begin(scan))) {
         REQUIRE(views.find(scan, epoch_of(scan)) == nullptr);
         views.add(scan, epoch_of(scan), since_begin(scan), Eigen::Isometry3d::Identity(),
                   wall(5.0F + 0.1F * static_cast<float>(scan)), {});
-        REQUIRE(views.newest().scan == scan);
+        REQUIRE((views.newest().scan == scan) == is_newest);
+        if (is_newest) {
+          REQUIRE(views.newest().count ==
+                  static_cast<std::size_t>(since_begin(scan) == 0 ? 1 : scans));
+        }
       }
       for (int age = 1; age <= 200; ++age) {
         if (static_cast<std::uint64_t>(age) > since_begin(scan)) break;
@@ -443,7 +475,7 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     points.grow(3 + detail::kPackWidth);
     detail::ReferenceTest memory;
     const detail::Visibility& visibility =
-        views.test(points, 3, Eigen::Isometry3d::Identity(), views.newest(), memory);
+        views.test(points, 3, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);
     CHECK(visibility.bits(0, 3).free == 1);
     CHECK(visibility.bits(0, 3).hit == 2);
     const std::uint64_t newest_scan = views.newest().scan;

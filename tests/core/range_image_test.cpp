@@ -28,7 +28,7 @@ std::int32_t cell_of(const RangeImageGrid& grid, float x, float y, float z) {
   const detail::Float8 px(x), py(y), pz(z);
   ImageLocator(grid)
       .locate<detail::BaselinePacks>(px, py, pz, sqrt((px * px + py * py) + pz * pz))
-      .store(cells);
+      .cell.store(cells);
   return cells[0];
 }
 
@@ -65,7 +65,7 @@ TEST_CASE("cells of an image are derived from the beams of a sensor, within limi
   sensor.azimuth_step = 0.05;
   CHECK(RangeImageGrid::for_sensor(sensor).columns == 1800);
   sensor.azimuth_step = 2.0;
-  CHECK(RangeImageGrid::for_sensor(sensor).columns == 600);
+  CHECK(RangeImageGrid::for_sensor(sensor).columns == 450);
   sensor.elevation_gap = 0.1;
   CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.2) < 3.0);
   sensor.elevation_gap = 3.0;
@@ -242,6 +242,101 @@ TEST_CASE("an image equals its definition: near objects protect more cells aroun
         }
       }
     }
+  }
+}
+
+// A scan with beams 0.8 deg apart in the middle of the cells of `grid`, which end at `range` m.
+PointBuffer coarse_wall(const RangeImageGrid& grid, double range) {
+  PointBuffer wall;
+  for (int column = -5; column < 5; ++column) {
+    for (int row = 0; row < grid.rows; ++row) {
+      const double azimuth = (column + 0.5) / static_cast<double>(grid.columns_per_radian);
+      const double elevation =
+          static_cast<double>(grid.lowest) + (row + 0.5) / static_cast<double>(grid.rows_per_level);
+      wall.push_back(static_cast<float>(range * std::cos(elevation) * std::cos(azimuth)),
+                     static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)),
+                     static_cast<float>(range * std::sin(elevation)));
+    }
+  }
+  return wall;
+}
+
+TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre") {
+  SensorModel sensor = SensorModel::typical();
+  sensor.azimuth_step = 2.0;
+  const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  image.build(grid, PointsView(), coarse_wall(grid, 60.0), {}, 0.0F, scratch);
+  const double azimuth = 0.5 / static_cast<double>(grid.columns_per_radian);  // of a beam
+  PointBuffer samples;
+  const double distances[] = {0.0, 0.10, 0.15, 0.18, 0.19, -0.15, -0.19};  // m, 30 m away: 17 cm
+  for (const double distance : distances) {
+    const double angle = azimuth + distance / 30.0;
+    samples.push_back(static_cast<float>(30.0 * std::cos(angle)),
+                      static_cast<float>(30.0 * std::sin(angle)), 0.0F);
+  }
+  const std::size_t count = samples.size();
+  samples.resize(count + detail::kPackWidth);
+  detail::Visibility visibility;
+  detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
+                          visibility);
+  for (std::size_t i = 0; i < count; ++i) {
+    INFO("sample " << i);
+    CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17));
+    CHECK(visibility.bits(i, i + 1).hit == 0);
+  }
+  // Another view of the same reference adds what it sees; its hits count more.
+  image.build(grid, PointsView(), coarse_wall(grid, 30.0), {}, 0.0F, scratch);
+  detail::Visibility other;
+  detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
+                          other);
+  REQUIRE(other.count(0, count).hit == count);
+  visibility.add(other, count);
+  visibility.settle(count);
+  CHECK(visibility.count(0, count).free == 0);
+  CHECK(visibility.count(0, count).hit == count);
+}
+
+TEST_CASE("the beam of a cell is the direction of its nearest return") {
+  const RangeImageGrid grid = small_grid();
+  RangeImage image;
+  RangeImage::Scratch scratch;
+  Random random(11);
+  for (int round = 0; round < 200; ++round) {
+    // Two returns in one cell; the other cells have none.
+    const auto column = static_cast<double>(100 + random.index(200));
+    const auto row = static_cast<double>(20 + random.index(20));
+    PointBuffer points;
+    double places[2][2], nearest = 0.0;
+    for (auto& place : places) {
+      place[0] = random.uniform(0.02, 0.98);
+      place[1] = random.uniform(0.02, 0.98);
+      const double azimuth =
+          (column + place[0]) / static_cast<double>(grid.columns_per_radian) - M_PI;
+      const double level = static_cast<double>(grid.lowest) +
+                           (row + place[1]) / static_cast<double>(grid.rows_per_level);
+      double sine = level;  // inverse of level() by bisection
+      for (double low = -1.0, high = 1.0; high - low > 1e-12;) {
+        sine = 0.5 * (low + high);
+        (RangeImageGrid::level(static_cast<float>(sine)) < static_cast<float>(level) ? low : high) =
+            sine;
+      }
+      const double range = nearest == 0.0 ? 20.0 : 10.0;
+      nearest = range;
+      const double across = range * std::sqrt(1.0 - sine * sine);
+      points.push_back(static_cast<float>(across * std::cos(azimuth)),
+                       static_cast<float>(across * std::sin(azimuth)),
+                       static_cast<float>(range * sine));
+    }
+    image.build(grid, PointsView(), points, {}, 0.0F, scratch);
+    const std::size_t cell =
+        grid.cell(static_cast<std::int32_t>(row), static_cast<std::int32_t>(column));
+    REQUIRE(image[cell].nearest < 1002);
+    const RangeImage::Beam beam = image.beams()[cell];
+    CHECK(std::abs((beam >> 8) - 256.0 * places[1][0]) < 8.0);
+    CHECK(std::abs((beam & 255) - 256.0 * places[1][1]) < 8.0);
+    CHECK(image.beams()[cell + 2] == RangeImage::kCentre);
   }
 }
 

@@ -122,8 +122,10 @@ class FreeSpaceEvidence {
             moved_ground_.find(split.ground(), record.ground)};
   }
 
-  /// Whether the newest scan is a reference for others.
-  bool is_reference() const { return phase_of(records_[newest_ % records_.size()]) == 0; }
+  /// Whether the newest scan is one of a reference for others.
+  bool is_reference() const {
+    return references_.takes(records_[newest_ % records_.size()].since_begin);
+  }
 
   /// By non-ground point of the newest scan, after its first judge(): 1 if it may move, else 0.
   /// Valid until the next observe().
@@ -136,8 +138,8 @@ class FreeSpaceEvidence {
     return may_move_;
   }
 
-  /// Makes the range image of the newest scan, which is a reference. Points that are certain to
-  /// move only occlude in it. Call it after the first judge() of the scan. `split`: points of the
+  /// Makes the range image of the newest scan, if is_reference(). Points that are certain to move
+  /// only occlude in it. Call it after the first judge() of the scan. `split`: points of the
   /// scan.
   void make_reference(const GroundSplit& split) {
     const Record& record = record_of(newest_);
@@ -146,7 +148,7 @@ class FreeSpaceEvidence {
         evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
     references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
                     is_moving_);
-    if (delay_of(0) != 0) return;
+    if (phase_of(record) != 0 || delay_of(0) != 0) return;
     test_older_scans(0);
     sum_along_tracks(newest_);
   }
@@ -228,24 +230,25 @@ class FreeSpaceEvidence {
     for (std::uint64_t age = 1; age <= record.since_begin && age <= lookback; ++age) {
       if (!references_.span().compares(record.since_begin, static_cast<int>(age))) continue;
       const detail::ReferenceScan* const reference = references_.find(scan - age, record.epoch);
-      if (reference != nullptr) test(record, *reference, newest_test_);
+      if (reference != nullptr) test(scan, record, *reference, newest_test_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
   }
 
   // Scans since the latest reference.
   std::uint64_t phase_of(const Record& record) const {
-    return record.since_begin % static_cast<std::uint64_t>(config_.reference_step);
+    return record.since_begin % static_cast<std::uint64_t>(references_.span().step);
   }
 
-  // Tests all samples of a scan against one reference. `memory`: of the thread.
-  void test(Record& record, const detail::ReferenceScan& reference,
+  // Tests all samples of scan number `scan` against one reference. `memory`: of the thread.
+  void test(std::uint64_t scan, Record& record, const detail::ReferenceScan& reference,
             detail::ReferenceTest& memory) const {
-    record.ground.add(references_.test(record.ground.points, record.ground.size(),
+    record.ground.add(references_.test(record.ground.points, record.ground.size(), scan,
                                        record.T_world_sensor, reference, memory));
     detail::InstanceEvidence& evidence = record.evidence;
-    const detail::Visibility& visibility = references_.test(
-        evidence.samples.points, evidence.samples.size(), record.T_world_sensor, reference, memory);
+    const detail::Visibility& visibility =
+        references_.test(evidence.samples.points, evidence.samples.size(), scan,
+                         record.T_world_sensor, reference, memory);
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_level);
     const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
@@ -259,7 +262,7 @@ class FreeSpaceEvidence {
   // phase are tested this many pushes after the image was made. For phase 0 it is one push, because
   // the push of a reference already makes the image.
   std::uint64_t delay_of(std::uint64_t phase) const {
-    return phase == 0 && config_.reference_step > 1 ? 1 : phase;
+    return phase == 0 && references_.span().step > 1 ? 1 : phase;
   }
 
   // Tests older scans of the phases with this delay against the newest image.
@@ -268,12 +271,13 @@ class FreeSpaceEvidence {
     if (reference.scan + phase_of(record_of(newest_)) != newest_) return;
     const int most = config_.lookahead_scans - static_cast<int>(delay);
     for (int age = 1; age <= most && static_cast<std::uint64_t>(age) <= reference.scan; ++age) {
-      Record& older = record_of(reference.scan - static_cast<std::uint64_t>(age));
+      const std::uint64_t scan = reference.scan - static_cast<std::uint64_t>(age);
+      Record& older = record_of(scan);
       if (older.epoch != reference.epoch || delay_of(phase_of(older)) != delay ||
-          !detail::is_compared(age, config_.reference_step, most)) {
+          !detail::is_compared(age, references_.span().step, most)) {
         continue;
       }
-      test(older, reference, older_test_);
+      test(scan, older, reference, older_test_);
     }
   }
 

@@ -13,7 +13,8 @@
 
 namespace dynains {
 
-/// Range image with the nearest return of each cell and the nearest return of its 3x3 cells.
+/// Range image with the nearest return of each cell and its direction, and the nearest return of
+/// its 3x3 cells.
 ///
 /// A return protects the samples in its 3x3 cells: samples at its range or behind it are not free.
 /// This margin keeps ground at grazing incidence and edges of objects. Returns of moving points
@@ -30,6 +31,11 @@ class RangeImage {
     /// cell: neither it nor both cells beside it have a return.
     std::int16_t around;
   };
+  /// Direction of the nearest return of a cell: its place along the columns (upper byte) and along
+  /// the rows (lower byte) of the cell, in 1/kPlaces of it. Without a return, kCentre.
+  using Beam = std::uint16_t;
+  static constexpr std::int32_t kPlaces = 256;
+  static constexpr Beam kCentre = 128 << 8 | 128;
   static constexpr float kCentimetres = 100.0F;  ///< unit of ranges, per metre
   static constexpr std::int16_t kMoving = 1;     ///< bit that is set in ranges of moving points
   static constexpr std::int16_t kNothing = 32766;
@@ -37,7 +43,8 @@ class RangeImage {
 
   /// Buffers of build(), which several images can share.
   struct Scratch {
-    std::vector<std::int16_t> nearest;         // by cell: nearest return
+    std::vector<std::int32_t> returns;         // by cell: nearest return, see collect()
+    std::vector<std::int16_t> nearest;         // by cell: its range
     std::vector<std::int16_t> objects, wider;  // by cell: nearest static object, see widen()
     std::vector<std::int16_t> below, gap;      // by column, see close_holes()
     std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
@@ -46,8 +53,11 @@ class RangeImage {
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
   const Cell* data() const { return cells_.get(); }
+  /// By cell.
+  const Beam* beams() const { return beams_.get(); }
   /// A cell to write, for images that are read from files. Call allocate() before.
   Cell& cell(std::size_t index) { return cells_[index]; }
+  Beam& beam(std::size_t index) { return beams_[index]; }
   /// The grid of the image; empty before the first allocate().
   const RangeImageGrid& grid() const { return grid_; }
 
@@ -58,6 +68,8 @@ class RangeImage {
     if (!fits) {
       cells_ = std::unique_ptr<Cell[]>(new Cell[grid.cell_count()]);
       cells_[0] = {kNothing, kUnknown};
+      beams_ = std::unique_ptr<Beam[]>(new Beam[grid.cell_count()]);
+      beams_[0] = kCentre;
     }
     grid_ = grid;
   }
@@ -69,11 +81,13 @@ class RangeImage {
   /// poses.
   void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
              Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
-    scratch.nearest.assign(grid.cell_count(), kNothing);
+    allocate(grid);
+    scratch.returns.assign(grid.cell_count(), kNoReturn);
     scratch.border.assign(grid.stride(), kNothing);
-    collect(grid, objects, moving, scratch.nearest.data());
+    collect(grid, objects, moving, scratch.returns.data());
     keep_objects(scratch);
-    collect(grid, ground, {}, scratch.nearest.data());
+    collect(grid, ground, {}, scratch.returns.data());
+    split(scratch);
     close_holes(grid, scratch);
     store_with_least_around(grid, scratch);
     widen(grid, reach, scratch);
@@ -82,18 +96,22 @@ class RangeImage {
  private:
   static constexpr float kFarthest = 320.0F;  // m
 
-  // Writes the nearest range of each cell. Cells and ranges of a block are stored in arrays, which
-  // is faster than an extraction of single numbers from packs.
+  static constexpr std::int32_t kNoReturn = kNothing << 16 | kCentre;
+
+  // Writes the nearest return of each cell: its range, then the places of its column and its row,
+  // 8 bits each. Returns of a block are stored in arrays, which is faster than an extraction of
+  // single numbers from packs.
   static void collect(const RangeImageGrid& grid, PointsView points,
-                      Span<const std::uint8_t> moving, std::int16_t* nearest) {
+                      Span<const std::uint8_t> moving, std::int32_t* nearest) {
     const ImageLocator locator(grid);
-    static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres);
+    static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres), kFine(kPlaces),
+        kFirst(0.0F), kLast(kPlaces - 1);
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
       using Int = typename Packs::Int;
       std::int32_t cell[detail::kStepPoints];
-      std::int32_t range[detail::kStepPoints];
+      std::int32_t value[detail::kStepPoints];
       for (std::size_t begin = 0; begin < points.size(); begin += detail::kStepPoints) {
         const std::size_t size = std::min(detail::kStepPoints, points.size() - begin);
         detail::for_slices<Packs>(size, [&](auto place) {
@@ -101,17 +119,24 @@ class RangeImage {
           const Float y = place.load(points.y.data() + begin);
           const Float z = place.load(points.z.data() + begin);
           const Float metres = sqrt((x * x + y * y) + z * z);
-          locator.template locate<Packs>(x, y, z, metres).store(&cell[place.begin]);
-          const Int centimetres = truncate(min(metres, Float(kMost)) * kScale);
-          (centimetres & Int(~kMoving)).store(&range[place.begin]);
+          const auto located = locator.template locate<Packs>(x, y, z, metres);
+          const auto byte = [](const Float& within) {
+            return truncate(max(min(within * kFine, Float(kLast)), Float(kFirst)));
+          };
+          const Int centimetres = truncate(min(metres, Float(kMost)) * kScale) & Int(~kMoving);
+          located.cell.store(&cell[place.begin]);
+          ((centimetres << 16) + (byte(located.column) << 8) + byte(located.row))
+              .store(&value[place.begin]);
         });
         if (!moving.empty()) {
-          for (std::size_t i = 0; i < size; ++i) range[i] |= moving[begin + i];
+          for (std::size_t i = 0; i < size; ++i) {
+            value[i] |= std::int32_t{moving[begin + i]} << 16;
+          }
         }
         // Points outside the image have cell 0, a cell of the border that is not read.
         for (std::size_t i = 0; i < size; ++i) {
-          std::int16_t& value = nearest[cell[i]];
-          value = std::min(value, static_cast<std::int16_t>(range[i]));
+          std::int32_t& least = nearest[cell[i]];
+          least = std::min(least, value[i]);
         }
       }
     });
@@ -133,9 +158,25 @@ class RangeImage {
 
   // Copies the returns of static objects, before the ground is added to the image.
   static void keep_objects(Scratch& scratch) {
-    scratch.objects.resize(scratch.nearest.size());
-    std::transform(scratch.nearest.begin(), scratch.nearest.end(), scratch.objects.begin(),
-                   [](std::int16_t range) { return (range & kMoving) != 0 ? kNothing : range; });
+    scratch.objects.resize(scratch.returns.size());
+    std::transform(scratch.returns.begin(), scratch.returns.end(), scratch.objects.begin(),
+                   [](std::int32_t value) {
+                     const auto range = static_cast<std::int16_t>(value >> 16);
+                     return (range & kMoving) != 0 ? kNothing : range;
+                   });
+  }
+
+  // Splits the returns into ranges and beams.
+  void split(Scratch& scratch) {
+    const std::size_t count = scratch.returns.size();
+    scratch.nearest.resize(count);
+    const std::int32_t* const from = scratch.returns.data();
+    std::int16_t* const nearest = scratch.nearest.data();
+    Beam* const beams = beams_.get();
+    detail::with_packs([&](auto) {
+      for (std::size_t i = 0; i < count; ++i) nearest[i] = static_cast<std::int16_t>(from[i] >> 16);
+      for (std::size_t i = 0; i < count; ++i) beams[i] = static_cast<Beam>(from[i]);
+    });
   }
 
   // Fills gaps of up to `hole_rows` empty rows between two beams with the nearer return of the rows
@@ -181,7 +222,6 @@ class RangeImage {
   void store_with_least_around(const RangeImageGrid& grid, Scratch& scratch) {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
-    allocate(grid);
     scratch.least.resize(stride);
     scratch.least_moving.resize(stride);
     scratch.count.resize(stride);
@@ -328,6 +368,7 @@ class RangeImage {
   }
 
   std::unique_ptr<Cell[]> cells_;
+  std::unique_ptr<Beam[]> beams_;
   RangeImageGrid grid_;
 };
 

@@ -37,7 +37,7 @@ struct RangeImageGrid {
   /// between its beams: few cells between returns are empty, and few returns share a cell.
   static RangeImageGrid for_sensor(const SensorModel& sensor) {
     constexpr double kBorder = 2.0;  // deg beyond the outer beams
-    const double width = std::clamp(1.2 * sensor.azimuth_step, 0.2, 0.6);
+    const double width = std::clamp(1.2 * sensor.azimuth_step, 0.2, 0.8);
     const double height = std::clamp(0.6 * sensor.elevation_gap, 0.2, 0.4);
     const auto level_at = [](double elevation) {
       return level(
@@ -100,12 +100,17 @@ struct ImageLocator {
         columns_per_radian(grid.columns_per_radian),
         last_column(static_cast<float>(grid.columns) - 0.5F) {}
 
-  /// Indices of the cells in the direction of points; 0 for directions outside the image.
+  /// Directions of points in the grid.
+  template <class Packs>
+  struct Located {
+    typename Packs::Int cell;      ///< index of the cell; 0 outside the image
+    typename Packs::Float row;     ///< place in the cell, from 0 to 1
+    typename Packs::Float column;  ///< place in the cell, from 0 to 1
+  };
   /// `range`: distances of the points from the sensor, in the unit of `x`, `y` and `z`.
   template <class Packs>
-  typename Packs::Int locate(const typename Packs::Float& x, const typename Packs::Float& y,
-                             const typename Packs::Float& z,
-                             const typename Packs::Float& range) const {
+  Located<Packs> locate(const typename Packs::Float& x, const typename Packs::Float& y,
+                        const typename Packs::Float& z, const typename Packs::Float& range) const {
     using Float = typename Packs::Float;
     static constexpr detail::PackConstant kZero(0.0F), kHalfTurn(detail::kPi),
         kBorder(static_cast<float>(detail::kPackWidth));
@@ -114,9 +119,11 @@ struct ImageLocator {
     // False for the origin, since its row is NaN.
     const typename Packs::Mask inside = (row >= kZero) & (row < rows);
     // Exact in single precision, since images have fewer than 2^24 cells.
-    const Float first = to_float(truncate(keep(inside, row))) * stride;
-    return inside & (truncate(first + kBorder) +
-                     truncate(max(min(column, Float(last_column)), Float(kZero))));
+    const Float row_index = to_float(truncate(keep(inside, row)));
+    const typename Packs::Int column_index =
+        truncate(max(min(column, Float(last_column)), Float(kZero)));
+    return {inside & (truncate(row_index * stride + kBorder) + column_index), row - row_index,
+            column - to_float(column_index)};
   }
 
   detail::PackConstant lowest, rows_per_level, rows, stride, columns_per_radian, last_column;

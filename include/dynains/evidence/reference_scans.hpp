@@ -4,8 +4,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
@@ -34,6 +36,15 @@ inline bool is_compared(int age, int spacing, int most, int above = 0) {
   return age > above && age <= most && lag != kReferenceLags.end() && *lag <= last;
 }
 
+/// Number of consecutive scans whose beams see a thing of 25 cm at 20 m, at least 1: one of a
+/// sensor with dense rows, several of one that is sparse or does not repeat its pattern. `most`:
+/// limit.
+inline int scans_to_see_things(const SensorModel& sensor, int most) {
+  constexpr double kThing = 0.0125 / kRadians;  // deg
+  const double scans = sensor.azimuth_step * sensor.elevation_gap / (kThing * kThing);
+  return static_cast<int>(std::clamp(std::round(scans), 1.0, static_cast<double>(most)));
+}
+
 /// Which scans are references, and for how long. Every `step`-th scan of an epoch is a reference
 /// for the scans up to `near` after it, and every `sparse_step`-th one up to `lookback`: images of
 /// long ago would take most of the memory.
@@ -41,8 +52,9 @@ struct ReferenceSpan {
   static constexpr int kDense = 30;       // scans
   static constexpr int kSparseStep = 10;  // scans
 
-  explicit ReferenceSpan(const FreeSpaceConfig& config)
-      : step(config.reference_step),
+  /// `scans`: of one reference.
+  explicit ReferenceSpan(const FreeSpaceConfig& config, int scans = 1)
+      : step(std::max(config.reference_step, scans)),
         sparse_step(step * std::max(kSparseStep / step, 1)),
         lookback(config.lookback_scans),
         near(std::max(config.lookahead_scans, std::min(lookback, kDense + step - 1))) {}
@@ -76,11 +88,13 @@ struct ReferenceSpan {
 
 /// The range image of one sensor of a scan.
 struct ReferenceView {
+  std::uint64_t scan = 0;
   Pose T_world_beams = Pose::Identity();
   RangeImage image;
 };
 
-/// A reference scan: the range images of its sensors are evidence on other scans.
+/// A reference scan: the range images of its sensors, and of some scans before it, are evidence on
+/// other scans.
 struct ReferenceScan {
   static constexpr std::uint64_t kNoEpoch = ~std::uint64_t{0};  ///< epoch without a valid image
 
@@ -88,7 +102,8 @@ struct ReferenceScan {
   std::uint64_t since_begin = 0;  ///< scans since the first scan of the epoch
   std::uint64_t epoch = kNoEpoch;
   Pose T_world_level = Pose::Identity();
-  std::vector<ReferenceView> views;  ///< by sensor
+  std::vector<ReferenceView> views;  ///< by scan, then by sensor
+  std::size_t count = 0;             ///< of the views that have images
 };
 
 /// What a reference sees of samples, with memory for the test.
@@ -98,18 +113,20 @@ struct ReferenceTest {
 };
 
 /// The reference scans that are still needed, see ReferenceSpan. The first scan of each epoch, and
-/// every scan that is a multiple of `reference_step` scans after it, is a reference.
+/// every scan that is a multiple of ReferenceSpan::step scans after it, is a reference.
 class ReferenceScans {
  public:
   explicit ReferenceScans(const FreeSpaceConfig& config)
-      : margin_(static_cast<float>(config.margin)),
+      : config_(config),
+        margin_(static_cast<float>(config.margin)),
         margin_slope_(static_cast<float>(config.margin_slope)),
         lateral_margin_(static_cast<float>(config.lateral_margin)),
         span_(config),
         references_(span_.count()) {}
 
-  /// Sets the resolution of later images, and their frames, for the sensors of a scan. Allocates
-  /// all images.
+  /// Sets the resolution of later images, their frames, and the number of scans of a reference, for
+  /// the sensors of a scan. If this number changes, all references are invalid. Allocates all
+  /// images.
   void adapt(Span<const SensorModel> sensors) {
     grids_.clear();
     T_level_beams_.clear();
@@ -120,57 +137,60 @@ class ReferenceScans {
       T_level_beams_.back().translation() = sensor.origin;
     }
     is_level_ = sensors.size() == 1 && sensors[0].is_level();
+    int scans = 1;
+    for (const SensorModel& sensor : sensors) {
+      scans = std::max(scans, scans_to_see_things(sensor, kMostScans));
+    }
+    if (scans != scans_) forget();
+    scans_ = scans;
+    span_ = ReferenceSpan(config_, scans_);
+    references_.resize(span_.count() + (scans_ > 1 ? 1 : 0));  // and the open one
     for (ReferenceScan& reference : references_) {
-      reference.views.resize(sensors.size());
-      for (std::size_t i = 0; i < sensors.size(); ++i) {
-        reference.views[i].image.allocate(grids_[i]);
+      reference.views.resize(static_cast<std::size_t>(scans_) * sensors.size());
+      for (std::size_t i = 0; i < reference.views.size(); ++i) {
+        reference.views[i].image.allocate(grids_[i % grids_.size()]);
       }
     }
   }
 
   const ReferenceSpan& span() const { return span_; }
 
+  /// Whether a scan, `since_begin` scans after the first one of its epoch, is one of a reference.
+  bool takes(std::uint64_t since_begin) const {
+    return scans_until_reference(since_begin) < static_cast<std::uint64_t>(scans_);
+  }
+
   /// Invalidates all references.
   void forget() {
+    open_.reset();
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Adds a reference in the place of one that is not needed any more. Each image is in the tilted
-  /// frame of its sensor, in which each beam is a row. `scan`, `epoch`: numbers of the scan and of
-  /// its epoch. `since_begin`: scans since the first scan of the epoch, a multiple of
-  /// `reference_step`. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground
+  /// Adds the images of a scan that takes() accepts to a reference, in the place of one that is not
+  /// needed any more. Each image is in the tilted frame of its sensor, in which each beam is a row.
+  /// `scan`, `epoch`: numbers of the scan and of its epoch. `since_begin`: scans since the first
+  /// scan of the epoch. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground
   /// point, as in RangeImage::build().
   void add(std::uint64_t scan, std::uint64_t epoch, std::uint64_t since_begin,
            const Pose& T_world_level, const GroundSplit& split, Span<const std::uint8_t> moving) {
-    const auto unneeded =
-        std::find_if(references_.begin(), references_.end(), [&](const ReferenceScan& reference) {
-          return reference.epoch != epoch ||
-                 !span_.needs(reference.since_begin, scan - reference.scan);
-        });
-    newest_ = static_cast<std::size_t>(unneeded - references_.begin());
-    ReferenceScan& reference = *unneeded;
+    if (since_begin == 0) open_.reset();
+    if (!open_) open_ = begin_reference(scan, epoch);
+    ReferenceScan& reference = references_[*open_];
+    if (grids_.size() > 1) {
+      sort_by_sensor(split, moving);
+      for (std::size_t i = 0; i < grids_.size(); ++i) {
+        build_view(i, T_world_level, next_view(scan, reference));
+      }
+    } else {
+      build_only_view(T_world_level, split, moving, next_view(scan, reference));
+    }
+    if (scans_until_reference(since_begin) > 0) return;
     reference.scan = scan;
     reference.epoch = epoch;
     reference.since_begin = since_begin;
     reference.T_world_level = T_world_level;
-    if (reference.views.size() > 1) {
-      sort_by_sensor(split, moving);
-      for (std::size_t i = 0; i < reference.views.size(); ++i) {
-        build_view(i, T_world_level, reference.views[i]);
-      }
-      return;
-    }
-    ReferenceView& view = reference.views.front();
-    view.T_world_beams = T_world_level;
-    PointsView ground = split.ground();
-    PointsView rest = split.non_ground();
-    if (!is_level_) {
-      const Eigen::Matrix3d R_beams_level = transposed(T_level_beams_.front().linear());
-      view.T_world_beams = rotated(T_world_level, R_beams_level);
-      ground = rotate(ground, R_beams_level, rotated_ground_);
-      rest = rotate(rest, R_beams_level, rotated_rest_);
-    }
-    view.image.build(grids_.front(), ground, rest, moving, lateral_margin_, scratch_);
+    newest_ = *open_;
+    open_.reset();
   }
 
   const ReferenceScan& newest() const { return references_[newest_]; }
@@ -183,20 +203,53 @@ class ReferenceScans {
     return nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) from a reference, held by `out`.
-  const Visibility& test(const PointBuffer& points, std::size_t count, const Pose& T_world_points,
-                         const ReferenceScan& reference, ReferenceTest& out) const {
-    for (const ReferenceView& view : reference.views) {
-      const bool is_first = &view == reference.views.data();
-      Visibility& visibility = is_first ? out.all : out.of_view;
+  /// Visibility of the first `count` points (m; padded for packs) of scan number `scan` from a
+  /// reference, held by `out`. If it has several scans, this scan and the adjacent ones are not
+  /// used.
+  const Visibility& test(const PointBuffer& points, std::size_t count, std::uint64_t scan,
+                         const Pose& T_world_points, const ReferenceScan& reference,
+                         ReferenceTest& out) const {
+    std::size_t tested = 0;
+    for (std::size_t i = 0; i < reference.count; ++i) {
+      const ReferenceView& view = reference.views[i];
+      if (scans_ > 1 && view.scan <= scan + 1 && scan <= view.scan + 1) continue;
+      Visibility& visibility = tested == 0 ? out.all : out.of_view;
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
       test_visibility(view.image, T_view_points, points, count, margin_, margin_slope_, visibility);
-      if (!is_first) out.all.merge(visibility, count);
+      if (tested > 0) out.all.add(out.of_view, count);
+      ++tested;
     }
+    if (tested == 0) out.all.clear(count);
+    if (tested > 1) out.all.settle(count);
     return out.all;
   }
 
  private:
+  static constexpr int kMostScans = 10;  // of a reference
+
+  std::uint64_t scans_until_reference(std::uint64_t since_begin) const {
+    const auto step = static_cast<std::uint64_t>(span_.step);
+    return (step - since_begin % step) % step;
+  }
+
+  // Index of an empty reference.
+  std::size_t begin_reference(std::uint64_t scan, std::uint64_t epoch) {
+    const auto unneeded =
+        std::find_if(references_.begin(), references_.end(), [&](const ReferenceScan& reference) {
+          return reference.epoch != epoch ||
+                 !span_.needs(reference.since_begin, scan - reference.scan);
+        });
+    unneeded->epoch = ReferenceScan::kNoEpoch;
+    unneeded->count = 0;
+    return static_cast<std::size_t>(unneeded - references_.begin());
+  }
+
+  static ReferenceView& next_view(std::uint64_t scan, ReferenceScan& reference) {
+    ReferenceView& view = reference.views[reference.count++];
+    view.scan = scan;
+    return view;
+  }
+
   // Points of one sensor in own_.
   struct OwnPoints {
     std::size_t begin, ground_count, rest_count;
@@ -231,6 +284,21 @@ class ReferenceScans {
     }
   }
 
+  // The image of the only sensor.
+  void build_only_view(const Pose& T_world_level, const GroundSplit& split,
+                       Span<const std::uint8_t> moving, ReferenceView& view) {
+    view.T_world_beams = T_world_level;
+    PointsView ground = split.ground();
+    PointsView rest = split.non_ground();
+    if (!is_level_) {
+      const Eigen::Matrix3d R_beams_level = transposed(T_level_beams_.front().linear());
+      view.T_world_beams = rotated(T_world_level, R_beams_level);
+      ground = rotate(ground, R_beams_level, rotated_ground_);
+      rest = rotate(rest, R_beams_level, rotated_rest_);
+    }
+    view.image.build(grids_.front(), ground, rest, moving, lateral_margin_, scratch_);
+  }
+
   // The image of one of several sensors, of its own points.
   void build_view(std::size_t sensor, const Pose& T_world_level, ReferenceView& view) {
     const OwnPoints& own = own_of_[sensor];
@@ -245,12 +313,15 @@ class ReferenceScans {
                      lateral_margin_, scratch_);
   }
 
+  FreeSpaceConfig config_;
   float margin_;
   float margin_slope_;
   float lateral_margin_;
   ReferenceSpan span_;
   std::vector<ReferenceScan> references_;
   std::size_t newest_ = 0;             // index of the newest reference
+  std::optional<std::size_t> open_;    // index of the one that has scans, but not its last one
+  int scans_ = 1;                      // of a reference
   std::vector<RangeImageGrid> grids_;  // by sensor
   std::vector<Pose> T_level_beams_;    // by sensor
   bool is_level_ = true;               // the images of the only sensor are in the level frame

@@ -31,6 +31,12 @@ class Visibility {
     grow(free_, bytes);
     grow(hit_, bytes);
   }
+  /// Sets the bits of `count` samples to "unknown".
+  void clear(std::size_t count) {
+    resize(count);
+    std::fill(free_.begin(), free_.end(), std::uint8_t{0});
+    std::fill(hit_.begin(), hit_.end(), std::uint8_t{0});
+  }
   /// Storage of the bits: one byte per eight samples.
   struct Bytes {
     std::uint8_t* free;  ///< all returns in the cells around the sample lie behind it
@@ -38,14 +44,18 @@ class Visibility {
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
-  /// Adds what another view of the same moment sees of the first `count` samples. A sample on which
-  /// the views contradict each other is unknown.
-  void merge(const Visibility& view, std::size_t count) {
+  /// Adds what another view of the same reference sees of the first `count` samples. A sample may
+  /// become both "free" and "hit": call settle() after the last view.
+  void add(const Visibility& view, std::size_t count) {
     for (std::size_t i = 0; i < (count + 7) / 8; ++i) {
-      const auto free = static_cast<std::uint8_t>(free_[i] | view.free_[i]);
-      const auto hit = static_cast<std::uint8_t>(hit_[i] | view.hit_[i]);
-      free_[i] = static_cast<std::uint8_t>(free & ~hit);
-      hit_[i] = static_cast<std::uint8_t>(hit & ~free);
+      free_[i] = static_cast<std::uint8_t>(free_[i] | view.free_[i]);
+      hit_[i] = static_cast<std::uint8_t>(hit_[i] | view.hit_[i]);
+    }
+  }
+  /// A sample that one view hits is no longer free: beams of the others pass beside it.
+  void settle(std::size_t count) {
+    for (std::size_t i = 0; i < (count + 7) / 8; ++i) {
+      free_[i] = static_cast<std::uint8_t>(free_[i] & ~hit_[i]);
     }
   }
 
@@ -99,13 +109,21 @@ class Visibility {
   std::vector<std::uint8_t> free_, hit_;
 };
 
+/// Largest lateral distance (m) from a sample to a beam that passes it: the error of poses and
+/// points, and the width of a beam at its range.
+struct BeamReach {
+  static constexpr float kLeast = 0.05F;   ///< m
+  static constexpr float kSlope = 0.004F;  ///< m per m of range
+};
+
 /// Computes the bits of a pack of samples. `cells`: their cells of the range image, one
-/// RangeImage::Cell per number. `is_inside`: whether they lie in the image. `range`, `tolerance`:
-/// range of the samples and margin, cm.
+/// RangeImage::Cell per number. `is_inside`: whether they lie in the image. `is_near`: whether a
+/// beam passes near enough. `range`, `tolerance`: range of the samples and margin, cm.
 template <class Packs>
 void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask& is_inside,
-                    const typename Packs::Float& range, const typename Packs::Float& tolerance,
-                    std::uint8_t& free_bits, std::uint8_t& hit_bits) {
+                    const typename Packs::Mask& is_near, const typename Packs::Float& range,
+                    const typename Packs::Float& tolerance, std::uint8_t& free_bits,
+                    std::uint8_t& hit_bits) {
   using Float = typename Packs::Float;
   using Int = typename Packs::Int;
   // Cell::nearest is the lower half of a cell, Cell::around the upper half.
@@ -117,7 +135,8 @@ void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask
   const auto is_nearest = is_at(nearest);
   const auto is_moving_beside = is_odd(cells);
   const auto is_moving = is_odd(cells >> 16);
-  const auto free = is_inside & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
+  const auto free =
+      is_inside & is_near & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
   const auto hit =
       is_inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));
   free_bits = static_cast<std::uint8_t>(free.bits());
@@ -135,6 +154,9 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
   const PackConstant to_centimetres(RangeImage::kCentimetres);
   const PackConstant base(margin * RangeImage::kCentimetres),
       growth(slope * RangeImage::kCentimetres);
+  // Of a cell, rad.
+  const PackConstant width(1.0F / image.grid().columns_per_radian),
+      height(1.0F / image.grid().rows_per_level);
   const ImageLocator locator(image.grid());
   visibility.resize(count);
   with_packs([&](auto packs) {
@@ -144,12 +166,16 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
     // Local copies, since stores of bytes may alias the members.
     const Visibility::Bytes bits = visibility.bytes();
     const RangeImage::Cell* const cells = image.data();
+    const RangeImage::Beam* const beams = image.beams();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
+    const Float cell_width(width), cell_height(height);
+    static constexpr PackConstant kLeast(BeamReach::kLeast), kSlope(BeamReach::kSlope),
+        kStep(1.0F / RangeImage::kPlaces), kHalf(0.5F / RangeImage::kPlaces);
     // All cells of a block are prefetched before the first is used, since an image is larger than
     // the inner caches.
     std::int32_t cell[kBeamBlock];
-    float ranges[kBeamBlock];
-    std::int32_t packed[kPackWidth];
+    float ranges[kBeamBlock], across[kBeamBlock], rows[kBeamBlock], columns[kBeamBlock];
+    std::int32_t packed[kPackWidth], beam[kPackWidth];
     for (std::size_t begin = 0; begin < count; begin += kBeamBlock) {
       const std::size_t size = std::min(kBeamBlock, count - begin);
       for (std::size_t i = 0; i < size; i += kPackWidth) {
@@ -159,18 +185,37 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
         const Float x = to_reference(0, px, py, pz);
         const Float y = to_reference(1, px, py, pz);
         const Float z = to_reference(2, px, py, pz);
-        const Float range = sqrt((x * x + y * y) + z * z);
-        locator.template locate<Packs>(x, y, z, range).store(&cell[i]);
+        const Float level = x * x + y * y;
+        const Float range = sqrt(level + z * z);
+        const auto located = locator.template locate<Packs>(x, y, z, range);
+        located.cell.store(&cell[i]);
         range.store(&ranges[i]);
-        for (std::size_t k = i; k < i + kPackWidth; ++k) __builtin_prefetch(&cells[cell[k]]);
+        (sqrt(level) * cell_width).store(&across[i]);
+        located.row.store(&rows[i]);
+        located.column.store(&columns[i]);
+        for (std::size_t k = i; k < i + kPackWidth; ++k) {
+          __builtin_prefetch(&cells[cell[k]]);
+          __builtin_prefetch(&beams[cell[k]]);
+        }
       }
       for (std::size_t i = 0; i < size; i += kPackWidth) {
         for (std::size_t k = 0; k < kPackWidth; ++k) {
           std::memcpy(&packed[k], &cells[cell[i + k]], sizeof(std::int32_t));
+          beam[k] = beams[cell[i + k]];
         }
         const Int both = Int::load(packed);
+        const Int place = Int::load(beam);
         const Float metres = Float::load(&ranges[i]);
-        compare_ranges<Packs>(both, Int(0) < Int::load(&cell[i]), metres * scale,
+        const auto within = [&](const Int& step) {
+          return to_float(step) * Float(kStep) + Float(kHalf);
+        };
+        const Float aside =
+            (within(place >> 8) - Float::load(&columns[i])) * Float::load(&across[i]);
+        const Float above = (within(place & Int(RangeImage::kPlaces - 1)) - Float::load(&rows[i])) *
+                            (metres * cell_height);
+        const Float reach = metres * Float(kSlope) + Float(kLeast);
+        compare_ranges<Packs>(both, Int(0) < Int::load(&cell[i]),
+                              aside * aside + above * above <= reach * reach, metres * scale,
                               metres * slope_per_metre + least, bits.free[(begin + i) / 8],
                               bits.hit[(begin + i) / 8]);
       }

@@ -29,15 +29,16 @@ struct RowChanges {
   std::array<std::int16_t, kWordBits + 1> values =
       {};  ///< before these cells, and after each change
 
-  /// Takes the next `count` cells of the row, and adds the changes to `bytes`.
-  void pack(const RangeImage::Cell* from, std::int32_t count, std::int16_t RangeImage::Cell::*value,
-            std::vector<std::uint8_t>& bytes) {
+  /// Takes `value_of(i)` of the next `count` cells of the row, and adds the changes to `bytes`.
+  template <class ValueOf>
+  void pack(std::int32_t count, ValueOf&& value_of, std::vector<std::uint8_t>& bytes) {
     std::int16_t latest = values[0];
     std::uint8_t changes = 0;
     cells = 0;
     for (std::int32_t i = 0; i < count; ++i) {
-      const bool is_new = from[i].*value != latest;
-      latest = from[i].*value;
+      const std::int16_t value = value_of(i);
+      const bool is_new = value != latest;
+      latest = value;
       values[changes + 1U] = latest;
       cells |= std::uint64_t{is_new} << i;
       changes = static_cast<std::uint8_t>(changes + is_new);
@@ -66,19 +67,25 @@ struct RowChanges {
 }  // namespace detail
 
 /// Adds a range image to `bytes`, row by row. A part of a row has 64 columns, the last part fewer.
-/// Each part has the changes of Cell::nearest, then the changes of Cell::around. A cell changes if
-/// its value differs from the value of the cell before; before the first cell of a row it is 0. A
-/// byte counts the changes of the part. If there are any, 64 bits mark the cells that change, the
-/// lowest bit for the first column, and the new values follow as int16.
+/// Each part has the changes of Cell::nearest, then the changes of Cell::around, then the changes
+/// of the beams, with the place of the column in the lower byte and that of the row in the upper
+/// one. A cell changes if its value differs from the value of the cell before; before the first
+/// cell of a row it is 0. A byte counts the changes of the part. If there are any, 64 bits mark the
+/// cells that change, the lowest bit for the first column, and the new values follow as int16.
 inline void pack_image(const RangeImage& image, std::vector<std::uint8_t>& bytes) {
   const RangeImageGrid& grid = image.grid();
   for (std::int32_t row = 0; row < grid.rows; ++row) {
-    detail::RowChanges nearest, around;
+    detail::RowChanges nearest, around, beam;
     for (std::int32_t begin = 0; begin < grid.columns; begin += 64) {
       const RangeImage::Cell* const cells = &image[grid.cell(row, begin)];
+      const RangeImage::Beam* const beams = image.beams() + grid.cell(row, begin);
       const std::int32_t count = std::min(64, grid.columns - begin);
-      nearest.pack(cells, count, &RangeImage::Cell::nearest, bytes);
-      around.pack(cells, count, &RangeImage::Cell::around, bytes);
+      nearest.pack(
+          count, [&](std::int32_t i) { return cells[i].nearest; }, bytes);
+      around.pack(
+          count, [&](std::int32_t i) { return cells[i].around; }, bytes);
+      beam.pack(
+          count, [&](std::int32_t i) { return static_cast<std::int16_t>(beams[i]); }, bytes);
     }
   }
 }
@@ -89,19 +96,27 @@ inline bool unpack_image(const RangeImageGrid& grid, Span<const std::uint8_t> by
   const std::uint8_t* at = bytes.begin();
   image.allocate(grid);
   for (std::int32_t row = 0; row < grid.rows; ++row) {
-    detail::RowChanges nearest, around;
+    detail::RowChanges nearest, around, beam;
     for (std::int32_t begin = 0; begin < grid.columns; begin += 64) {
-      if (!nearest.unpack(at, bytes.end()) || !around.unpack(at, bytes.end())) return false;
+      if (!nearest.unpack(at, bytes.end()) || !around.unpack(at, bytes.end()) ||
+          !beam.unpack(at, bytes.end())) {
+        return false;
+      }
       RangeImage::Cell* const cells = &image.cell(grid.cell(row, begin));
+      RangeImage::Beam* const beams = &image.beam(grid.cell(row, begin));
       const std::int32_t count = std::min(64, grid.columns - begin);
-      const std::int16_t *near = &nearest.values[0], *least = &around.values[0];
+      const std::int16_t *near = &nearest.values[0], *least = &around.values[0],
+                         *place = &beam.values[0];
       for (std::int32_t i = 0; i < count; ++i) {
         near += nearest.cells >> i & 1U;
         least += around.cells >> i & 1U;
+        place += beam.cells >> i & 1U;
         cells[i] = {*near, *least};
+        beams[i] = static_cast<RangeImage::Beam>(*place);
       }
       nearest.values[0] = *near;
       around.values[0] = *least;
+      beam.values[0] = *place;
     }
   }
   return at == bytes.end();

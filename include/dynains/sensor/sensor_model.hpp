@@ -17,7 +17,9 @@ namespace dynains {
 
 /// Angular sampling of a sensor (deg), and its mounting.
 struct SensorModel {
-  double azimuth_step = 0.0;        ///< median step between consecutive returns of one beam
+  /// Median step between consecutive returns of one beam. Without rings, as of a sensor whose
+  /// pattern does not repeat, all three are the mean distance of neighbouring returns.
+  double azimuth_step = 0.0;
   double elevation_gap = 0.0;       ///< 30th percentile of the gaps between beams
   double elevation_gap_wide = 0.0;  ///< 90th percentile of these gaps
   double elevation_min = 0.0;       ///< elevation of the lowest beam
@@ -77,6 +79,19 @@ inline BeamAngles beam_angles(PointsView points) {
   angles.azimuth.resize(points.size());
   angles.elevation.resize(points.size());
   return angles;
+}
+
+/// Mean distance (deg) of neighbouring returns that are spread evenly over the field of view, whose
+/// lowest and highest elevation (deg) are given.
+inline double mean_spacing(const std::vector<float>& azimuths, double lowest, double highest) {
+  constexpr double kSector = 4.0;  // deg; those without returns are no part of the field of view
+  std::vector<bool> seen(static_cast<std::size_t>(360.0 / kSector) + 1, false);
+  for (const float azimuth : azimuths) {
+    seen[static_cast<std::size_t>((static_cast<double>(azimuth) + 180.0) / kSector)] = true;
+  }
+  const double width = kSector * static_cast<double>(std::count(seen.begin(), seen.end(), true));
+  const double height = (std::sin(highest * kRadians) - std::sin(lowest * kRadians)) / kRadians;
+  return std::sqrt(width * height / static_cast<double>(azimuths.size()));
 }
 
 /// The value above the ratio `ratio` ([0, 1]) of the other ones. `values` must not be empty.
@@ -145,6 +160,13 @@ inline SensorModel estimate_sensor_model(PointsView points) {
       detail::gaps_in_bands(angles.elevation, angles.azimuth, kBeamBand, kLeastStep);
   if (steps.empty()) return {};
   model.azimuth_step = std::clamp(detail::percentile(steps, 0.5), 0.05, 2.0);
+  // Returns of one ring are closer together than those that are spread evenly.
+  const double spacing =
+      detail::mean_spacing(angles.azimuth, model.elevation_min, model.elevation_max);
+  if (model.azimuth_step > spacing) {
+    model.azimuth_step = model.elevation_gap = model.elevation_gap_wide = spacing;
+    return model;
+  }
   const std::vector<float> gaps =
       detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, kLeastGap);
   const auto gap_at = [&](double ratio) {
