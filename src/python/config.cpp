@@ -1,6 +1,7 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <string>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
@@ -55,7 +56,13 @@ py::list sensors_of(const Config& config) {
 void set_sensors(Config& config, const py::list& poses) {
   Config result = config;
   result.sensors.clear();
-  for (const py::handle pose : poses) result.sensors.push_back(to_pose(pose));
+  for (const py::handle pose : poses) {
+    try {
+      result.sensors.push_back(to_pose(pose));
+    } catch (const PoseError& error) {
+      throw ConfigError("sensors[" + std::to_string(result.sensors.size()) + "]: " + error.what());
+    }
+  }
   result.validate();
   config = result;
 }
