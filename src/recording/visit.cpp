@@ -15,9 +15,9 @@ constexpr float kBelief = 0.95F;  // of points that the second pass removes
 
 Visit::Visit(ByteStore& store, const SecondPassConfig& config)
     : config_(config), store_(store), places_(store, config.memory) {
-  constexpr std::uint32_t kMostScans = 5;  // from one reference to the next
+  constexpr std::uint32_t kMaxStep = 5;  // from one reference to the next
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-    references_.emplace_back(kMostScans, config.evidence.lateral_margin);
+    references_.emplace_back(kMaxStep, config.evidence.lateral_margin);
   }
 }
 

@@ -145,8 +145,8 @@ void check_bin_content(const std::filesystem::path& file) {
                    "; --bin-columns 3d (x y z) or 4d (x y z intensity) reads it");
   }
   // Spreads of few values differ by chance.
-  const auto values = static_cast<double>(bytes.size() / value_size(usual));
-  const double clearly = 1.0 - std::max(0.1, 4.0 / std::sqrt(values));
+  const std::size_t values = bytes.size() / value_size(usual);
+  const double clearly = 1.0 - std::max(0.1, 4.0 / std::sqrt(static_cast<double>(values)));
   const double spread = spread_of_columns(bytes, usual);
   const BinLayout* best = nullptr;
   double least = spread;
