@@ -319,9 +319,10 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
 
 OutputFile::OutputFile(const fs::path& target, Existing existing, const InputFiles& inputs)
     : target_(checked_place(target)), locked_(target_.parent_path()) {
-  locked_->lock(Folder::Lock::kShared);
   const std::string name = target_.filename().string();
+  // First: a folder that this command reads is in use, too.
   how_ = check_output(*locked_, name, existing, inputs);
+  locked_->lock(Folder::Lock::kShared);
   partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
   folder_ = &partial_->parent();
 }
