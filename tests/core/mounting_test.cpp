@@ -213,6 +213,7 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
   };
   const Mount mounts[] = {{1.73, 0, 0},  {0.5, 0, 0},   {1.0, -20, 10}, {1.73, 30, 0},
                           {2.5, 5, -25}, {0.7, 0, -30}, {2.0, -10, 0}};
+  int unknown_in_rooms = 0;
   for (std::size_t i = 0; i < 2 * value_names(sim::Scene()).size(); ++i) {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
     sim::Config config = dynains::test::drive_of(
@@ -233,12 +234,18 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     }
     CAPTURE(dynains::plain_value(config.scene), dynains::plain_value(config.sensor), mount.height,
             mount.pitch, mount.roll, mounting.height, mounting.up_sensor.transpose());
+    // A tilted sensor sees little floor in a small room: its mounting is unknown, not wrong.
+    if (!mounting.known && config.scene == sim::Scene::kRoom) {
+      ++unknown_in_rooms;
+      continue;
+    }
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - mount.height) < 0.12);
     // The vehicle is not parallel to the ground around it: crowned roads, unevenness.
     CHECK(angle_between(mounting.up_sensor, R_body_sensor.transpose() * Eigen::Vector3d::UnitZ()) <
           2.2);
   }
+  CHECK(unknown_in_rooms <= 1);
 }
 
 // `height` was measured by hand on ground points around the vehicle.

@@ -148,6 +148,6 @@ TEST_CASE("clean refuses a map or a recording that does not belong to the run") 
     CHECK_THAT(f.clean({"--map", f.map, "--force"}).err, ContainsSubstring("merged.ply"));
     CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
     CHECK_THAT(f.clean({"--map", f.out + "/static_map.ply", "--force"}).err,
-               ContainsSubstring("is read by this command"));
+               ContainsSubstring("which this command reads"));
   }
 }

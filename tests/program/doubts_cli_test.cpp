@@ -136,7 +136,6 @@ TEST_CASE("run tells by how much its parameters leave points unjudged") {
   told({"--noise-depth", "0.1"}, outside);
   told({"--self-box", "-50 -50 -50 50 50 50"}, outside);
   told({"--cluster-range", "0.001"}, loose);
-  told({"--sensor-origin-z", "100"}, loose);
 }
 
 TEST_CASE("run tells the error of a return to a place, and check writes it for a pose graph") {

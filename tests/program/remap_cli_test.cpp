@@ -272,7 +272,7 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
          write_points(f, std::vector<float>(tiny_scan(4).size(), std::nanf("")));
        },
        "not finite"},
-      {[](const auto& f) { write_text(f.map, "mine"); }, "is in the way"},
+      {[](const auto& f) { write_text(f.map, "mine"); }, "exists, and is no file of the results"},
   };
   const auto check_unchanged = [](const RemapFixture& f, const std::vector<std::string>& flags,
                                   int code, const std::string& expected) {

@@ -83,7 +83,7 @@ std::vector<std::vector<std::uint8_t>> remove_movers(
     const dynains::RawPoints cloud{scan->xyzi.data(), scan->xyzi.size() / 4, 4};
     const auto frame = std::make_unique<dynains::FrameResult>(
         remover.push(cloud, scan->T_world_sensor, scan->time));
-    add(frame->newest, sum);
+    add(frame->newest(), sum);
     if (frame->finished) finish(*frame->finished);
     if (frame->pose_residual) residuals.push_back(*frame->pose_residual);
   }
