@@ -94,7 +94,7 @@ struct RemoverConfig {
   double min_range = 2.7;  ///< m, in the sensor's x-y plane
   double max_range = 250;  ///< m, in the sensor's x-y plane, and along its z axis
   /// By sensor, its pose in the frame of the pushed clouds (m), such as base_link: its rays begin
-  /// at its origin. PointCloudTraits tell which sensor measured a point; by default the first one.
+  /// at its origin. PointCloudTraits give the sensor of a point; by default it is the first one.
   std::vector<Pose> sensors = {Pose::Identity()};
   double max_gap = 1.0;    ///< s
   double max_speed = 100;  ///< m/s

@@ -15,6 +15,10 @@ namespace {
 constexpr double kMargin = 2.0;     // m, around the ground
 constexpr double kMostCells = 4e8;  // some 2 GB
 
+std::int64_t index(double position, double edge) {
+  return detail::floor_to<std::int64_t>(position / edge);
+}
+
 /// Columns of this edge around a box, with a margin (m).
 Columns columns_around(const Eigen::AlignedBox2d& box, double edge, double margin) {
   const Eigen::Array2d low = ((box.min().array() - margin) / edge).floor();
@@ -50,9 +54,6 @@ void spread(const Columns& columns, std::int64_t reach, std::vector<std::uint32_
 }  // namespace
 
 void Floors::add(const Eigen::Vector3d& point, bool is_ground) {
-  const auto index = [](double position, double edge) {
-    return detail::floor_to<std::int64_t>(position / edge);
-  };
   const VoxelKey key =
       voxel_key(index(point.x(), kEdge), index(point.y(), kEdge), index(point.z(), kBin));
   const std::uint32_t number = numbers_.insert(key);
@@ -131,9 +132,6 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
   std::vector<VoxelKey> keys;
   std::vector<std::uint32_t> cell_of;
   for (const Floor& floor : floors) {
-    const auto index = [](double position, double edge) {
-      return detail::floor_to<std::int64_t>(position / edge);
-    };
     const VoxelKey key =
         voxel_key(index(static_cast<double>(floor.x) * kEdge, kCell),
                   index(static_cast<double>(floor.y) * kEdge, kCell), index(floor.height, step));

@@ -58,8 +58,8 @@ class GridMaker {
   void begin_scan() { ++scan_; }
   /// Adds a point of the scan: as an obstacle, as ground, or as what has left its place.
   void add(const Eigen::Vector3d& point, bool is_moving);
-  /// What the beams of a scan have crossed at less than half of the largest height is free: a
-  /// higher beam does not tell of low obstacles. `ends`: where they returned. Between both ends,
+  /// Marks the cells that beams of a scan cross below half of the maximum height as free: a higher
+  /// beam misses low obstacles. `ends`: where they returned. Between both ends,
   /// the ground counts as a plane.
   void add_beams(const Eigen::Vector3d& sensor, Span<const Eigen::Vector3d> ends);
   /// The grid of all that was added, as far as cells are known. An obstacle was seen in three

@@ -33,7 +33,7 @@ double gap_of(const Landmarks& a, const Points& points, const Pose& T, double mo
 }
 
 /// The `points` of another scan that do not keep their place beside `a`, as traffic ahead and
-/// smooth walls do: only these tell the way. None if they are few.
+/// smooth walls do. Only these points determine the way. Empty if they are few.
 Points decisive_of(const Points& points, const Landmarks& a, const Pose& standing) {
   constexpr double kLeastShare = 0.15;  // of the points
   Points decisive;

@@ -27,6 +27,7 @@
 #include "run/input_files.hpp"
 #include "run/interrupt.hpp"
 #include "run/labelled_sequence.hpp"
+#include "run/map_spacing.hpp"
 #include "run/output_folder.hpp"
 #include "run/write_view.hpp"
 
@@ -200,12 +201,10 @@ fs::path target_of(const CleanOptions& options) {
 }
 
 /// The edge of voxels that hold about one point of the map, m; at least `least`.
-double edge_by_spacing(const std::vector<Eigen::Vector3d>& map, double least) {
-  constexpr double kMost = 2.0;     // m
-  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
-  double edge = least;
-  while (edge < kMost && map.size() < 2 * MapVotes(map, kDouble * edge).voxel_count()) edge *= 1.2;
-  return edge;
+double voxel_of(const std::vector<Eigen::Vector3d>& map, double least) {
+  constexpr double kMost = 2.0;  // m
+  return edge_by_spacing(map.size(), least, kMost,
+                         [&](double edge) { return MapVotes(map, edge).voxel_count(); });
 }
 
 /// Adds the points of all scans of the run with their labels, where they lie in the map. Throws
@@ -277,7 +276,7 @@ void clean(CleanOptions& options) {
 
   const InterruptGuard interrupt;
   const bool is_given = options.voxel_option->count() > 0;
-  MapVotes votes(positions, is_given ? options.voxel : edge_by_spacing(positions, options.voxel));
+  MapVotes votes(positions, is_given ? options.voxel : voxel_of(positions, options.voxel));
   MapAlignment alignment(positions);
   add_scans(recording, out, options.quiet, alignment, votes);
   const Verdicts verdicts = judge(votes, positions.size(), options.map);

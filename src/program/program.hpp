@@ -1,4 +1,4 @@
-// What all programs have in common: help, version, standard streams, exit codes.
+// The base of all programs: help, version, standard streams, exit codes.
 #pragma once
 
 #include <CLI/CLI.hpp>

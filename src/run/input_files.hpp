@@ -1,5 +1,5 @@
-// What a command was given: files that it reads, and recordings and results, of which it changes
-// nothing.
+// The files that a command reads, and the recordings and results that it is given. It changes none
+// of them.
 #pragma once
 
 #include <filesystem>

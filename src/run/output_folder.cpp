@@ -239,7 +239,7 @@ void PartialFolder::remove() {
 }
 
 void PartialFolder::replace(ResultFolder* earlier) {
-  // What others put into the folder meanwhile stays there.
+  // Files that others have put into the folder meanwhile stay there.
   const auto empty = [&] {
     earlier->remove_results();
     move_rest(earlier->folder(), results_->folder());

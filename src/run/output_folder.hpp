@@ -27,7 +27,7 @@ std::filesystem::path whole_path(const std::filesystem::path& path);
 /// Creates a folder and those above it. Throws IoError.
 void create_folder(const std::filesystem::path& folder);
 
-/// What becomes of a file in the place of an output.
+/// Whether a file in the place of an output is replaced.
 enum class Existing {
   kStays,   ///< the command is refused: --force was not given
   kForced,  ///< it is replaced, unless it is a part of what the command was given

@@ -102,9 +102,8 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
   visitor(TextParameter{
       "sensors", o.sensors, &read_sensor_poses, "FILE",
       "poses of several lidars in the frame of the clouds, a row each: 3x4, or x y z qx qy qz qw "
-      "in "
-      "m. Which one measured a point is in sensor/NAME.id (uint8) or in a column sensor, lidar_id, "
-      "lidar_index, d or laser_number [sensors.txt, if it is there]"});
+      "in m. Which one measured a point is in sensor/NAME.id (uint8) or in a column sensor, "
+      "lidar_id, lidar_index, d or laser_number [sensors.txt, if it is there]"});
   visitor(Parameter{"sensor_beams", o.sensor_beams, closed(0, 255), "beams",
                     "beams of one lidar, if laser_number counts those of all; 0: it is the lidar"});
   visitor(Parameter{"time_offset", o.time_offset, closed(-1e12, 1e12), "s",

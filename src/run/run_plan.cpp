@@ -41,10 +41,10 @@ PointBuffer points_of_sensor(const Recording& recording, const RecordedScan& sca
   return finite_points(own);
 }
 
-/// OwnBody::min_range() of a sample of the scans of `range`, m, at most `otherwise`; that value if
-/// the sensor moves less than 5 m or the scans are too few to tell; the largest one of several
-/// sensors. A body that reaches farther is
-/// judged like other things; otherwise the road around it would be lost. Throws IoError.
+/// The largest OwnBody::min_range() of the sensors in a sample of the scans of `range`, m, at most
+/// `otherwise`; that value if the sensor moves less than 5 m, or if the scans are too few. A body
+/// that reaches farther is judged like other things; otherwise the road around it would be lost.
+/// Throws IoError.
 double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
   constexpr std::size_t kScans = 24;
   constexpr double kLeastMotion = 5.0;  // m

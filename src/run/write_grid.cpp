@@ -9,6 +9,7 @@
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 #include "label_writer.hpp"
+#include "map_spacing.hpp"
 #include "output_folder.hpp"
 
 namespace dynains::program {
@@ -51,14 +52,11 @@ class JudgedScans {
 /// Distance between the points of surfaces, m: the edge of voxels that hold about one.
 double spacing_of(const std::vector<Eigen::Vector3d>& points) {
   constexpr double kFinest = 0.02, kCoarsest = 0.5;  // m
-  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
-  double edge = kFinest;
-  for (; edge < kCoarsest; edge *= 1.2) {
+  return edge_by_spacing(points.size(), kFinest, kCoarsest, [&](double edge) {
     VoxelHashTable<> voxels;
-    for (const Eigen::Vector3d& point : points) voxels.insert(voxel_at(point, kDouble * edge));
-    if (points.size() >= 2 * voxels.size()) break;
-  }
-  return edge;
+    for (const Eigen::Vector3d& point : points) voxels.insert(voxel_at(point, edge));
+    return voxels.size();
+  });
 }
 
 }  // namespace

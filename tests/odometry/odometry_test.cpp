@@ -14,6 +14,7 @@
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
 #include "simulation/simulator.hpp"
+#include "support/box_room.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 
@@ -85,13 +86,8 @@ std::vector<Eigen::Vector3f> scan_of_room(const Eigen::Vector3d& size, const Eig
     const double elevation = (-45.0 + 90.0 * beam / (kBeams - 1)) * M_PI / 180.0;
     for (int column = 0; column < kColumns; ++column) {
       const double azimuth = 2.0 * M_PI * column / kColumns;
-      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-      double range = 1e9;
-      for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        const double wall = ray[axis] > 0.0 ? high[axis] : low[axis];
-        if (ray[axis] != 0.0) range = std::min(range, (wall - place[axis]) / ray[axis]);
-      }
+      const Eigen::Vector3d ray = dynains::test::ray_of(elevation, azimuth);
+      const double range = dynains::test::range_to_wall(place, ray, low, high);
       points.push_back(((range + noise(random)) * ray).cast<float>());
     }
   }

@@ -13,6 +13,7 @@
 #include "poses/in_two_threads.hpp"
 #include "poses/scan_registration.hpp"
 #include "simulation/config.hpp"
+#include "support/box_room.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/written_drive.hpp"
@@ -143,13 +144,8 @@ void write_box(const std::filesystem::path& folder, const Eigen::Vector3d& size,
     for (int k = 0; k < kBeams * kColumns; ++k) {
       const double elevation = (-25.0 + 2.5 * (k % kBeams)) * M_PI / 180.0;
       const double azimuth = 2.0 * M_PI * (k / kBeams) / kColumns;
-      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-      double range = 1e9;
-      for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        const double wall = ray[axis] > 0.0 ? high[axis] : low[axis];
-        if (ray[axis] != 0.0) range = std::min(range, (wall - place[axis]) / ray[axis]);
-      }
+      const Eigen::Vector3d ray = dynains::test::ray_of(elevation, azimuth);
+      const double range = dynains::test::range_to_wall(place, ray, low, high);
       if (range > 40.0) continue;
       Eigen::Vector3d p = (range + noise(random)) * ray;
       if (is_on_floor) p.z() += kHeight;

@@ -106,7 +106,7 @@ struct ReferenceScan {
   std::size_t count = 0;             ///< of the views that have images
 };
 
-/// What a reference sees of samples, with memory for the test.
+/// Visibility of samples from a reference, with working memory.
 struct ReferenceTest {
   Visibility all;      ///< of all views: each sample is judged once
   Visibility of_view;  ///< of one of several
@@ -117,12 +117,7 @@ struct ReferenceTest {
 class ReferenceScans {
  public:
   explicit ReferenceScans(const FreeSpaceConfig& config)
-      : config_(config),
-        margin_(static_cast<float>(config.margin)),
-        margin_slope_(static_cast<float>(config.margin_slope)),
-        lateral_margin_(static_cast<float>(config.lateral_margin)),
-        span_(config),
-        references_(span_.count()) {}
+      : config_(config), span_(config), references_(span_.count()) {}
 
   /// Sets the resolution of later images, their frames, and the number of scans of a reference, for
   /// the sensors of a scan. If this number changes, all references are invalid. Allocates all
@@ -215,7 +210,8 @@ class ReferenceScans {
       if (scans_ > 1 && view.scan <= scan + 1 && scan <= view.scan + 1) continue;
       Visibility& visibility = tested == 0 ? out.all : out.of_view;
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
-      test_visibility(view.image, T_view_points, points, count, margin_, margin_slope_, visibility);
+      test_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
+                      static_cast<float>(config_.margin_slope), visibility);
       if (tested > 0) out.all.add(out.of_view, count);
       ++tested;
     }
@@ -226,6 +222,8 @@ class ReferenceScans {
 
  private:
   static constexpr int kMostScans = 10;  // of a reference
+
+  float lateral_margin() const { return static_cast<float>(config_.lateral_margin); }
 
   std::uint64_t scans_until_reference(std::uint64_t since_begin) const {
     const auto step = static_cast<std::uint64_t>(span_.step);
@@ -296,7 +294,7 @@ class ReferenceScans {
       ground = rotate(ground, R_beams_level, rotated_ground_);
       rest = rotate(rest, R_beams_level, rotated_rest_);
     }
-    view.image.build(grids_.front(), ground, rest, moving, lateral_margin_, scratch_);
+    view.image.build(grids_.front(), ground, rest, moving, lateral_margin(), scratch_);
   }
 
   // The image of one of several sensors, of its own points.
@@ -310,13 +308,10 @@ class ReferenceScans {
     view.image.build(grids_[sensor], PointsView(own_).subview(own.begin, own.ground_count),
                      PointsView(own_).subview(rest, own.rest_count),
                      Span<const std::uint8_t>(own_moving_).subspan(rest, own.rest_count),
-                     lateral_margin_, scratch_);
+                     lateral_margin(), scratch_);
   }
 
   FreeSpaceConfig config_;
-  float margin_;
-  float margin_slope_;
-  float lateral_margin_;
   ReferenceSpan span_;
   std::vector<ReferenceScan> references_;
   std::size_t newest_ = 0;             // index of the newest reference

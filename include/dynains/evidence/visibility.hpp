@@ -154,7 +154,7 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
   const PackConstant to_centimetres(RangeImage::kCentimetres);
   const PackConstant base(margin * RangeImage::kCentimetres),
       growth(slope * RangeImage::kCentimetres);
-  // Of a cell, rad.
+  // Angles of a cell, rad.
   const PackConstant width(1.0F / image.grid().columns_per_radian),
       height(1.0F / image.grid().rows_per_level);
   const ImageLocator locator(image.grid());

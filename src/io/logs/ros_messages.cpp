@@ -96,7 +96,7 @@ struct LivoxCloud {
   std::uint32_t points = 0;
 };
 
-/// What follows the header of a CustomMsg: the number of points is checked against its size.
+/// The part of a CustomMsg behind its header: the number of points is checked against its size.
 LivoxCloud read_livox_cloud(MessageReader& in) {
   LivoxCloud cloud;
   in.number<std::uint64_t>("a time base");

@@ -1,0 +1,18 @@
+// Distance between the points of a map.
+#pragma once
+
+#include <cstddef>
+
+namespace dynains::program {
+
+/// The edge of voxels that hold about one of `points` points of surfaces, m, from `least` on and
+/// about `most` at the most. `count(edge)`: number of voxels of this edge that hold points.
+template <class Count>
+double edge_by_spacing(std::size_t points, double least, double most, Count&& count) {
+  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
+  double edge = least;
+  while (edge < most && points < 2 * count(kDouble * edge)) edge *= 1.2;
+  return edge;
+}
+
+}  // namespace dynains::program
