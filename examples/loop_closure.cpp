@@ -260,7 +260,7 @@ std::vector<Edge> close_loops(const std::vector<Points>& scans, const Poses& pos
                               std::size_t revisit) {
   constexpr std::size_t kEvery = 5;    // scans
   constexpr std::size_t kAround = 15;  // scans
-  constexpr double kFarthest = 25.0;   // m
+  constexpr double kMaxRange = 25.0;   // m
   constexpr double kOverlap = 0.7;
   std::vector<Edge> closures;
   for (std::size_t b = revisit; b < poses.size(); b += kEvery) {
@@ -269,7 +269,7 @@ std::vector<Edge> close_loops(const std::vector<Points>& scans, const Poses& pos
       return (poses[i].translation() - poses[b].translation()).norm();
     };
     for (std::size_t i = 0; i + revisit / 2 < b; ++i) a = distance(i) < distance(a) ? i : a;
-    if (distance(a) > kFarthest) continue;
+    if (distance(a) > kMaxRange) continue;
     small_odometry::LocalMap map(100.0);
     Points around;
     const std::size_t end = std::min(a + kAround + 1, poses.size());

@@ -57,12 +57,12 @@ class LocalMap {
   // fails.
   bool plane_at(const Eigen::Vector3d& p, Eigen::Vector3d& normal, double& distance) const {
     constexpr std::size_t kNeighbours = 8;
-    constexpr double kFarthest = 1.5;   // m
+    constexpr double kMaxRange = 1.5;   // m
     constexpr double kThickness = 0.1;  // m, largest thickness of a plane
     std::array<std::size_t, kNeighbours> near{};
     std::array<double, kNeighbours> squared{};
     const std::size_t found = tree_.knnSearch(p.data(), kNeighbours, near.data(), squared.data());
-    if (found < kNeighbours || squared.back() > kFarthest * kFarthest) return false;
+    if (found < kNeighbours || squared.back() > kMaxRange * kMaxRange) return false;
 
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     for (const std::size_t i : near) mean += points_[i] / double{kNeighbours};

@@ -190,11 +190,11 @@ struct RemoverConfig {
 
  private:
   void validate_sensors() const {
-    constexpr std::size_t kMostSensors = 255;
-    constexpr double kFarthestSensor = 1000.0;  // m
-    if (sensors.empty() || sensors.size() > kMostSensors) {
+    constexpr std::size_t kMaxSensors = 255;
+    constexpr double kMaxSensor = 1000.0;  // m
+    if (sensors.empty() || sensors.size() > kMaxSensors) {
       throw ConfigError("DynaInsRemover.sensors has " + std::to_string(sensors.size()) +
-                        " poses; expected 1 to " + std::to_string(kMostSensors));
+                        " poses; expected 1 to " + std::to_string(kMaxSensors));
     }
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       const std::string name = "DynaInsRemover.sensors[" + std::to_string(i) + "]";
@@ -203,7 +203,7 @@ struct RemoverConfig {
       } catch (const PoseError& error) {
         throw ConfigError(error.what());
       }
-      if (sensors[i].translation().cwiseAbs().maxCoeff() > kFarthestSensor) {
+      if (sensors[i].translation().cwiseAbs().maxCoeff() > kMaxSensor) {
         throw ConfigError(name + " is farther than 1000 m from the origin of the clouds");
       }
     }

@@ -45,11 +45,11 @@ class Candidates {
   }
 
   bool is_object(const std::vector<std::uint32_t>& members) const {
-    constexpr float kLeastHeight = 0.4F;  // m
-    constexpr std::size_t kLeastBlocks = 8;
-    constexpr float kLeastHits = 3.0F;    // references of the own session, mean of the points
-    constexpr float kMostPassed = 0.05F;  // ratio of the points
-    constexpr float kMostContact = 0.7F;  // ratio of the blocks beside what stands in both states
+    constexpr float kMinHeight = 0.4F;  // m
+    constexpr std::size_t kMinBlocks = 8;
+    constexpr float kMinHits = 3.0F;     // references of the own session, mean of the points
+    constexpr float kMaxPassed = 0.05F;  // ratio of the points
+    constexpr float kMaxContact = 0.7F;  // ratio of the blocks beside what stands in both states
     Eigen::AlignedBox3f box;
     float points = 0.0F, hits = 0.0F, passed = 0.0F, contacts = 0.0F;
     for (const std::uint32_t block : members) {
@@ -66,9 +66,9 @@ class Candidates {
         passed += history_.own_beams_passed(session, i) ? 1.0F : 0.0F;
       }
     }
-    return members.size() >= kLeastBlocks && box.sizes().z() > kLeastHeight &&
-           hits >= kLeastHits * points && passed <= kMostPassed * points &&
-           contacts <= kMostContact * static_cast<float>(members.size());
+    return members.size() >= kMinBlocks && box.sizes().z() > kMinHeight &&
+           hits >= kMinHits * points && passed <= kMaxPassed * points &&
+           contacts <= kMaxContact * static_cast<float>(members.size());
   }
 
   const SessionGrid& grid_;

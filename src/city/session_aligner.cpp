@@ -49,7 +49,7 @@ std::vector<Pose> guesses() {
 /// near `places` (m, frame of the city). Adds the names of these sessions.
 PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& places,
                         const Eigen::Vector3d& origin, std::set<std::string>& names) {
-  constexpr double near = kReach + SessionAligner::kMostTranslation;  // m
+  constexpr double near = kReach + SessionAligner::kMaxTranslation;  // m
   const SessionGrid& grid = city.grid();
   std::map<TileIndex, std::size_t> counts;
   PointBuffer points;
@@ -122,31 +122,31 @@ Fit best_fit(const RegistrationScan& map, const RegistrationScan& session) {
 
 /// Throws ConfigError unless a result is a fit.
 void check_fit(const City& city, const Fit& fit) {
-  constexpr double kFewest = 200.0;  // points at upright surfaces
-  constexpr double kLeastFitting = 0.7;
+  constexpr double kMin = 200.0;  // points at upright surfaces
+  constexpr double kMinFitting = 0.7;
   constexpr double kSlack = 1.1;
-  const std::string limits = rounded(SessionAligner::kMostTranslation, 0) + " m and " +
-                             rounded(SessionAligner::kMostRotation, 0) + " degrees";
-  if (fit.upright < kFewest) {
+  const std::string limits = rounded(SessionAligner::kMaxTranslation, 0) + " m and " +
+                             rounded(SessionAligner::kMaxRotation, 0) + " degrees";
+  if (fit.upright < kMin) {
     refuse(city, "only " + rounded(fit.upright, 0) +
                      " of its points meet walls, poles or the like of the map; expected at least " +
-                     rounded(kFewest, 0));
+                     rounded(kMin, 0));
   }
-  if (fit.fitting() < kLeastFitting) {
+  if (fit.fitting() < kMinFitting) {
     refuse(city, "it does not fit: " + rounded(100.0 * fit.fitting(), 0) +
                      " % of its points at upright surfaces are within " + rounded(kInlier, 2) +
-                     " m of them; expected at least " + rounded(100.0 * kLeastFitting, 0) +
+                     " m of them; expected at least " + rounded(100.0 * kMinFitting, 0) +
                      " %. Is the start within " + limits + '?');
   }
-  if (fit.uncertainty > kMostUncertain) {
+  if (fit.uncertainty > kMaxUncertain) {
     refuse(city, "one direction is uncertain by " + rounded(fit.uncertainty, 2) +
-                     " m; expected at most " + rounded(kMostUncertain, 2) + " m");
+                     " m; expected at most " + rounded(kMaxUncertain, 2) + " m");
   }
   if (fit.is_ambiguous) refuse(city, "it fits nearly as well at another place");
   const double way = fit.T.translation().norm();
   const double angle = angle_of(fit.T.linear()) / detail::kRadians;
-  if (way > kSlack * SessionAligner::kMostTranslation ||
-      angle > kSlack * SessionAligner::kMostRotation) {
+  if (way > kSlack * SessionAligner::kMaxTranslation ||
+      angle > kSlack * SessionAligner::kMaxRotation) {
     refuse(city, "the best fit is " + rounded(way, 2) + " m and " + rounded(angle, 2) +
                      " degrees from the start; expected at most " + limits);
   }
@@ -160,7 +160,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
     const Eigen::Vector3d local(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                                 static_cast<double>(points.z[i]));
     const double range = local.norm();
-    if (!(range > kNearestPoint && range < kReach)) continue;
+    if (!(range > kMinPoint && range < kReach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
     if (adds(taken_, voxel_at(point - sensors_.front(), kThinned))) points_.push_back(point);
   }
@@ -184,8 +184,8 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
 
   // Points near the seed come first: they determine the rotation. A wrong rotation displaces
   // distant scans by more than the registration can correct.
-  constexpr double kFirstRadius = 60.0;           // m
-  constexpr std::size_t kMost[] = {3000, 60000};  // points, near and all
+  constexpr double kFirstRadius = 60.0;               // m
+  constexpr std::size_t kMaxCount[] = {3000, 60000};  // points, near and all
   Fit fit;
   for (const bool is_first : {true, false}) {
     const double radius = is_first ? kFirstRadius : std::numeric_limits<double>::infinity();
@@ -195,7 +195,7 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
       if (p.norm() < radius) near.push_back(p.cast<float>());
     }
     PointBuffer of_session;
-    const std::size_t stride = 1 + near.size() / kMost[is_first ? 0 : 1];
+    const std::size_t stride = 1 + near.size() / kMaxCount[is_first ? 0 : 1];
     for (std::size_t i = 0; i < near.size(); i += stride) {
       of_session.push_back(near[i].x(), near[i].y(), near[i].z());
     }

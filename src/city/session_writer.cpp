@@ -31,7 +31,7 @@ SessionWriter::SessionWriter(const City& city, SessionInfo session, Mode mode)
       mode_(mode),
       store_(city.folder()),
       points_(city.grid(), kTestRange, store_),
-      references_(/*most_scans=*/10, session_.evidence.lateral_margin) {
+      references_(/*max_scans=*/10, session_.evidence.lateral_margin) {
   if (!is_session_name(session_.name)) {
     throw ConfigError("SessionInfo.name = \"" + session_.name +
                       "\" must consist of letters, digits, '.', '_' and '-', and begin with a "

@@ -12,8 +12,8 @@
 namespace dynains::grid {
 namespace {
 
-constexpr double kMargin = 2.0;     // m, around the ground
-constexpr double kMostCells = 4e8;  // some 2 GB
+constexpr double kMargin = 2.0;    // m, around the ground
+constexpr double kMaxCells = 4e8;  // some 2 GB
 
 std::int64_t index(double position, double edge) {
   return detail::floor_to<std::int64_t>(position / edge);
@@ -126,8 +126,8 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
 /// The floors of surfaces that are large, or the largest ones there are.
 std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors,
                                                   double step) const {
-  constexpr double kCell = 1.0;            // m: a gap without ground that does not end a surface
-  constexpr std::size_t kLeastCells = 10;  // the roof of a car is smaller
+  constexpr double kCell = 1.0;          // m: a gap without ground that does not end a surface
+  constexpr std::size_t kMinCells = 10;  // the roof of a car is smaller
   VoxelHashTable<> numbers;
   std::vector<VoxelKey> keys;
   std::vector<std::uint32_t> cell_of;
@@ -142,7 +142,7 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
   ComponentSearch().for_each(keys, numbers, [&](const std::vector<std::uint32_t>& members) {
     for (const std::uint32_t cell : members) size[cell] = members.size();
   });
-  const std::size_t least = std::min(kLeastCells, *std::max_element(size.begin(), size.end()));
+  const std::size_t least = std::min(kMinCells, *std::max_element(size.begin(), size.end()));
   std::vector<Floor> large;
   for (std::size_t i = 0; i < floors.size(); ++i) {
     if (size[cell_of[i]] >= least) large.push_back(floors[i]);
@@ -163,7 +163,7 @@ void Floors::finish(double step, double resolution) {
   }
   columns_ = columns_around(box, kEdge, kMargin);
   const double cells = static_cast<double>(columns_.size()) * std::pow(kEdge / resolution, 2);
-  if (cells > kMostCells) {
+  if (cells > kMaxCells) {
     throw IoError(place_ + ": a grid of " + std::to_string(static_cast<int>(box.sizes().x())) +
                   " x " + std::to_string(static_cast<int>(box.sizes().y())) +
                   " m has too many cells; choose a coarser --resolution");

@@ -84,11 +84,11 @@ class GridMaker {
   void count(std::uint8_t& scans, std::uint8_t& latest, Cell& cell) const;
   bool is_obstacle(const Cell& cell) const {
     return cell.has_obstacle && cell.obstacle > cell.clear &&
-           cell.obstacle >= std::min(kFewestScans, scan_);
+           cell.obstacle >= std::min(kMinScans, scan_);
   }
   void close_gaps(OccupancyGrid& grid) const;
 
-  static constexpr int kFewestScans = 3;  // of an obstacle; fewer may be what passed unnoticed
+  static constexpr int kMinScans = 3;  // of an obstacle; fewer may be what passed unnoticed
 
   Config config_;
   std::int64_t reach_;  // cells, in which scans see one obstacle

@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFarthestSensor = 1000.0;  // m, as of RemoverConfig::sensors
+constexpr double kMaxSensor = 1000.0;  // m, as of RemoverConfig::sensors
 constexpr const char* kSensorPoses = "sensors.txt";
 constexpr const char* kSensorFolder = "sensor";
 
@@ -107,10 +107,9 @@ std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text) {
 
 Recording::Recording(const fs::path& path, const RecordingOptions& options)
     : folder_(path), options_(options) {
-  if (!(options.sensor_origin.array().abs() <= kFarthestSensor).all()) {
+  if (!(options.sensor_origin.array().abs() <= kMaxSensor).all()) {
     throw ConfigError("the origin of the sensor must be finite and within " +
-                      std::to_string(static_cast<int>(kFarthestSensor)) +
-                      " m of that of the clouds");
+                      std::to_string(static_cast<int>(kMaxSensor)) + " m of that of the clouds");
   }
   const auto tables = is_folder(path) ? nuscenes_tables(path) : std::nullopt;
   if (is_log(path)) {

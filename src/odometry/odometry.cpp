@@ -111,25 +111,25 @@ class Odometry::Loop {
   bool is_predictable(double period) const { return !first_ && !are_scans_missing(period); }
 
   bool is_after_gap(double period) const {
-    return period > kLongestPoseGap && are_scans_missing(period);
+    return period > kMaxPoseGap && are_scans_missing(period);
   }
 
   /// Whether the newest scan fits to the map as registrations of other places hardly do. How well
   /// scans fit at all depends on the pattern of their points.
   bool is_overlap(double fit) const {
-    constexpr double kLeast = 0.6;  // ratio
-    return fit >= kLeast || fit >= kLeast * scan_.expected_fit();
+    constexpr double kMin = 0.6;  // ratio
+    return fit >= kMin || fit >= kMin * scan_.expected_fit();
   }
 
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
     if (is_after_gap(period)) return OdometryLoss::kGap;
-    constexpr int kMostTurns = 4;
+    constexpr int kMaxTurns = 4;
     constexpr double kConverged = 0.02;  // m
-    for (int turn = 0; turn < kMostTurns; ++turn) {
+    for (int turn = 0; turn < kMaxTurns; ++turn) {
       scan_.prepare(T_last_newest, period);
       const std::vector<Eigen::Vector3d>& points = scan_.keypoints();
-      if (points.size() < kFewestMatches) return OdometryLoss::kFewPoints;
+      if (points.size() < kMinMatches) return OdometryLoss::kFewPoints;
       if (scan_count_ == 0) return OdometryLoss::kNone;
       if (first_) start_map(T_last_newest, period);
       const Pose T_predicted = T_world_last_ * T_last_newest;

@@ -14,7 +14,7 @@
 namespace dynains::odometry {
 namespace {
 
-constexpr double kLongest = 0.5;       // s from the stamp, of offsets that can be right
+constexpr double kMaxLength = 0.5;     // s from the stamp, of offsets that can be right
 constexpr std::size_t kWanted = 2000;  // keypoints
 
 }  // namespace
@@ -39,38 +39,38 @@ void ScanPreparation::take(const detail::CloudView& cloud, Span<const double> of
 
 void ScanPreparation::choose_scale() {
   constexpr double kNarrow = 4.0, kWide = 12.0;  // m, median ranges that end a scale of 1
-  constexpr double kSmallest = 0.125;
+  constexpr double kMinSize = 0.125;
   constexpr std::size_t kStep = 8;  // every 8th point
   std::vector<double> ranges;
   for (std::size_t i = 0; 3 * i < measured_.size(); i += kStep) {
     const double range = Eigen::Map<const Eigen::Vector3f>(&measured_[3 * i]).norm();
-    if (range > kSmallest * nearest_ && range < farthest_) ranges.push_back(range);
+    if (range > kMinSize * nearest_ && range < farthest_) ranges.push_back(range);
   }
   if (ranges.empty()) return;
   const double middle = median(std::move(ranges));
   while (scale_ < 1.0 && middle > kWide * scale_) scale_ *= 2.0;
-  while (scale_ > kSmallest && middle < kNarrow * scale_) scale_ *= 0.5;
+  while (scale_ > kMinSize && middle < kNarrow * scale_) scale_ *= 0.5;
 }
 
 /// Whether a point is a return with a time.
 bool ScanPreparation::is_timed(std::size_t i) const {
   const Eigen::Map<const Eigen::Vector3f> p(&measured_[3 * i]);
-  return std::abs(offsets_[i]) <= kLongest && p.allFinite() && !p.isZero(0.0F);
+  return std::abs(offsets_[i]) <= kMaxLength && p.allFinite() && !p.isZero(0.0F);
 }
 
 /// Moves points by the nearest of equally spaced poses of the sensor.
 void ScanPreparation::deskew(const Pose& motion, double period) {
   constexpr double kStep = 0.0005;  // s
-  constexpr auto kSteps = static_cast<std::size_t>(4.0 * kLongest / kStep);
+  constexpr auto kSteps = static_cast<std::size_t>(4.0 * kMaxLength / kStep);
   std::vector<Pose> T_mean_point(kSteps + 1);
   for (std::size_t k = 0; k <= kSteps; ++k) {
-    const double time = static_cast<double>(k) * kStep - 2.0 * kLongest;
+    const double time = static_cast<double>(k) * kStep - 2.0 * kMaxLength;
     T_mean_point[k] = extrapolate(Pose::Identity(), motion, time / period);
   }
   for (std::size_t i = 0; i < offsets_.size(); ++i) {
     if (!is_timed(i)) continue;
     Eigen::Map<Eigen::Vector3f> p(&cloud_[3 * i]);
-    const double time = offsets_[i] - mean_offset_ + 2.0 * kLongest;
+    const double time = offsets_[i] - mean_offset_ + 2.0 * kMaxLength;
     p = (T_mean_point[static_cast<std::size_t>(std::lround(time / kStep))] * p.cast<double>())
             .cast<float>();
   }
@@ -129,10 +129,10 @@ Landmarks ScanPreparation::landmarks() const {
 }
 
 void ScanPreparation::adapt() {
-  constexpr double kSmallest = 0.3, kLargest = 1.5;  // m
+  constexpr double kMinSize = 0.3, kMaxSize = 1.5;  // m
   const double share = static_cast<double>(keypoints_.size()) / static_cast<double>(kWanted);
-  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kSmallest,
-                     scale_ * kLargest);
+  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kMinSize,
+                     scale_ * kMaxSize);
 }
 
 }  // namespace dynains::odometry

@@ -16,13 +16,13 @@ bool is_trace_of_beam(const Eigen::Vector3d& beam, const Eigen::Vector3d& normal
   constexpr double kDistance = 0.5;                // m, of the plane from the sensor, in one scan
   constexpr double kEdgeOn = 0.04, kNearly = 0.1;  // sines of the angle between beam and plane
   constexpr double kGrazing = 0.3;                 // the same; less steep planes are long
-  constexpr double kLeastLength = 0.2;             // m, standard deviation along the beam
+  constexpr double kMinLength = 0.2;               // m, standard deviation along the beam
   const double across = normal.dot(beam);
   const double sine = std::abs(across) / beam.norm();
   if (!in_map) return std::abs(across) < kDistance && sine < kEdgeOn;
   if (sine < kNearly || sine >= kGrazing) return sine < kNearly;
   const Eigen::Vector3d along = (beam - across * normal).normalized();
-  return along.dot(covariance * along) < kLeastLength * kLeastLength;
+  return along.dot(covariance * along) < kMinLength * kMinLength;
 }
 
 }  // namespace
@@ -75,12 +75,12 @@ const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& p
 }
 
 CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
-  constexpr double kFewest = 6.0;   // points
+  constexpr double kMin = 6.0;      // points
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
   constexpr double kUpright = 0.5;  // most sine of the tilt of what is upright
   CellSurface surface;
-  if (cell.count < kFewest) return surface;
+  if (cell.count < kMin) return surface;
   const Eigen::Vector3d mean = cell.sum / cell.count;
   surface.mean = cell.origin + mean;
   const Eigen::Matrix3d covariance = cell.squares / cell.count - mean * mean.transpose();

@@ -24,7 +24,7 @@ inline constexpr std::array<double, kCellLevels> kCellEdges = {4.0, 2.0, 1.0};
 /// correlated, so it is a large value.
 inline constexpr double kPointDeviation = 0.2;
 /// Nearer points (m) belong to the own vehicle.
-inline constexpr double kNearestPoint = 2.0;
+inline constexpr double kMinPoint = 2.0;
 
 /// Whether `key` was new to `table`, which has it now.
 inline bool adds(VoxelHashTable<>& table, VoxelKey key) {
@@ -66,7 +66,7 @@ class SurfaceGrid {
   double lever() const { return scale_ * kLever; }
   /// Least eigenvalue of normal equations whose direction is determined, in points whose distance
   /// changes as much as the motion. Clutter determines every direction a little.
-  double least_determined() const { return with_clutter_ ? 2.0 : 0.01; }
+  double min_determined() const { return with_clutter_ ? 2.0 : 0.01; }
   /// The next points are of a scan by a sensor at this place (m).
   void begin_scan(const Eigen::Vector3d& sensor) { sensor_ = sensor; }
   /// Adds a point (m). Dense rings would outweigh others: of a small voxel, one point counts.
@@ -109,7 +109,7 @@ Pose stepped(const Pose& T, const Vector6& step, double lever = kLever);
 class NormalEquations {
  public:
   explicit NormalEquations(const SurfaceGrid& grid)
-      : least_(grid.least_determined()), lever_(grid.lever()) {}
+      : least_(grid.min_determined()), lever_(grid.lever()) {}
 
   /// Adds the point `p` (m) of a scan at the pose `T`. `scale`: m, distance at which its weight is
   /// a fourth. Returns the weight (Geman-McClure), (0, 1].

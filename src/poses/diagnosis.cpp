@@ -22,11 +22,11 @@
 namespace dynains {
 namespace {
 
-constexpr double kLeastAgreement = 0.5;       // share; wrong poses of a moving sensor stay below it
-constexpr std::size_t kFewestCompared = 200;  // compared points of a sample
-constexpr std::size_t kFewestPairs = 3;       // of neighbours, for a statement about their error
-constexpr std::size_t kPairs = 8;             // of a sample
-constexpr double kRough = 0.4;  // m at points 10 m away; more is not inexact but wrong
+constexpr double kMinAgreement = 0.5;      // share; wrong poses of a moving sensor stay below it
+constexpr std::size_t kMinCompared = 200;  // compared points of a sample
+constexpr std::size_t kMinPairs = 3;       // of neighbours, for a statement about their error
+constexpr std::size_t kPairs = 8;          // of a sample
+constexpr double kRough = 0.4;             // m at points 10 m away; more is not inexact but wrong
 constexpr double kInexact =
     0.05;  // m, from one scan to the next, of places and at points 10 m away
 constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -64,7 +64,7 @@ class ScanSample {
     std::vector<Pair> pairs;
     for (std::size_t k = 0; k < scans.size(); k += 2) {
       const Landmarks &a = scans_.at(scans[k]).landmarks, &b = scans_.at(scans[k + 1]).landmarks;
-      if (std::min(a.size(), b.size()) < kFewestLandmarks) continue;
+      if (std::min(a.size(), b.size()) < kMinLandmarks) continue;
       pairs.push_back({scans[k], scans[k + 1], a, b});
     }
     return pairs;
@@ -131,7 +131,7 @@ class ScanSample {
       for (std::size_t k = 0; k < points.size(); ++k) {
         const float x = points.x[k], y = points.y[k], z = points.z[k];
         const double range = std::sqrt(x * x + (y * y + z * z));
-        if (range < kNearestPoint) ++near;
+        if (range < kMinPoint) ++near;
         if (k % 37 == 0) ranges.push_back(range);
       }
     }
@@ -201,7 +201,7 @@ SampledPairs sample_pairs(const Recording& recording, ScanSample& sample, double
   }
   for (std::size_t stride = kStride; stride <= 16 * kStride && 2 * stride <= scans; stride *= 4) {
     result = {sample.pairs(0, scans - 1, stride, most), stride, result.neighbours};
-    if (agreement_under(no_motion, result.pairs).share < kLeastAgreement) break;
+    if (agreement_under(no_motion, result.pairs).share < kMinAgreement) break;
   }
   return result;
 }
@@ -226,14 +226,14 @@ double describe_motion(const Recording& recording, Diagnosis& d) {
 /// a tenth of the way from scan to scan.
 double coarse_step(const std::vector<Pose>& poses) {
   constexpr double kNear = 0.01;  // of a step
-  constexpr std::size_t kFewest = 5;
+  constexpr std::size_t kMin = 5;
   double coarsest = 0.0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     std::vector<double> values, differences;
     for (const Pose& T : poses) values.push_back(T.translation()[axis]);
     std::sort(values.begin(), values.end());
     values.erase(std::unique(values.begin(), values.end()), values.end());
-    if (values.size() < kFewest) continue;
+    if (values.size() < kMin) continue;
     double step = kNever, widest = 0.0;
     for (std::size_t i = 1; i < values.size(); ++i) {
       step = std::min(step, values[i] - values[i - 1]);
@@ -253,8 +253,8 @@ double coarse_step(const std::vector<Pose>& poses) {
 
 /// PoseFlaws::period, by scans in the middle of the recording.
 std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
-  constexpr std::size_t kMost = 80;
-  const std::size_t last_period = std::min(kMost, recording.size() / 2);
+  constexpr std::size_t kMaxCount = 80;
+  const std::size_t last_period = std::min(kMaxCount, recording.size() / 2);
   const std::size_t first = (recording.size() - 2 * last_period) / 2;
   Agreement neighbours;
   for (std::size_t period = 1; period < last_period; ++period) {
@@ -280,7 +280,7 @@ PoseFlaws flaws_of(const Recording& recording) {
 /// Whether poses and scans do not move alike at a fourth of the pairs between which one of them
 /// moves, as with poses that stand, those of another recording, or points of the world.
 bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion& given) {
-  constexpr double kMost = 0.7;  // ratio
+  constexpr double kMaxRatio = 0.7;  // ratio
   std::size_t moving = 0, missed = 0;
   for (const RegisteredMotion& motion : motions) {
     const auto T = given(motion);
@@ -289,7 +289,7 @@ bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion&
     const double by_scans = extent_of(motion.T_first_second);
     if (!(std::max(by_poses, by_scans) > kAgreeing)) continue;
     ++moving;
-    missed += error_at_points({motion}, given) > kMost * std::min(by_poses, by_scans) ? 1 : 0;
+    missed += error_at_points({motion}, given) > kMaxRatio * std::min(by_poses, by_scans) ? 1 : 0;
   }
   return 4 * missed > moving;
 }
@@ -297,7 +297,7 @@ bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion&
 /// Whether there are enough motions for a decision, `steps` of neighbours.
 bool are_enough(const std::vector<RegisteredMotion>& motions, std::size_t steps) {
   const auto is_step = [](const RegisteredMotion& m) { return m.second == m.first + 1; };
-  return motions.size() >= kFewestMotions &&
+  return motions.size() >= kMinMotions &&
          std::count_if(motions.begin(), motions.end(), is_step) >= std::ptrdiff_t(steps);
 }
 
@@ -391,7 +391,7 @@ bool is_inexact(const Recording& recording, const MotionError& steps) {
 /// surfaces fit equally well.
 bool are_refuted(const Evidence& evidence) {
   constexpr double kClearly = 0.6;  // ratio
-  constexpr double kLeastFit = 0.3;
+  constexpr double kMinFit = 0.3;
   const BodyMotion given = given_motion(evidence.recording);
   std::size_t refuted = 0;
   for (const Pair& pair : evidence.pairs) {
@@ -404,7 +404,7 @@ bool are_refuted(const Evidence& evidence) {
     const auto found =
         register_scans(pair.a.surfaces(), pair.b.points(), {*T_given, Pose::Identity()});
     if (found) best = std::max(best, fit_under(found->T_a_b));
-    refuted += best > kLeastFit && fit_under(*T_given) < kClearly * best ? 1 : 0;
+    refuted += best > kMinFit && fit_under(*T_given) < kClearly * best ? 1 : 0;
   }
   return 2 * refuted > evidence.pairs.size();
 }
@@ -412,7 +412,7 @@ bool are_refuted(const Evidence& evidence) {
 /// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd.
 PoseVerdict verdict_of_agreement(const Evidence& evidence) {
   const Agreement &given = evidence.as_given, &standing = evidence.standing;
-  const bool is_doubtful = given.share < kLeastAgreement || is_clearly_better(standing, given);
+  const bool is_doubtful = given.share < kMinAgreement || is_clearly_better(standing, given);
   if (is_doubtful && are_refuted(evidence)) return PoseVerdict::kDisagree;
   return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
 }
@@ -484,7 +484,7 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   d.stride = sampled.stride;
   d.as_given = agreement_under(given, sampled.pairs);
   d.standing = agreement_under(no_motion, sampled.pairs);
-  if (d.as_given.points < kFewestCompared) return d;
+  if (d.as_given.points < kMinCompared) return d;
   const Evidence evidence{recording, sampled.pairs, std::move(motions), d.as_given, d.standing};
   if (is_world) {
     constexpr double kTellingWay = 5.0;  // m
@@ -493,12 +493,12 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
                     : PoseVerdict::kDisagree;
     return d;
   }
-  if (are_enough(evidence.motions, kFewestPairs)) {
+  if (are_enough(evidence.motions, kMinPairs)) {
     judge_by_motions(evidence, d);
   } else {
     d.verdict = verdict_of_agreement(evidence);
   }
-  const bool is_apart = std::max(d.as_given.share, d.standing.share) < kLeastAgreement;
+  const bool is_apart = std::max(d.as_given.share, d.standing.share) < kMinAgreement;
   if (d.verdict == PoseVerdict::kDisagree || (d.verdict == PoseVerdict::kNoMotion && is_apart)) {
     d.flaws.period = period_of_views(recording, sample);
     if (d.flaws.period > 0) d.verdict = PoseVerdict::kDisagree;
@@ -508,7 +508,7 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
 
 /// Whether the scans leave less than half of the error of the given motion in `d`.
 bool halves_error(const Recording& recording, const Diagnosis& d) {
-  const auto suffice = [](const auto& motions) { return are_enough(motions, kFewestPairs); };
+  const auto suffice = [](const auto& motions) { return are_enough(motions, kMinPairs); };
   const std::vector<RegisteredMotion> motions = register_motions(recording, suffice);
   const MotionError steps = motion_error(motions, given_motion(recording), Pose::Identity(), true);
   return suffice(motions) && std::hypot(steps.translation, kLever * steps.rotation) <

@@ -12,7 +12,7 @@
 namespace dynains {
 namespace {
 
-constexpr double kFarthestGap = 1.0;  // m
+constexpr double kMaxGap = 1.0;  // m
 
 std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting, double farthest) {
   constexpr double kOverGround = 0.5;  // m; ground agrees under every motion along it
@@ -22,7 +22,7 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p(points.x[i], points.y[i], points.z[i]);
     const double range = p.norm();
-    if (!(range > kNearestPoint && range < farthest)) continue;
+    if (!(range > kMinPoint && range < farthest)) continue;
     if (mounting.known && mounting.up_sensor.dot(p) + mounting.height < kOverGround) continue;
     const VoxelKey key = voxel_at(p, kVoxel);
     if (adds(occupied, key)) kept.emplace_back(key, p);
@@ -87,8 +87,8 @@ const SurfaceGrid& Landmarks::surfaces() const {
 }
 
 double Landmarks::distance_to(const Eigen::Vector3d& p) const {
-  NearestWithin nearest{kFarthestGap * kFarthestGap};
-  if (size() == 0) return kFarthestGap;
+  NearestWithin nearest{kMaxGap * kMaxGap};
+  if (size() == 0) return kMaxGap;
   if (!tree_->index) tree_->index.emplace(3, *tree_);
   tree_->index->findNeighbors(nearest, p.data(), {});
   return std::sqrt(nearest.squared);

@@ -17,7 +17,7 @@
 namespace dynains {
 
 /// Number of landmarks from which on a scan determines its motion.
-inline constexpr std::size_t kFewestLandmarks = 60;
+inline constexpr std::size_t kMinLandmarks = 60;
 /// Nearer points (m) of two scans agree.
 inline constexpr double kAgreeing = 0.3;
 

@@ -38,7 +38,7 @@ double sharpness(const PointBuffer& points, const Eigen::Vector3d& origin) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d p =
         Eigen::Vector3f(points.x[i], points.y[i], points.z[i]).cast<double>() - origin;
-    if (!(p.norm() > kNearestPoint)) continue;
+    if (!(p.norm() > kMinPoint)) continue;
     const double elevation = std::asin(std::clamp(p.z() / p.norm(), -1.0, 1.0));
     counts[static_cast<std::size_t>(kBinsPerRad * (elevation + M_PI / 2))] += 1.0;
   }
@@ -56,7 +56,7 @@ double sharpness(const PointBuffer& points, const Eigen::Vector3d& origin) {
 
 }  // namespace
 
-std::optional<bool> follow_sensor(const Recording& recording, double least_way) {
+std::optional<bool> follow_sensor(const Recording& recording, double min_way) {
   std::size_t farthest = 0;
   const auto way_to = [&](std::size_t i) -> Eigen::Vector3d {
     return recording.T_world_sensor(i).translation() - recording.T_world_sensor(0).translation();
@@ -65,7 +65,7 @@ std::optional<bool> follow_sensor(const Recording& recording, double least_way) 
     if (way_to(i).norm() > way_to(farthest).norm()) farthest = i;
   }
   const Eigen::Vector3d way = way_to(farthest);
-  if (!(way.norm() > least_way)) return std::nullopt;
+  if (!(way.norm() > min_way)) return std::nullopt;
   const Eigen::Vector3d moved = middle_in_file(recording, farthest) - middle_in_file(recording, 0);
   return moved.dot(way) > 0.5 * way.squaredNorm();
 }
@@ -97,8 +97,8 @@ std::vector<RecordingOptions> other_options(const Recording& recording) {
   if (has_wrong_origin(recording)) add([](RecordingOptions& o) { o.sensor_origin.setZero(); });
   if (recording.columns().time && !is_world) add([](RecordingOptions& o) { o.deskew = !o.deskew; });
   // A short way is weak evidence, but a proposal must also agree.
-  constexpr double kLeastWay = 1.0;  // m
-  if (recording.size() > 0 && follow_sensor(recording, kLeastWay) == !is_world) {
+  constexpr double kMinWay = 1.0;  // m
+  if (recording.size() > 0 && follow_sensor(recording, kMinWay) == !is_world) {
     add([&](RecordingOptions& o) {
       o.frame = is_world ? PointFrame::kSensor : PointFrame::kWorld;
       o.deskew = false;

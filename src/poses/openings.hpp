@@ -9,8 +9,8 @@
 namespace dynains {
 
 /// Whether points in the files move with the sensor, as those in the frame of the world do. Empty
-/// if the sensor stays within `least_way` (m) of its first place. Throws IoError.
-std::optional<bool> follow_sensor(const Recording& recording, double least_way);
+/// if the sensor stays within `min_way` (m) of its first place. Throws IoError.
+std::optional<bool> follow_sensor(const Recording& recording, double min_way);
 
 /// Whether beams meet clearly better in the origin of the clouds than in the given position of the
 /// sensor. Throws IoError.

@@ -30,7 +30,7 @@ class ChainScan {
   Landmarks landmarks_;
 };
 
-constexpr double kFarthestFromGuess = 1.5;  // m
+constexpr double kMaxFromGuess = 1.5;  // m
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
 /// less than `farthest` (m), and the motion at another place.
@@ -53,7 +53,7 @@ std::vector<Pose> first_guesses(const Pose& given, const std::optional<Pose>& el
 
 bool is_certain(const std::optional<Registration>& registration) {
   constexpr double kUncertain = 0.08;  // m
-  return registration && registration->score > kLeastScore &&
+  return registration && registration->score > kMinScore &&
          registration->uncertainty < kUncertain && !registration->is_ambiguous;
 }
 
@@ -93,34 +93,34 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
                                       const Registration& by_planes, const Pose& given,
                                       double farthest) {
   std::optional<Registration> best;
-  double least_gap = 1.0;
+  double min_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
     const auto along = [&](const Pose& T, const Eigen::Vector3d& open, double most) {
       return register_along(a.surfaces(), b.points(), a.landmarks(), b.landmarks(), T, open, most);
     };
-    auto found = along(given, direction, kFarthestFromGuess);
+    auto found = along(given, direction, kMaxFromGuess);
     const bool fits = found && is_exact(found->T_a_b, given);
     if (!fits) {
       found = along(by_planes.T_a_b, direction, farthest);
       if (!found) continue;
       // The planes that meet at the found pose determine the open direction better.
-      if (const auto again = along(found->T_a_b, found->uncertain[0], kFarthestFromGuess)) {
+      if (const auto again = along(found->T_a_b, found->uncertain[0], kMaxFromGuess)) {
         found = again;
       }
     }
     const double gap = mean_gap(a.landmarks(), b.landmarks(), found->T_a_b);
     Pose standing = by_planes.T_a_b;
     standing.translation() -= direction.dot(standing.translation()) * direction;
-    if (gap < least_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
+    if (gap < min_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
       best = found;
-      least_gap = gap;
+      min_gap = gap;
       if (fits) break;
     }
   }
   if (!best) return std::nullopt;
   const Pose& found = best->T_a_b;
   const bool is_distant = (found.translation() - given.translation()).norm() > kDistinct;
-  if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < least_gap) return std::nullopt;
+  if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < min_gap) return std::nullopt;
   const Pose T_b_a = best->T_a_b.inverse();
   const Eigen::Vector3d direction = T_b_a.linear() * best->way->direction;
   const KnownTranslation way{direction, direction.dot(T_b_a.translation()), best->way->deviation};
@@ -229,7 +229,7 @@ std::vector<std::size_t> starts_of_chains(const Recording& recording) {
     if (steps == 3) moving.insert(moving.end(), {i - 2, i - 1});
     if (steps >= 3) moving.push_back(i);
   }
-  const bool stands = 2 * moving.size() < all && moving.size() >= kFewestMotions;
+  const bool stands = 2 * moving.size() < all && moving.size() >= kMinMotions;
   const std::size_t places = stands ? moving.size() : all;
   std::vector<std::size_t> starts;
   const std::size_t count = std::min(kChains, places);
@@ -246,8 +246,8 @@ std::vector<std::size_t> starts_of_chains(const Recording& recording) {
 /// one scan to the next at another place.
 std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t number,
                                        std::size_t first, const std::optional<Pose>& elsewhere) {
-  constexpr std::size_t kLongest = 9;  // scans
-  constexpr double kFar = 3.0;         // m, at points kLever away
+  constexpr std::size_t kMaxLength = 9;  // scans
+  constexpr double kFar = 3.0;           // m, at points kLever away
   const auto read = [&](std::size_t i) {
     return ChainScan(sampled_points(recording.read_scan(i)));
   };
@@ -263,13 +263,13 @@ std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t n
   const double farthest = longest_way(recording.time(first + 1) - recording.time(first));
   add(first + 1, first_guesses(motion_between(recording, first, first + 1), elsewhere, farthest),
       farthest);
-  for (std::size_t step = 3; step <= kLongest && !motions.empty(); step *= 3) {
+  for (std::size_t step = 3; step <= kMaxLength && !motions.empty(); step *= 3) {
     const Pose T = motions.back().T_first_second;
     if (extent_of(T) > kFar || first + step >= recording.size()) break;
     const Pose guess = T * T * T;
-    if (!add(first + step, {guess}, kFarthestFromGuess)) break;
+    if (!add(first + step, {guess}, kMaxFromGuess)) break;
     const Pose& found = motions.back().T_first_second;
-    if ((found.translation() - guess.translation()).norm() < kFarthestFromGuess) continue;
+    if ((found.translation() - guess.translation()).norm() < kMaxFromGuess) continue;
     motions.pop_back();
     break;
   }
@@ -351,13 +351,13 @@ double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyM
 
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
                                   const BodyMotion& body) {
-  constexpr std::size_t kFewest = 4;
+  constexpr std::size_t kMin = 4;
   std::vector<BothMotions> motions;
   for (const RegisteredMotion& motion : registered) {
     const auto T_body = body(motion);
     if (T_body) motions.push_back({*T_body, motion.T_first_second});
   }
-  if (motions.size() < kFewest) return std::nullopt;
+  if (motions.size() < kMin) return std::nullopt;
   std::optional<Pose> best;
   double least = 0.0;
   for (const Eigen::Matrix3d& R : axis_rotations()) {

@@ -13,7 +13,7 @@
 namespace dynains {
 
 inline constexpr double kExact = 0.03;  ///< m at points 10 m away; registrations are worse rarely
-inline constexpr std::size_t kFewestMotions = 6;  ///< registered, for a decision
+inline constexpr std::size_t kMinMotions = 6;  ///< registered, for a decision
 
 /// Motion of the sensor between two scans, by their registration.
 struct RegisteredMotion {

@@ -29,35 +29,35 @@ Reading given_reading(const Recording& recording) {
 
 /// Factor of the ways under which most motions agree; empty without motion.
 std::optional<Reading> fit_scale(const Recording& recording, const Motions& motions) {
-  constexpr double kLeastWay = 0.2;    // m
-  constexpr double kMostFactor = 3.0;  // more is another unit, or no motion
+  constexpr double kMinWay = 0.2;     // m
+  constexpr double kMaxFactor = 3.0;  // more is another unit, or no motion
   const BodyMotion given = motion_under(recording, given_reading(recording));
   std::vector<double> factors;
   for (const RegisteredMotion& motion : motions) {
     const auto T = given(motion);
-    if (!T || !(T->translation().norm() > kLeastWay)) continue;
+    if (!T || !(T->translation().norm() > kMinWay)) continue;
     const Eigen::Vector3d way = T->translation();
     factors.push_back(way.dot(motion.T_first_second.translation()) / way.squaredNorm());
   }
   // Three digits: more are not known.
   const double factor = std::round(1e3 * median(std::move(factors))) / 1e3;
-  if (!(1.0 / kMostFactor < factor && factor < kMostFactor)) return std::nullopt;
+  if (!(1.0 / kMaxFactor < factor && factor < kMaxFactor)) return std::nullopt;
   Reading result = given_reading(recording);
   result.complexity = 2;
   result.convention.scale =
-      std::clamp(result.convention.scale * factor, kLeastPoseScale, kLargestPoseScale);
+      std::clamp(result.convention.scale * factor, kMinPoseScale, kMaxPoseScale);
   return result;
 }
 
 /// The offset of the clocks with the least error; empty without times, or if it is 0 or at an end
 /// of the range.
 std::optional<Reading> fit_offset(const Recording& recording, const Motions& motions) {
-  constexpr double kFarthest = 0.6;  // s
-  constexpr double kStep = 0.005;    // s
+  constexpr double kMaxOffset = 0.6;  // s
+  constexpr double kStep = 0.005;     // s
   Reading result = given_reading(recording);
   double best = 0.0;
   double least = error_at_points(motions, motion_under(recording, result));
-  const auto steps = static_cast<int>(kFarthest / kStep);
+  const auto steps = static_cast<int>(kMaxOffset / kStep);
   for (int k = -steps; k <= steps; ++k) {
     result.time_offset = recording.time_offset() + kStep * k;
     const MotionError error = motion_error(motions, motion_under(recording, result));
@@ -65,7 +65,7 @@ std::optional<Reading> fit_offset(const Recording& recording, const Motions& mot
     least = error.at_points;
     best = kStep * k;
   }
-  if (best == 0.0 || !(std::abs(best) < kFarthest - 4.0 * kStep)) return std::nullopt;
+  if (best == 0.0 || !(std::abs(best) < kMaxOffset - 4.0 * kStep)) return std::nullopt;
   return Reading{recording.convention(), recording.time_offset() + best, 1};
 }
 

@@ -73,7 +73,7 @@ std::optional<Registration> register_near(const SurfaceGrid& a, const Points& b,
   Pose T = refine(a, b, guess, 1, 0.2, 1, 8, way);
   T = refine(a, b, T, 2, kFine, 1, 15, way);
   Linearization last = linearize(a, b, T, 2, kFine, 1);
-  if (last.firm_count < kFewestMatches) return std::nullopt;
+  if (last.firm_count < kMinMatches) return std::nullopt;
   Registration result;
   result.T_a_b = T;
   result.way = way;
@@ -94,7 +94,7 @@ RegistrationScan::RegistrationScan(PointsView points, double farthest) {
     const Eigen::Vector3d p(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                             static_cast<double>(points.z[i]));
     const double range = p.norm();
-    if (!(range > kNearestPoint && range < farthest)) continue;
+    if (!(range > kMinPoint && range < farthest)) continue;
     surfaces_.insert(p);
     if (adds(thinned, voxel_at(p, kThinned))) points_.push_back(p);
   }

@@ -36,12 +36,12 @@ inline constexpr double kDistinct = 0.5;
 /// Ratio of what is nearly as good as the best.
 inline constexpr double kAlmost = 0.93;
 /// Points at planes and poles that a registration needs.
-inline constexpr std::size_t kFewestMatches = 100;
+inline constexpr std::size_t kMinMatches = 100;
 /// Score that registrations of other places hardly reach, of dense scans.
-inline constexpr double kLeastScore = 0.45;
+inline constexpr double kMinScore = 0.45;
 /// Maximum standard deviation (m) of the translation of a registration that places a scan or
 /// session.
-inline constexpr double kMostUncertain = 0.05;
+inline constexpr double kMaxUncertain = 0.05;
 
 /// A component of the translation that is known otherwise.
 struct KnownTranslation {

@@ -13,8 +13,8 @@ constexpr double kCoarse = 0.5;     // m
 constexpr double kFineShift = 0.1;  // m
 
 Points thinned(const Points& points) {
-  constexpr std::size_t kMost = 800;
-  const std::size_t stride = 1 + points.size() / kMost;
+  constexpr std::size_t kMaxCount = 800;
+  const std::size_t stride = 1 + points.size() / kMaxCount;
   Points kept;
   for (std::size_t i = 0; i < points.size(); i += stride) kept.push_back(points[i]);
   return kept;
@@ -35,13 +35,13 @@ double gap_of(const Landmarks& a, const Points& points, const Pose& T, double mo
 /// The `points` of another scan that do not keep their place beside `a`, as traffic ahead and
 /// smooth walls do. Only these points determine the way. Empty if they are few.
 Points decisive_of(const Points& points, const Landmarks& a, const Pose& standing) {
-  constexpr double kLeastShare = 0.15;  // of the points
+  constexpr double kMinShare = 0.15;  // of the points
   Points decisive;
   for (const Eigen::Vector3d& p : points) {
     if (a.distance_to(standing * p) > kDistinct) decisive.push_back(p);
   }
-  const double least_count = kLeastShare * static_cast<double>(points.size());
-  if (static_cast<double>(decisive.size()) < least_count || decisive.size() < kFewestLandmarks) {
+  const double min_count = kMinShare * static_cast<double>(points.size());
+  if (static_cast<double>(decisive.size()) < min_count || decisive.size() < kMinLandmarks) {
     decisive.clear();
   }
   return decisive;
@@ -69,10 +69,10 @@ double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b) {
 
 std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
                                const Eigen::Vector3d& direction, double farthest) {
-  constexpr double kMostGap = 0.4;  // m; traffic of another speed must not pull at the minimum
+  constexpr double kMaxGap = 0.4;  // m; traffic of another speed must not pull at the minimum
   const Points of_a = thinned(a.points());
   const Points of_b = thinned(b.points());
-  if (of_a.size() < kFewestLandmarks || of_b.size() < kFewestLandmarks) return std::nullopt;
+  if (of_a.size() < kMinLandmarks || of_b.size() < kMinLandmarks) return std::nullopt;
   const double way = direction.dot(T_a_b.translation());
   const Pose standing = moved(T_a_b, -way * direction);
   const Points decisive_a = decisive_of(of_a, b, standing.inverse());
@@ -83,14 +83,13 @@ std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pos
   for (int k = -steps; k <= steps; ++k) {
     gaps.push_back(gap_of(a, decisive_b, moved(T_a_b, kCoarse * k * direction)));
   }
-  const auto least_gap = clear_minimum(gaps);
-  if (!least_gap) return std::nullopt;
-  const double coarse = kCoarse * (static_cast<double>(*least_gap) - static_cast<double>(steps));
+  const auto min_gap = clear_minimum(gaps);
+  if (!min_gap) return std::nullopt;
+  const double coarse = kCoarse * (static_cast<double>(*min_gap) - static_cast<double>(steps));
 
   const auto gap_at = [&](double displacement) {
     const Pose T = moved(T_a_b, displacement * direction);
-    return 0.5 *
-           (gap_of(a, decisive_b, T, kMostGap) + gap_of(b, decisive_a, T.inverse(), kMostGap));
+    return 0.5 * (gap_of(a, decisive_b, T, kMaxGap) + gap_of(b, decisive_a, T.inverse(), kMaxGap));
   };
   double best = coarse;
   double least = gap_at(best);

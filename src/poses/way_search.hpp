@@ -19,7 +19,7 @@ inline constexpr double kWayRange = 80.0;
 /// Longest way (m) of a sensor in `period` (s), of which 0.1 to 1 s count: times may be wrong.
 inline double longest_way(double period) {
   constexpr double kFastest = 60.0;  // m/s
-  return kFastest * std::clamp(period, 0.1, kLongestPoseGap);
+  return kFastest * std::clamp(period, 0.1, kMaxPoseGap);
 }
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.

@@ -129,7 +129,7 @@ class MapAlignment {
     const RegistrationScan map(around(centre), kReach), scan(standing, kReach);
     const auto found =
         register_scans(map.surfaces(), scan.points(), {T_latest, T_centre_map * T_world_sensor});
-    if (!found || found->score < kLeastScore || found->uncertainty > kMostUncertain) return;
+    if (!found || found->score < kMinScore || found->uncertainty > kMaxUncertain) return;
     T_map_world_ = T_map_centre * found->T_a_b * T_world_sensor.inverse();
     ++aligned_;
     farthest_ = std::max(farthest_, (T_map_world_ * sensor - sensor).norm());
@@ -202,8 +202,8 @@ fs::path target_of(const CleanOptions& options) {
 
 /// The edge of voxels that hold about one point of the map, m; at least `least`.
 double voxel_of(const std::vector<Eigen::Vector3d>& map, double least) {
-  constexpr double kMost = 2.0;  // m
-  return edge_by_spacing(map.size(), least, kMost,
+  constexpr double kMaxEdge = 2.0;  // m
+  return edge_by_spacing(map.size(), least, kMaxEdge,
                          [&](double edge) { return MapVotes(map, edge).voxel_count(); });
 }
 

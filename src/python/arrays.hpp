@@ -45,11 +45,11 @@ inline std::string type_text(const py::handle& object) {
 /// Throws CloudError unless `array` has a point in each row. Scans that were handed in by columns
 /// have some thousand of them, which no record of a point has.
 inline void expect_rows_of_points(const std::string& what, const py::array& array) {
-  constexpr py::ssize_t kMostColumns = 64;
-  if (array.ndim() == 2 && array.shape(1) >= 3 && array.shape(1) <= kMostColumns) return;
+  constexpr py::ssize_t kMaxColumns = 64;
+  if (array.ndim() == 2 && array.shape(1) >= 3 && array.shape(1) <= kMaxColumns) return;
   std::string text = what + shape_text(array) + ", expected (N, 3), or (N, 4) and more up to " +
-                     std::to_string(kMostColumns) + " columns, x y z first";
-  if (array.ndim() == 2 && array.shape(1) > kMostColumns) text += ": transpose it, or slice it";
+                     std::to_string(kMaxColumns) + " columns, x y z first";
+  if (array.ndim() == 2 && array.shape(1) > kMaxColumns) text += ": transpose it, or slice it";
   throw CloudError(text);
 }
 

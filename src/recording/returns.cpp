@@ -12,29 +12,29 @@ namespace {
 
 constexpr double kKeyWay = 2.0;         // m, between two key scans
 constexpr double kNearby = 8.0;         // m, between two sensors that see the same surfaces
-constexpr double kLeastInliers = 0.6;   // share of points
-constexpr double kMostMovement = 0.05;  // m, of points 10 m away, of scans that fit
+constexpr double kMinInliers = 0.6;     // share of points
+constexpr double kMaxMovement = 0.05;   // m, of points 10 m away, of scans that fit
 constexpr double kMapDeviation = 0.03;  // m, of the earlier poses around, at 10 m
 constexpr float kStoredStep = 0.002F;   // m, of stored coordinates
-constexpr std::size_t kMostPoints = 12000;
-constexpr std::size_t kMostScans = 16;
+constexpr std::size_t kMaxPoints = 12000;
+constexpr std::size_t kMaxScans = 16;
 
 using Steps = std::array<std::int16_t, 3>;
 
 }  // namespace
 
-bool ReturnToPlace::fits() const { return is_known() && movement <= kMostMovement; }
+bool ReturnToPlace::fits() const { return is_known() && movement <= kMaxMovement; }
 
-bool ReturnToPlace::is_wrong() const { return inliers < kLeastInliers || movement > kMostMovement; }
+bool ReturnToPlace::is_wrong() const { return inliers < kMinInliers || movement > kMaxMovement; }
 
 bool ReturnToPlace::is_known() const {
-  constexpr double kMostDeviation = 0.1;  // m
-  return inliers >= kLeastInliers && deviation <= kMostDeviation;
+  constexpr double kMaxDeviation = 0.1;  // m
+  return inliers >= kMinInliers && deviation <= kMaxDeviation;
 }
 
 // Puts the points that stand into kept_, and into the store.
 void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
-  const std::size_t stride = 1 + points.size() / kMostPoints;
+  const std::size_t stride = 1 + points.size() / kMaxPoints;
   kept_.points.clear();
   bytes_.clear();
   for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -143,7 +143,7 @@ void Returns::choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor) {
   }
   std::stable_sort(near_.begin(), near_.end(),
                    [&](const KeyScan* a, const KeyScan* b) { return distance(a) < distance(b); });
-  near_.resize(std::min(near_.size(), kMostScans));
+  near_.resize(std::min(near_.size(), kMaxScans));
 }
 
 void Returns::choose_visit(const Pose& T_world_sensor) {

@@ -137,12 +137,12 @@ bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
 // it holds wheels and undersides.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
-  constexpr double kMostRise = 0.02;  // m
+  constexpr double kMaxRise = 0.02;  // m
   const Cause cause = verdict.causes[i];
   if (cause == Cause::kUnderInstance) return false;
   const auto is_ground = [&] {
     const std::optional<double> rise = places_.rise(point);
-    return rise && *rise <= kMostRise && places_.is_level(point);
+    return rise && *rise <= kMaxRise && places_.is_level(point);
   };
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;

@@ -17,7 +17,7 @@ namespace {
 /// Whether nearly all coordinates of an axis in the frame `file` lie multiples of `step` (m) apart.
 bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::Index axis,
                    double step) {
-  constexpr std::size_t kFewest = 100;
+  constexpr std::size_t kMin = 100;
   constexpr double kNear = 0.1;  // of a step
   std::size_t count = 0, off_grid = 0;
   double first = 0.0;
@@ -30,7 +30,7 @@ bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::I
     off_grid += std::abs(steps - std::round(steps)) < kNear ? 0 : 1;
     ++count;
   }
-  return count >= kFewest && off_grid * 20 <= count;
+  return count >= kMin && off_grid * 20 <= count;
 }
 
 /// Upward normals (sensor frame) under which scan i has ground below the sensor, for a sensor that
@@ -103,7 +103,7 @@ bool is_repeated(const Recording& recording, std::size_t i) {
 }
 
 std::optional<std::string> remark_on_stripes(const Recording& recording) {
-  constexpr double kLeast = 0.01;  // m
+  constexpr double kMin = 0.01;  // m
   const RecordedScan scan = recording.read_scan(0);
   if (recording.frame() != PointFrame::kWorld) return remark_on_grid(scan, Pose::Identity());
   const Pose& T_world_sensor = recording.T_world_sensor(0);
@@ -113,7 +113,7 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
     const double place = std::abs(T_world_sensor.translation()[axis]);
     if (!(place > 1.0)) continue;
     const double step = std::exp2(std::floor(std::log2(place)) - 23.0);  // of a float32
-    if (step < kLeast || !are_multiples(scan, T_world_sensor, axis, step)) continue;
+    if (step < kMin || !are_multiples(scan, T_world_sensor, axis, step)) continue;
     widest = std::max(widest, step);
     far = std::max(far, place);
   }
@@ -125,12 +125,12 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
 }
 
 std::optional<std::string> remark_on_copies(const Recording& recording, const ScanRange& range) {
-  constexpr double kLeastMotion = 0.05;  // m
+  constexpr double kMinMotion = 0.05;  // m
   if (range.size() < 3) return std::nullopt;
   for (const std::size_t first : ScanRange{range.first, range.last - 2}.sample()) {
     for (std::size_t i = first; i < first + 2; ++i) {
       const Pose T = recording.T_world_sensor(i).inverse() * recording.T_world_sensor(i + 1);
-      if (T.translation().norm() > kLeastMotion && is_repeated(recording, i)) {
+      if (T.translation().norm() > kMinMotion && is_repeated(recording, i)) {
         return "clouds " + recording.name(i) + " and " + recording.name(i + 1) +
                " are equal, though the sensor moves between them: leave copies of clouds out";
       }

@@ -76,7 +76,7 @@ constexpr int kStrip = kTextHeight + 2 * kInset;  // pixels of a title, and of t
 struct Style {
   double margin = 50.0;         ///< m around the path
   double longer_side = 1200.0;  ///< pixels of a panel
-  double most_per_metre = 8.0;  ///< pixels
+  double max_per_metre = 8.0;   ///< pixels
   double longest_bar = 200.0;   ///< pixels, of the scale
   Colour ink = {40, 40, 40};
   Colour grey = {150, 150, 150};  ///< static points in a legend
@@ -145,7 +145,7 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
   }
   low_ = low - kStyle.margin;
   const Eigen::Array2d size = high + kStyle.margin - low_.array();
-  scale_ = std::min(kStyle.most_per_metre, kStyle.longer_side / size.maxCoeff());
+  scale_ = std::min(kStyle.max_per_metre, kStyle.longer_side / size.maxCoeff());
   const auto pixels = [&](double metres) {
     return std::max(1, static_cast<int>(std::ceil(metres * scale_)));
   };

@@ -61,7 +61,7 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                     "poses are from the world to the sensor, not from it"});
   visitor(TextParameter{"pose_units", c.unit, &read_length_unit, "m|cm|mm",
                         "unit of the translations [m]"});
-  visitor(Parameter{"pose_scale", c.scale, closed(kLeastPoseScale, kLargestPoseScale), "",
+  visitor(Parameter{"pose_scale", c.scale, closed(kMinPoseScale, kMaxPoseScale), "",
                     "factor of the translations, for an odometry with a wrong scale"});
   visitor(Parameter{"quaternion_order", c.quaternion, Bounds(), "",
                     "order of quaternions in the file of poses; auto: as its form has it"});

@@ -47,7 +47,7 @@ PointBuffer points_of_sensor(const Recording& recording, const RecordedScan& sca
 /// Throws IoError.
 double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
   constexpr std::size_t kScans = 24;
-  constexpr double kLeastMotion = 5.0;  // m
+  constexpr double kMinMotion = 5.0;  // m
   const std::size_t count = std::min(kScans, range.size());
   std::vector<std::size_t> chosen;
   double motion = 0.0;
@@ -57,7 +57,7 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
                                recording.T_world_sensor(range.first).translation())
                                   .norm());
   }
-  if (motion < kLeastMotion) return otherwise;
+  if (motion < kMinMotion) return otherwise;
   std::vector<std::vector<PointBuffer>> scans(std::max<std::size_t>(1, recording.sensors().size()));
   RecordedScan scan;
   for (const std::size_t i : chosen) {

@@ -35,7 +35,7 @@ PointColumns map_columns(bool far, const Recording& recording, bool with_attribu
   return columns;
 }
 
-float most_intensity(const RecordedScan& scan) {
+float max_intensity(const RecordedScan& scan) {
   float most = 0.0F;
   for (std::size_t i = 0; i < scan.size(); ++i) most = std::max(most, scan.xyzi[4 * i + 3]);
   return most;
@@ -99,7 +99,7 @@ std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recor
   options.columns = map_columns(is_far(recording, range), recording, outputs.map_attributes);
   if (is_las(file)) {
     options.las = las_options(recording, range, outputs.crs);
-    options.intensity_scale = las_intensity_scale(most_intensity(recording.read_scan(range.first)));
+    options.intensity_scale = las_intensity_scale(max_intensity(recording.read_scan(range.first)));
   }
   return MapFile::open(file, options);
 }

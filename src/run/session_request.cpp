@@ -49,7 +49,7 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
   SessionAligner aligner(City::open_or_make(request.city, request.grid));
   RecordedScan scan;
   PointBuffer points;
-  const std::size_t count = std::min(range.size(), SessionAligner::kMostScans);
+  const std::size_t count = std::min(range.size(), SessionAligner::kMaxScans);
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i =
         range.first + k * (range.size() - 1) / std::max<std::size_t>(count - 1, 1);

@@ -33,8 +33,8 @@ void check_poses(const Recording& recording, bool accepts_poses, StartCheck& res
 
 void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
                   bool unit_is_given) {
-  constexpr double kFarthestReturn = 250.0;  // m, of most points of a LiDAR
-  std::vector<float> ranges;                 // in the x-y plane
+  constexpr double kMaxReturn = 250.0;  // m, of most points of a LiDAR
+  std::vector<float> ranges;            // in the x-y plane
   for (const std::size_t i : range.sample()) {
     const PointBuffer points = sampled_points(recording.read_scan(i));
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -48,7 +48,7 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
   };
   const auto count = static_cast<double>(ranges.size());
   const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
-  const bool is_far = !unit_is_given && count_within(kFarthestReturn) < 0.1 * count;
+  const bool is_far = !unit_is_given && count_within(kMaxReturn) < 0.1 * count;
   if (judged >= 0.01 && !is_far) return;
   const auto number = [](double value) { return evaluation::format_number(value, 1); };
   throw ConfigError(
@@ -84,11 +84,10 @@ std::optional<std::string> remark_on_lone_scans(const Recording& recording, cons
 
 StartCheck check_start(const Recording& recording, const ScanRange& range,
                        const RemoverConfig& config, bool accepts_poses) {
-  constexpr std::size_t kFewestScans = 8;
+  constexpr std::size_t kMinScans = 8;
   StartCheck result;
   const bool has_given_poses = !recording.options().without_poses;
-  if (has_given_poses && range.size() >= kFewestScans)
-    check_poses(recording, accepts_poses, result);
+  if (has_given_poses && range.size() >= kMinScans) check_poses(recording, accepts_poses, result);
   if (!result.refusal.empty()) return result;
   const auto warn_if = [&](const std::optional<std::string>& remark) {
     if (remark) result.warnings.push_back(*remark);

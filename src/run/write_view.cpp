@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace viewer;
 
-constexpr double kSmallestCell = 0.05;  // m
+constexpr double kMinCell = 0.05;  // m
 
 /// Reads scan by scan. The page gets at most `max_points` points: the first static point of each
 /// voxel, up to two thirds, and moving points.
@@ -38,9 +38,9 @@ class Collector {
         files_(folder / "labels", folder / "causes", folder / "beliefs"),
         max_points_(max_points),
         // A third is left for the moving points.
-        static_(max_points - max_points / 3, std::max(map_voxel, kSmallestCell),
+        static_(max_points - max_points / 3, std::max(map_voxel, kMinCell),
                 std::numeric_limits<ViewPoint::ScanIndex>::max() + 1),
-        moving_(max_points, kSmallestCell, 1) {
+        moving_(max_points, kMinCell, 1) {
     if (range.size() > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
       throw ConfigError("a page shows at most 65535 scans, not " + std::to_string(range.size()));
     }

@@ -279,7 +279,7 @@ struct Outcome {
 
 /// Removes from the recording as a run would if it began; times are those of the simulated scans.
 Outcome judge(const Scans& scans, const WrittenScans& written) {
-  constexpr float kFarthest = 50.0F;  // m
+  constexpr float kMaxRange = 50.0F;  // m
   Outcome outcome;
   std::uint64_t fixed = 0, lost = 0;
   const auto count = [&](const ScanVerdict& verdict) {
@@ -287,7 +287,7 @@ Outcome judge(const Scans& scans, const WrittenScans& written) {
     for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
       const std::uint32_t label = scan.labels[i] & 0xFFFFU;
       const bool is_fixed = label > 1 && label < 252;
-      if (!is_fixed || std::hypot(scan.xyzi[4 * i], scan.xyzi[4 * i + 1]) > kFarthest) continue;
+      if (!is_fixed || std::hypot(scan.xyzi[4 * i], scan.xyzi[4 * i + 1]) > kMaxRange) continue;
       ++fixed;
       lost += verdict.labels[i] == PointLabel::kDynamic ? 1 : 0;
     }

@@ -326,8 +326,8 @@ TEST_CASE("beliefs equal those of the slow reference sum") {
     for (std::vector<std::uint32_t>& supervoxels : instances) {
       supervoxels.resize(random.index(20));  // some have none
       for (std::uint32_t& count : supervoxels) {
-        count = static_cast<std::uint32_t>(
-            1 + random.index(round % 2 == 0 ? 4 : Visibility::kMostBits));
+        count =
+            static_cast<std::uint32_t>(1 + random.index(round % 2 == 0 ? 4 : Visibility::kMaxBits));
       }
     }
     Scan scan(instances);

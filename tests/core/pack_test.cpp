@@ -120,14 +120,14 @@ TEST_CASE("all kinds of packs give equal bits") {
     b.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
   }
   // Comparisons with NaN must not depend on the width either.
-  constexpr std::size_t kMost = detail::kPackWidth;
-  a.resize(a.size() / kMost * kMost);
+  constexpr std::size_t kMaxCount = detail::kPackWidth;
+  a.resize(a.size() / kMaxCount * kMaxCount);
   b.resize(a.size());
-  for (std::size_t i = 0; i < 2 * kMost; ++i) {
+  for (std::size_t i = 0; i < 2 * kMaxCount; ++i) {
     a.push_back(i % 2 == 0 ? std::numeric_limits<float>::quiet_NaN() : 1.0F);
     b.push_back(i % 4 < 2 ? 2.0F : std::numeric_limits<float>::quiet_NaN());
   }
-  const std::size_t finite = a.size() - 2 * kMost;  // conversions of NaN are undefined
+  const std::size_t finite = a.size() - 2 * kMaxCount;  // conversions of NaN are undefined
   const std::vector<float> finite_a(a.data(), a.data() + finite);
   const std::vector<float> finite_b(b.data(), b.data() + finite);
   const auto expected = results<detail::BaselinePacks>(finite_a, finite_b);

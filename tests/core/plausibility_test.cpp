@@ -54,19 +54,19 @@ TEST_CASE("a usual window is plausible, and each share has a bound") {
   };
   constexpr double kStep = 0.01;
   using Check = PlausibilityCheck;
-  CHECK(judged(with_shares(Check::kMostGroundFree - kStep, 0.0)) == Suspicion::kNone);
-  CHECK(judged(with_shares(Check::kMostGroundFree + kStep, 0.0)) == Suspicion::kRays);
-  CHECK(judged(with_shares(0.0, Check::kMostInstanceFree - kStep)) == Suspicion::kNone);
-  CHECK(judged(with_shares(0.0, Check::kMostInstanceFree + kStep)) == Suspicion::kRays);
+  CHECK(judged(with_shares(Check::kMaxGroundFree - kStep, 0.0)) == Suspicion::kNone);
+  CHECK(judged(with_shares(Check::kMaxGroundFree + kStep, 0.0)) == Suspicion::kRays);
+  CHECK(judged(with_shares(0.0, Check::kMaxInstanceFree - kStep)) == Suspicion::kNone);
+  CHECK(judged(with_shares(0.0, Check::kMaxInstanceFree + kStep)) == Suspicion::kRays);
   const double ground = Check::kGroundFree, instances = Check::kInstanceFree;
   CHECK(judged(with_shares(ground + kStep, instances - kStep)) == Suspicion::kNone);
   CHECK(judged(with_shares(ground - kStep, instances + kStep)) == Suspicion::kNone);
   CHECK(judged(with_shares(ground + kStep, instances + kStep)) == Suspicion::kRays);
 
   scan = usual_scan();
-  scan.residual = PlausibilityCheck::kMostResidual - 0.01F;
+  scan.residual = PlausibilityCheck::kMaxResidual - 0.01F;
   CHECK(judged(scan) == Suspicion::kNone);
-  scan.residual = PlausibilityCheck::kMostResidual + 0.01F;
+  scan.residual = PlausibilityCheck::kMaxResidual + 0.01F;
   CHECK(judged(scan) == Suspicion::kPoses);
 }
 

@@ -26,13 +26,11 @@ using simulation::Scene;
 using simulation::Sensor;
 using simulation::SimulatedScan;
 
-constexpr double kTolerance = 0.01;                            // m
-constexpr double kLongestObject = 18.0, kHighestObject = 4.5;  // m
+constexpr double kTolerance = 0.01;                    // m
+constexpr double kMaxObject = 18.0, kMaxObject = 4.5;  // m
 constexpr double kDegrees = M_PI / 180.0;
 
-PoseCorrection new_correction() {
-  return PoseCorrection(kTolerance, kLongestObject, kHighestObject);
-}
+PoseCorrection new_correction() { return PoseCorrection(kTolerance, kMaxObject, kMaxObject); }
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
   const simulation::Config config = drive_of(scene, sensor, scans, 31);
@@ -145,7 +143,7 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
                     SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
                     SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
   static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 30);
-  residuals_of_exact({0.003, kLongestObject, kHighestObject}, scans, [&](GroundSplit& split) {
+  residuals_of_exact({0.003, kMaxObject, kMaxObject}, scans, [&](GroundSplit& split) {
     for (std::size_t i = 0; i < split.count; ++i) {
       const Eigen::Vector3f p = fault({split.points.x[i], split.points.y[i], split.points.z[i]});
       split.points.x[i] = p.x();
@@ -477,7 +475,7 @@ TEST_CASE("a block of points makes the planes of its single points") {
   const std::vector<double> expected = planes_of(1);
   REQUIRE(expected.size() > 1500);
   CHECK(planes_of(7) == expected);
-  CHECK(planes_of(VoxelPlanes::Block::kMost) == expected);
+  CHECK(planes_of(VoxelPlanes::Block::kMaxCount) == expected);
 }
 
 }  // namespace

@@ -319,8 +319,8 @@ std::uint64_t play(Stream stream, DynaInsRemover& remover) {
 
 constexpr unsigned kPooled = 64;          ///< number of configurations with their own remover
 constexpr unsigned kWithDynamicGrid = 8;  ///< number of them with a dynamic grid of 2 MB
-constexpr unsigned kLeastCompared = 250;  ///< from here on, a new remover has to give equal answers
-constexpr unsigned kLeastChanged = 253;   ///< from here on, the stream encodes the configuration
+constexpr unsigned kMinCompared = 250;    ///< from here on, a new remover has to give equal answers
+constexpr unsigned kMinChanged = 253;     ///< from here on, the stream encodes the configuration
 
 /// The two presets, then presets with some parameters changed at random.
 Config pooled_config(unsigned number) {
@@ -356,7 +356,7 @@ DynaInsRemover* pooled_remover(unsigned number) {
 void run_facade(Bytes bytes) {
   Stream stream(bytes);
   const unsigned kind = stream.byte();
-  if (kind >= kLeastChanged) {
+  if (kind >= kMinChanged) {
     Config config = small_preset(kind % 2 == 1);
     change(stream, config);
     config.evidence.dynamic_grid_ratio = 1.0;
@@ -367,7 +367,7 @@ void run_facade(Bytes bytes) {
   DynaInsRemover* const remover = pooled_remover(number);
   if (remover == nullptr) return;
   const std::uint64_t digest = play(stream, *remover);
-  if (kind < kLeastCompared) return;
+  if (kind < kMinCompared) return;
   DynaInsRemover fresh(pooled_config(number));
   require(play(stream, fresh) == digest, "reset brings back the state after construction");
 }

@@ -500,7 +500,7 @@ TEST_CASE("Compressed blocks are decompressed to the announced size, and to no o
     CHECK(std::string(output.begin(), output.end()) == text);
     CHECK_FALSE(decompressed(method, bytes, text.size() - 1).empty());
     CHECK_FALSE(decompressed(method, bytes, std::uint64_t{1} << 40U).empty());
-    CHECK(output.capacity() <= most_decompressed(bytes.size()));
+    CHECK(output.capacity() <= max_decompressed(bytes.size()));
     CHECK_FALSE(decompressed(method, bytes.substr(0, bytes.size() - 1), text.size()).empty());
     CHECK_FALSE(decompressed(method, "12345678", 100).empty());
     CHECK_FALSE(decompressed(method, "", 100).empty());

@@ -53,9 +53,9 @@ class Recorder {
   }
   template <class Visit>
   void for_each_changed(Visit&& visit) const {
-    constexpr int kFarthest = 200;  // cells
-    for (int x = 0; x < kFarthest; ++x) {
-      for (int y = -kFarthest; y < kFarthest; ++y) {
+    constexpr int kMaxRange = 200;  // cells
+    for (int x = 0; x < kMaxRange; ++x) {
+      for (int y = -kMaxRange; y < kMaxRange; ++y) {
         const ChangedPlace* const place = places.changed(voxel_key(x, y, 0));
         if (place != nullptr) visit(*place);
       }

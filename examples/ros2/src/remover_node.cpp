@@ -58,10 +58,11 @@ class FixedParameters {
   }
   static void set_range(rcl_interfaces::msg::ParameterDescriptor& descriptor,
                         const ParameterText& text, std::int64_t) {
-    constexpr double kMost = 9e18;  // an integer of 64 bits holds it
+    constexpr double kMaxCount = 9e18;  // an integer of 64 bits holds it
     descriptor.integer_range.emplace_back();
-    descriptor.integer_range[0].from_value = static_cast<std::int64_t>(std::max(text.min, -kMost));
-    descriptor.integer_range[0].to_value = static_cast<std::int64_t>(std::min(text.max, kMost));
+    descriptor.integer_range[0].from_value =
+        static_cast<std::int64_t>(std::max(text.min, -kMaxCount));
+    descriptor.integer_range[0].to_value = static_cast<std::int64_t>(std::min(text.max, kMaxCount));
     descriptor.integer_range[0].step = 1;
   }
   template <class Value>

@@ -39,10 +39,10 @@ class FreeSpaceSum {
   /// `samples` are visible: less than 30 %, or less than two unless it has only one.
   static std::optional<float> free_ratio(std::uint32_t free, std::uint32_t hit,
                                          std::uint32_t samples) {
-    constexpr float kLeastVisible = 0.3F;
+    constexpr float kMinVisible = 0.3F;
     const auto visible = static_cast<float>(free + hit);
     const auto least = static_cast<float>(std::min(2U, samples));
-    if (free + hit == 0 || visible < std::max(least, kLeastVisible * static_cast<float>(samples))) {
+    if (free + hit == 0 || visible < std::max(least, kMinVisible * static_cast<float>(samples))) {
       return std::nullopt;
     }
     return static_cast<float>(free) / visible;

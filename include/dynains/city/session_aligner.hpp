@@ -15,20 +15,20 @@ namespace dynains {
 /// Registers scans of a session to planes and poles through the points of the map. Moving points
 /// have little weight (Geman-McClure), so scans need no verdicts. In each tile, the newest three
 /// sessions of the map count. The result depends on the scans, the start and these sessions alone.
-/// Memory: about 100 MB for kMostScans scans that lie far apart.
+/// Memory: about 100 MB for kMaxScans scans that lie far apart.
 class SessionAligner {
  public:
   /// More scans hardly improve the result.
-  static constexpr std::size_t kMostScans = 40;
-  static constexpr double kMostTranslation = 2.0;  ///< m, at the first scan in the map
-  static constexpr double kMostRotation = 5.0;     ///< deg
+  static constexpr std::size_t kMaxScans = 40;
+  static constexpr double kMaxTranslation = 2.0;  ///< m, at the first scan in the map
+  static constexpr double kMaxRotation = 5.0;     ///< deg
 
   explicit SessionAligner(const City& city) : city_(city) {}
 
   /// Adds one scan. `points`: m, sensor frame; points that are not finite are ignored.
   void add(PointsView points, const Pose& T_session_sensor);
 
-  /// Refines an estimate that is at most kMostTranslation and kMostRotation away. Throws
+  /// Refines an estimate that is at most kMaxTranslation and kMaxRotation away. Throws
   /// ConfigError, with the figures, if the map has no points there, or if the scans do not fit, fit
   /// at several places or leave a direction open; IoError.
   SessionAlignment align(const Pose& T_city_start) const;

@@ -53,7 +53,7 @@ class TileHistory {
   }
   /// Whether a reference of its own session passed through the block of a point at some time.
   bool own_beams_passed(std::size_t session, std::size_t point) const {
-    return part_of(session, point).most_own_level >= level_;
+    return part_of(session, point).max_own_level >= level_;
   }
   /// Whether a session before its own saw the place of a point free.
   bool was_free(std::size_t session, std::size_t point) const {
@@ -172,7 +172,7 @@ class TileHistory {
     std::uint32_t octants = 0;  // bits of those with points
     float level = 0.0F;         // log-odds of being free
     float own_level = 0.0F;     // sum of its own session, never below zero
-    float most_own_level = 0.0F;
+    float max_own_level = 0.0F;
     std::uint32_t component = kNoIndex;  // kNoIndex: ground
     std::uint32_t removed_by = kNever;
     std::uint8_t own_hits = 0;  // references of its own session that hit
@@ -195,7 +195,7 @@ class TileHistory {
     part.level += step;
     if (part.session != tested_count_) return;
     part.own_level = std::max(0.0F, part.own_level + step);
-    part.most_own_level = std::max(part.most_own_level, part.own_level);
+    part.max_own_level = std::max(part.max_own_level, part.own_level);
     if (!is_free && part.own_hits < 255) ++part.own_hits;
   }
 

@@ -74,13 +74,13 @@ class OccupancyDescriptor {
     void validate() const {
       validate_parameters("OccupancyDescriptor", *this);
       // Largest possible grid: a cluster around the sensor with the largest cluster_range.
-      constexpr double kFarthest = 1000.0;  // m
+      constexpr double kMaxRange = 1000.0;  // m
       constexpr double kMaxCells = 1 << 26;
-      const double cells = 360.0 / cell_azimuth * (kFarthest / cell_range);
+      const double cells = 360.0 / cell_azimuth * (kMaxRange / cell_range);
       if (!(cells <= kMaxCells)) {
         throw ConfigError("OccupancyDescriptor: cell_range = " + std::to_string(cell_range) +
                           " and cell_azimuth = " + std::to_string(cell_azimuth) + " make " +
-                          std::to_string(cells) + " cells up to " + std::to_string(kFarthest) +
+                          std::to_string(cells) + " cells up to " + std::to_string(kMaxRange) +
                           " m; at most " + std::to_string(kMaxCells) + " are possible");
       }
     }

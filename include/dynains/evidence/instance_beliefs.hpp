@@ -113,8 +113,8 @@ struct InstanceBeliefs {
     std::uint32_t stood() const { return decided - moved; }
     /// Whether enough samples are known, and none of them moved.
     bool stands_still() const {
-      constexpr float kLeastKnown = 0.3F;  // ratio of known to all samples
-      return moved == 0 && static_cast<float>(decided) >= kLeastKnown * static_cast<float>(total);
+      constexpr float kMinKnown = 0.3F;  // ratio of known to all samples
+      return moved == 0 && static_cast<float>(decided) >= kMinKnown * static_cast<float>(total);
     }
   };
 
@@ -189,7 +189,7 @@ class InstanceBeliefUpdater {
   }
 
  private:
-  static constexpr float kLeastVisible = 0.25F;      // ratio of visible samples of an instance
+  static constexpr float kMinVisible = 0.25F;        // ratio of visible samples of an instance
   static constexpr float kPartWeight = 0.5F;         // of a reference that passes a small part
   static constexpr std::uint8_t kTurnsByChance = 4;  // hit, free, hit, free, hit
 
@@ -199,7 +199,7 @@ class InstanceBeliefUpdater {
     return {samples, free ? samples : 0, free || belief.hits != 0 ? samples : 0};
   }
 
-  // `visible`: its samples, at most Visibility::kMostBits, which
+  // `visible`: its samples, at most Visibility::kMaxBits, which
   // FreeSpaceConfig::supervoxel_samples ensures. `weight`: of free samples, see update(). `counts`:
   // of its instance.
   void update_supervoxel(const Visibility::Bits& visible, std::uint32_t samples, float weight,
@@ -217,7 +217,7 @@ class InstanceBeliefUpdater {
   float update_instance(const Visibility::Count& all, const InstanceViews::Position& reference,
                         std::size_t instance, InstanceBeliefs& beliefs) const {
     const auto visible = static_cast<float>(all.free + all.hit);
-    const float least = kLeastVisible * static_cast<float>(beliefs.counts[instance].total);
+    const float least = kMinVisible * static_cast<float>(beliefs.counts[instance].total);
     const float free_ratio = visible >= least ? static_cast<float>(all.free) / visible : 0.0F;
     const bool is_hit = free_ratio <= FreeSpaceSum::kHitRatio;
     const float weight = is_hit ? kPartWeight : 1.0F;

@@ -19,9 +19,9 @@ namespace dynains::detail {
 /// Finds groups of supervoxels that are connected in the 26-neighbourhood.
 class SupervoxelGroups {
  public:
-  /// Removes supervoxels from `members` whose group has fewer than `least_samples` samples, and
+  /// Removes supervoxels from `members` whose group has fewer than `min_samples` samples, and
   /// reorders the rest. `members`: supervoxels of one instance.
-  void keep_large(const InstanceSamples& samples, std::size_t least_samples,
+  void keep_large(const InstanceSamples& samples, std::size_t min_samples,
                   std::vector<std::uint32_t>& members) {
     if (members.empty()) return;
     places_.clear();
@@ -37,7 +37,7 @@ class SupervoxelGroups {
         count += samples.sample_begin[members[i] + 1] - samples.sample_begin[members[i]];
       }
       for (const std::uint32_t i : group) {
-        if (count >= least_samples) kept_.push_back(members[i]);
+        if (count >= min_samples) kept_.push_back(members[i]);
       }
     });
     members.swap(kept_);
@@ -83,7 +83,7 @@ class InstanceJudge {
         }
       } else {
         // Only a part of the instance is dynamic; small groups of free samples may be noise.
-        groups_.keep_large(samples, kLeastGroup, free_);
+        groups_.keep_large(samples, kMinGroup, free_);
       }
       for (const std::uint32_t s : free_) verdicts[s].cause = Cause::kFreeSpace;
     }
@@ -100,8 +100,8 @@ class InstanceJudge {
   }
 
  private:
-  static constexpr std::size_t kLeastGroup = 4;  // samples
-  static constexpr float kSurelyMoved = 0.7F;    // ratio of moved to decided samples of a track
+  static constexpr std::size_t kMinGroup = 4;  // samples
+  static constexpr float kSurelyMoved = 0.7F;  // ratio of moved to decided samples of a track
 
   static float moved_ratio(const InstanceEvidence& evidence, std::size_t instance) {
     return evidence.tracked.instances[instance].moved_ratio(evidence.beliefs.counts[instance]);
@@ -141,11 +141,11 @@ class InstanceJudge {
   // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
   // vehicle ahead, or a static object that came into view.
   bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
-    constexpr std::uint32_t kLeastSamples = 5;
+    constexpr std::uint32_t kMinSamples = 5;
     constexpr float kMaxDecided = 0.1F;  // ratio to all samples
     if (!presume_dynamic_ || !evidence.tracked.shapes[instance].carried) return false;
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-    return counts.total >= kLeastSamples &&
+    return counts.total >= kMinSamples &&
            static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);
   }
 

@@ -63,17 +63,17 @@ inline void find_cells(const InstanceSamples& samples, double cell, const Pose& 
   });
 }
 
-/// Selects samples of instances: in each supervoxel, up to `most_samples` points of the smallest
+/// Selects samples of instances: in each supervoxel, up to `max_samples` points of the smallest
 /// hashes of their coordinates. A supervoxel is the part of one instance in one voxel. The
 /// selection does not depend on the order of the points.
 class InstanceSampler {
  public:
   /// `supervoxel_size` (m): edge of the voxels. `max_range` (m): horizontal range beyond which
-  /// points get no sample. `most_samples`: maximum number of samples of a supervoxel, at least 1.
-  InstanceSampler(double supervoxel_size, double max_range, std::uint32_t most_samples)
+  /// points get no sample. `max_samples`: maximum number of samples of a supervoxel, at least 1.
+  InstanceSampler(double supervoxel_size, double max_range, std::uint32_t max_samples)
       : supervoxels_per_metre_(static_cast<float>(1.0 / supervoxel_size)),
         max_range_(static_cast<float>(max_range)),
-        most_(most_samples) {}
+        most_(max_samples) {}
 
   /// Bits of the points, of up to 64 `points`, that lie in another voxel than their predecessor.
   /// The first bit is always set.

@@ -126,7 +126,7 @@ class InstanceLinker {
   };
 
   static constexpr std::size_t kTable = 1U << 14;
-  static constexpr std::uint32_t kLeastSamples = 2;  // a single sample may overlap by chance
+  static constexpr std::uint32_t kMinSamples = 2;  // a single sample may overlap by chance
 
   // The hash does not include the instance, so that equal cells of two scans share a slot.
   std::uint32_t& slot_of(const Cell& cell) {
@@ -144,7 +144,7 @@ class InstanceLinker {
     shape.length = std::hypot(size.x(), size.y());
     shape.height = size.z();
     shape.carried =
-        end - begin >= kLeastSamples && shape.length <= max_length_ && shape.height <= max_height_;
+        end - begin >= kMinSamples && shape.length <= max_length_ && shape.height <= max_height_;
   }
 
   void connect(TrackedInstances& before, std::uint32_t from, TrackedInstances& now,

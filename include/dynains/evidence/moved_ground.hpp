@@ -74,20 +74,20 @@ class SurroundingGround {
 
   // Few points, or points on a line, do not define a plane.
   std::optional<Plane> plane_around(VoxelKey place) const {
-    constexpr double kLeastPoints = 8.0;
-    constexpr double kLeastVariance = 0.4;  // m^2, along any horizontal direction
+    constexpr double kMinPoints = 8.0;
+    constexpr double kMinVariance = 0.4;  // m^2, along any horizontal direction
     PlaneMoments sum;
     for (int i = 0; i < 9; ++i) {
       const std::uint32_t beside = numbers_.find(place + voxel_key_step(i % 3 - 1, i / 3 - 1, 0));
       if (beside != kNoIndex) sum += cells_[beside].moments;
     }
-    if (sum.count < kLeastPoints) return std::nullopt;
+    if (sum.count < kMinPoints) return std::nullopt;
     const double xx = variance_along(sum, {1.0, 0.0, 0.0});
     const double yy = variance_along(sum, {0.0, 1.0, 0.0});
     const double xy = variance_along(sum, {M_SQRT1_2, M_SQRT1_2, 0.0}) - 0.5 * (xx + yy);
     const double half = 0.5 * (xx - yy);
     const double least = 0.5 * (xx + yy) - std::sqrt(half * half + xy * xy);
-    return least >= kLeastVariance ? std::optional(fit_plane(sum)) : std::nullopt;
+    return least >= kMinVariance ? std::optional(fit_plane(sum)) : std::nullopt;
   }
 
   VoxelHashTable<> numbers_;  // of the cells
@@ -105,7 +105,7 @@ class MovedGround {
       : removes_footprint_(config.footprint > 0.0),
         rise_(static_cast<float>(config.footprint_rise)),
         belief_(static_cast<float>(config.tau_free)),
-        footprint_(std::max(config.footprint, kLeastCell),
+        footprint_(std::max(config.footprint, kMinCell),
                    removes_footprint_ ? config.evidence_range : 0.0) {}
 
   void adapt(const SensorModel& sensor) {
@@ -147,9 +147,9 @@ class MovedGround {
   }
 
  private:
-  static constexpr double kLeastCell = 0.1;       // m, smallest cell of the footprint
-  static constexpr std::uint32_t kLeastFree = 2;  // "free" references of a moved voxel
-  static constexpr float kLeastRatio = 0.3F;      // "free" to "hit" references of a moved voxel
+  static constexpr double kMinCell = 0.1;       // m, smallest cell of the footprint
+  static constexpr std::uint32_t kMinFree = 2;  // "free" references of a moved voxel
+  static constexpr float kMinRatio = 0.3F;      // "free" to "hit" references of a moved voxel
 
   // Removes the ground points under removed points that rise above the surrounding ground (the foot
   // of an object), or whose surrounding ground is unknown.
@@ -219,9 +219,8 @@ class MovedGround {
     moved_.assign(ground.size() + 2, 0);
     for (std::size_t sample = 0; sample < ground.size(); ++sample) {
       const std::uint8_t free = ground.free[sample];
-      const bool moved =
-          free >= kLeastFree &&
-          static_cast<float>(free) >= kLeastRatio * static_cast<float>(ground.hit[sample]);
+      const bool moved = free >= kMinFree && static_cast<float>(free) >=
+                                                 kMinRatio * static_cast<float>(ground.hit[sample]);
       moved_[sample + 1] = moved ? 1 : 0;
       any |= moved;
     }

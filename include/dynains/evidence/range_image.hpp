@@ -47,8 +47,8 @@ class RangeImage {
     std::vector<std::int16_t> nearest;         // by cell: its range
     std::vector<std::int16_t> objects, wider;  // by cell: nearest static object, see widen()
     std::vector<std::int16_t> below, gap;      // by column, see close_holes()
-    std::vector<std::int16_t> least, least_moving, count;  // by column, see merge_three_rows()
-    std::vector<std::int16_t> border;                      // row of kNothing
+    std::vector<std::int16_t> least, min_moving, count;  // by column, see merge_three_rows()
+    std::vector<std::int16_t> border;                    // row of kNothing
   };
 
   const Cell& operator[](std::size_t cell) const { return cells_[cell]; }
@@ -94,7 +94,7 @@ class RangeImage {
   }
 
  private:
-  static constexpr float kFarthest = 320.0F;  // m
+  static constexpr float kMaxRange = 320.0F;  // m
 
   static constexpr std::int32_t kNoReturn = kNothing << 16 | kCentre;
 
@@ -104,8 +104,8 @@ class RangeImage {
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int32_t* nearest) {
     const ImageLocator locator(grid);
-    static constexpr detail::PackConstant kMost(kFarthest), kScale(kCentimetres), kFine(kPlaces),
-        kFirst(0.0F), kLast(kPlaces - 1);
+    static constexpr detail::PackConstant kMaxCount(kMaxRange), kScale(kCentimetres),
+        kFine(kPlaces), kFirst(0.0F), kLast(kPlaces - 1);
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
       using Float = typename Packs::Float;
@@ -123,7 +123,7 @@ class RangeImage {
           const auto byte = [](const Float& within) {
             return truncate(max(min(within * kFine, Float(kLast)), Float(kFirst)));
           };
-          const Int centimetres = truncate(min(metres, Float(kMost)) * kScale) & Int(~kMoving);
+          const Int centimetres = truncate(min(metres, Float(kMaxCount)) * kScale) & Int(~kMoving);
           located.cell.store(&cell[place.begin]);
           ((centimetres << 16) + (byte(located.column) << 8) + byte(located.row))
               .store(&value[place.begin]);
@@ -223,7 +223,7 @@ class RangeImage {
     const std::size_t stride = grid.stride();
     const auto rows = static_cast<std::size_t>(grid.rows);
     scratch.least.resize(stride);
-    scratch.least_moving.resize(stride);
+    scratch.min_moving.resize(stride);
     scratch.count.resize(stride);
     for (std::size_t row = 0; row < rows; ++row) {
       wrap(&scratch.nearest[row * stride], static_cast<std::size_t>(grid.columns));
@@ -254,7 +254,7 @@ class RangeImage {
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
     const std::int16_t* const high = row_of(scratch.nearest, row + 1, grid, scratch);
     std::int16_t* const leasts = scratch.least.data();
-    std::int16_t* const moving_leasts = scratch.least_moving.data();
+    std::int16_t* const moving_leasts = scratch.min_moving.data();
     std::int16_t* const counts = scratch.count.data();
     for (std::size_t column = 0; column < stride; column += detail::kShortPackWidth) {
       const Short below = Short::load(low + column);
@@ -285,7 +285,7 @@ class RangeImage {
     const std::size_t stride = grid.stride();
     const std::int16_t* const middle = row_of(scratch.nearest, row, grid, scratch);
     const std::int16_t* const leasts = scratch.least.data();
-    const std::int16_t* const moving_leasts = scratch.least_moving.data();
+    const std::int16_t* const moving_leasts = scratch.min_moving.data();
     const std::int16_t* const counts = scratch.count.data();
     Cell* const cells = &cells_[row * stride];
     for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < stride;
@@ -314,7 +314,7 @@ class RangeImage {
     detail::with_packs([&](auto packs) {
       for (int cells = 1; cells <= kWidest; ++cells) {
         const float farthest = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
-        const auto limit = static_cast<std::int16_t>(std::min(farthest, kFarthest) * kCentimetres);
+        const auto limit = static_cast<std::int16_t>(std::min(farthest, kMaxRange) * kCentimetres);
         for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
           widen_row<typename decltype(packs)::Short>(grid, row, limit, cells > 1, scratch);
         }

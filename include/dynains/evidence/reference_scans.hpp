@@ -134,7 +134,7 @@ class ReferenceScans {
     is_level_ = sensors.size() == 1 && sensors[0].is_level();
     int scans = 1;
     for (const SensorModel& sensor : sensors) {
-      scans = std::max(scans, scans_to_see_things(sensor, kMostScans));
+      scans = std::max(scans, scans_to_see_things(sensor, kMaxScans));
     }
     if (scans != scans_) forget();
     scans_ = scans;
@@ -221,7 +221,7 @@ class ReferenceScans {
   }
 
  private:
-  static constexpr int kMostScans = 10;  // of a reference
+  static constexpr int kMaxScans = 10;  // of a reference
 
   float lateral_margin() const { return static_cast<float>(config_.lateral_margin); }
 

@@ -61,7 +61,7 @@ class Visibility {
 
   /// Most samples of bits(): a word that begins with the byte of a bit contains at least as many
   /// bits from this bit on.
-  static constexpr std::size_t kMostBits = 56;
+  static constexpr std::size_t kMaxBits = 56;
   struct Count {
     std::uint32_t free = 0;
     std::uint32_t hit = 0;
@@ -72,7 +72,7 @@ class Visibility {
 
     Count count() const { return {count_ones(free), count_ones(hit)}; }
   };
-  /// Bits of the samples in [begin, end), at most kMostBits; the lowest one is that of sample
+  /// Bits of the samples in [begin, end), at most kMaxBits; the lowest one is that of sample
   /// `begin`.
   Bits bits(std::size_t begin, std::size_t end) const {
     const std::uint64_t all = (std::uint64_t{1} << (end - begin)) - 1;
@@ -81,8 +81,8 @@ class Visibility {
   /// Numbers of free and hit samples in [begin, end).
   Count count(std::size_t begin, std::size_t end) const {
     Count sum;
-    for (; begin < end; begin += kMostBits) {
-      const Count some = bits(begin, std::min(begin + kMostBits, end)).count();
+    for (; begin < end; begin += kMaxBits) {
+      const Count some = bits(begin, std::min(begin + kMaxBits, end)).count();
       sum.free += some.free;
       sum.hit += some.hit;
     }
@@ -112,7 +112,7 @@ class Visibility {
 /// Largest lateral distance (m) from a sample to a beam that passes it: the error of poses and
 /// points, and the width of a beam at its range.
 struct BeamReach {
-  static constexpr float kLeast = 0.05F;   ///< m
+  static constexpr float kMin = 0.05F;     ///< m
   static constexpr float kSlope = 0.004F;  ///< m per m of range
 };
 
@@ -169,7 +169,7 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
     const RangeImage::Beam* const beams = image.beams();
     const Float scale(to_centimetres), least(base), slope_per_metre(growth);
     const Float cell_width(width), cell_height(height);
-    static constexpr PackConstant kLeast(BeamReach::kLeast), kSlope(BeamReach::kSlope),
+    static constexpr PackConstant kMin(BeamReach::kMin), kSlope(BeamReach::kSlope),
         kStep(1.0F / RangeImage::kPlaces), kHalf(0.5F / RangeImage::kPlaces);
     // All cells of a block are prefetched before the first is used, since an image is larger than
     // the inner caches.
@@ -213,7 +213,7 @@ inline void test_visibility(const RangeImage& image, const Pose& T_reference_sam
             (within(place >> 8) - Float::load(&columns[i])) * Float::load(&across[i]);
         const Float above = (within(place & Int(RangeImage::kPlaces - 1)) - Float::load(&rows[i])) *
                             (metres * cell_height);
-        const Float reach = metres * Float(kSlope) + Float(kLeast);
+        const Float reach = metres * Float(kSlope) + Float(kMin);
         compare_ranges<Packs>(both, Int(0) < Int::load(&cell[i]),
                               aside * aside + above * above <= reach * reach, metres * scale,
                               metres * slope_per_metre + least, bits.free[(begin + i) / 8],

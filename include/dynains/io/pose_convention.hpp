@@ -20,8 +20,8 @@ enum class PoseFrame {
 constexpr std::array<const char*, 3> value_names(PoseFrame) { return {"auto", "lidar", "camera"}; }
 
 /// Range of PoseConvention::scale.
-inline constexpr double kLeastPoseScale = 0.1;
-inline constexpr double kLargestPoseScale = 10.0;
+inline constexpr double kMinPoseScale = 0.1;
+inline constexpr double kMaxPoseScale = 10.0;
 
 /// Conversion of the rows of a pose file to poses of the sensor in the world frame, m. By default,
 /// rows are used without conversion.

@@ -46,11 +46,11 @@ struct RecordingOptions {
   std::filesystem::path times;  ///< file with one time per scan, s; empty: search the recording
   PointFrame frame = PointFrame::kAuto;
   PoseConvention convention;
-  double time_offset = 0.0;           ///< s; a scan at time t has the pose at t + time_offset
-  double pose_gap = kLongestPoseGap;  ///< s, longest interval between poses for interpolation
-  std::string cloud_topic;            ///< for logs; empty: the only topic of clouds
-  std::string cloud_frame;            ///< for logs: of the clouds that count; empty: the only one
-  std::string pose_topic;             ///< for logs; empty: the only topic of poses
+  double time_offset = 0.0;       ///< s; a scan at time t has the pose at t + time_offset
+  double pose_gap = kMaxPoseGap;  ///< s, longest interval between poses for interpolation
+  std::string cloud_topic;        ///< for logs; empty: the only topic of clouds
+  std::string cloud_frame;        ///< for logs: of the clouds that count; empty: the only one
+  std::string pose_topic;         ///< for logs; empty: the only topic of poses
   std::string pose_frame;  ///< for logs: fixed frame of transforms; empty: root of their tree
   std::string scene;       ///< for nuScenes: name of the scene; empty: the only one
   /// Whether points are moved to the sensor frame at the time of their scan. Needs a time for each

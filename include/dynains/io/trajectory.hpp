@@ -50,12 +50,12 @@ struct TrajectoryMatch {
 };
 
 /// Default of the longest interval between two poses for interpolation, s.
-inline constexpr double kLongestPoseGap = 1.0;
+inline constexpr double kMaxPoseGap = 1.0;
 
 /// Rows around `time` (s). Empty if the time is more than 5 ms outside of the trajectory, or within
 /// an interval longer than `longest_gap` (s).
 std::optional<TrajectoryMatch> match_time(const Trajectory& trajectory, double time,
-                                          double longest_gap = kLongestPoseGap);
+                                          double longest_gap = kMaxPoseGap);
 
 /// Interpolates linearly in translation and by slerp in rotation. `share`: [0, 1]; 0 gives exactly
 /// `a`, 1 exactly `b`.

@@ -71,8 +71,8 @@ class BlockTable {
   }
 
   void grow() {
-    constexpr std::size_t kFewest = 1024;
-    numbers_.assign(std::max(kFewest, 2 * numbers_.size()), kNoIndex);
+    constexpr std::size_t kMin = 1024;
+    numbers_.assign(std::max(kMin, 2 * numbers_.size()), kNoIndex);
     std::uint32_t number = 0;
     for (const MapBlock& block : blocks_) numbers_[slot_of(block.index)] = number++;
   }

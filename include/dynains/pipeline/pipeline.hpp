@@ -69,7 +69,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
         decision_(make_decision<Stages>(config, other_.get())),
         finishes_later_(other_ && decision_->latency() > 0),
         map_(config.map),
-        scans_(std::max({decision_->window_length(), latency() + 1, kFewestSlots})) {}
+        scans_(std::max({decision_->window_length(), latency() + 1, kMinSlots})) {}
   // Not copyable: window_ refers to memory of clusterer_.
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
@@ -168,7 +168,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   }
 
  private:
-  static constexpr std::size_t kFewestSlots = 2;  // ids are propagated from the previous scan
+  static constexpr std::size_t kMinSlots = 2;  // ids are propagated from the previous scan
 
   static const Config& validated(const Config& config) {
     config.validate();

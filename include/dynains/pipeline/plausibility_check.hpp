@@ -17,10 +17,10 @@ class ScanRate {
  public:
   /// `interval`: s since the previous scan. `max_gap`: RemoverConfig::max_gap, s.
   TimeDoubt add(double interval, double max_gap) {
-    constexpr std::size_t kEnough = 3;  // intervals; a pause is one
-    constexpr double kShortest = 1e-3;  // s
+    constexpr std::size_t kEnough = 3;   // intervals; a pause is one
+    constexpr double kMinLength = 1e-3;  // s
     slow_ = interval > max_gap ? slow_ + 1 : 0;
-    fast_ = interval < kShortest ? fast_ + 1 : 0;
+    fast_ = interval < kMinLength ? fast_ + 1 : 0;
     if (slow_ >= kEnough) return TimeDoubt::kTooSlow;
     return fast_ >= kEnough ? TimeDoubt::kTooFast : TimeDoubt::kNone;
   }
@@ -33,11 +33,11 @@ class ScanRate {
 /// behind the bounds.
 class PlausibilityCheck {
  public:
-  static constexpr float kMostUnjudged = 0.98F;
-  static constexpr float kMostGroundFree = 0.35F, kMostInstanceFree = 0.5F;  // each alone
-  static constexpr float kGroundFree = 0.12F, kInstanceFree = 0.2F;          // together
-  static constexpr float kMostMisfits = 0.35F;
-  static constexpr float kMostResidual = 0.05F;  // m
+  static constexpr float kMaxUnjudged = 0.98F;
+  static constexpr float kMaxGroundFree = 0.35F, kMaxInstanceFree = 0.5F;  // each alone
+  static constexpr float kGroundFree = 0.12F, kInstanceFree = 0.2F;        // together
+  static constexpr float kMaxMisfits = 0.35F;
+  static constexpr float kMaxResidual = 0.05F;  // m
 
   struct Scan {
     std::uint64_t scan = 0;          ///< number of the push
@@ -64,10 +64,10 @@ class PlausibilityCheck {
   }
 
  private:
-  static constexpr double kMostCounted = 0.15;          // m, residual of one jump
-  static constexpr std::size_t kWindow = 10;            // scans
-  static constexpr std::uint64_t kFewestBeams = 300;    // for a share of the ground
-  static constexpr std::uint64_t kFewestSamples = 500;  // for a share of instances
+  static constexpr double kMaxCounted = 0.15;        // m, residual of one jump
+  static constexpr std::size_t kWindow = 10;         // scans
+  static constexpr std::uint64_t kMinBeams = 300;    // for a share of the ground
+  static constexpr std::uint64_t kMinSamples = 500;  // for a share of instances
 
   static float ratio(std::uint64_t part, std::uint64_t whole, std::uint64_t fewest) {
     return whole < fewest ? 0.0F : static_cast<float>(part) / static_cast<float>(whole);
@@ -87,15 +87,15 @@ class PlausibilityCheck {
       judged += scan.judged;
       misfits += scan.is_misfit ? 1 : 0;
       residuals += scan.residual ? 1 : 0;
-      residual += std::min(scan.residual.value_or(0.0), kMostCounted);
+      residual += std::min(scan.residual.value_or(0.0), kMaxCounted);
     }
     // A fault of the recording is in all scans, the sway of a shock in one.
     sum.ground_free -= most->ground_free;
     sum.ground_hit -= most->ground_hit;
     Plausibility result;
     result.not_judged = ratio(points - judged, points, 1);
-    result.ground_free = ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kFewestBeams);
-    result.instance_free = ratio(sum.instances_free, sum.instances_decided, kFewestSamples);
+    result.ground_free = ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kMinBeams);
+    result.instance_free = ratio(sum.instances_free, sum.instances_decided, kMinSamples);
     result.misfits = ratio(misfits, count, kWindow);
     if (2 * residuals >= kWindow) {
       result.residual = static_cast<float>(residual / static_cast<double>(residuals));
@@ -105,10 +105,10 @@ class PlausibilityCheck {
 
   Suspicion judge(const Plausibility& window) const {
     if (count_ < kWindow) return Suspicion::kNone;
-    if (window.not_judged > kMostUnjudged) return Suspicion::kUnits;
-    if (window.misfits > kMostMisfits || window.residual > kMostResidual) return Suspicion::kPoses;
-    const bool is_free = window.ground_free > kMostGroundFree ||
-                         window.instance_free > kMostInstanceFree ||
+    if (window.not_judged > kMaxUnjudged) return Suspicion::kUnits;
+    if (window.misfits > kMaxMisfits || window.residual > kMaxResidual) return Suspicion::kPoses;
+    const bool is_free = window.ground_free > kMaxGroundFree ||
+                         window.instance_free > kMaxInstanceFree ||
                          (window.ground_free > kGroundFree && window.instance_free > kInstanceFree);
     return is_free ? Suspicion::kRays : Suspicion::kNone;
   }

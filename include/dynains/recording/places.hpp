@@ -298,8 +298,8 @@ class RecordingPlaces {
   /// Ends the last observation and decides on all places and objects: components of touching
   /// changed places that are large enough and not part of a static object. No test may follow.
   void decide() {
-    constexpr std::size_t kFewest = 6;    // places
-    constexpr double kMostContact = 1.5;  // unchanged places that touch it, ratio to its own places
+    constexpr std::size_t kMin = 6;      // places
+    constexpr double kMaxContact = 1.5;  // unchanged places that touch it, ratio to its own places
     end_observation();
     VoxelTile<Place> found;
     tiles_.for_each_index([&](const TileIndex& index) {
@@ -320,8 +320,7 @@ class RecordingPlaces {
             });
           }
           const auto size = static_cast<double>(members.size());
-          if (members.size() < kFewest ||
-              static_cast<double>(contacts.size()) > kMostContact * size)
+          if (members.size() < kMin || static_cast<double>(contacts.size()) > kMaxContact * size)
             return;
           for (const std::uint32_t member : members) {
             const Place& place = found.values[member];
@@ -390,10 +389,10 @@ class RecordingPlaces {
   }
   // Null: there are too few ground points in the column of a cell.
   const GroundColumn* find_ground(VoxelKey cell) {
-    constexpr std::uint32_t kFewest = 20;
+    constexpr std::uint32_t kMin = 20;
     const Tile* const tile = tiles_.find(tile_of(cell));
     const GroundColumn* const found = tile == nullptr ? nullptr : &tile->ground[Tile::column(cell)];
-    return found == nullptr || found->count < kFewest ? nullptr : found;
+    return found == nullptr || found->count < kMin ? nullptr : found;
   }
 
   PagedTiles<Tile> tiles_;

@@ -133,9 +133,9 @@ struct RecordingReference {
 /// some scans away from the latest reference. The grid of all images is that of the first scan.
 class RecordingReferences {
  public:
-  /// `most_scans`: from one reference to the next. `lateral_margin`: m, of FreeSpaceConfig.
-  RecordingReferences(std::uint32_t most_scans, double lateral_margin)
-      : most_scans_(most_scans), lateral_margin_(lateral_margin) {}
+  /// `max_scans`: from one reference to the next. `lateral_margin`: m, of FreeSpaceConfig.
+  RecordingReferences(std::uint32_t max_scans, double lateral_margin)
+      : max_scans_(max_scans), lateral_margin_(lateral_margin) {}
 
   /// The grid of the images; without rows until the first scan with a known sensor.
   const RangeImageGrid& grid() const { return grid_; }
@@ -148,7 +148,7 @@ class RecordingReferences {
     constexpr double kWay = 1.0;  // m
     const Eigen::Vector3d position = T_world_sensor.translation();
     const bool is_near = latest_ && (position - *latest_).norm() < kWay;
-    if (is_near && scan - reference_.scan < most_scans_) return nullptr;
+    if (is_near && scan - reference_.scan < max_scans_) return nullptr;
     split(points, verdicts);
     if (grid_.rows == 0) {
       const SensorModel sensor =
@@ -195,7 +195,7 @@ class RecordingReferences {
     split_.count = count;
   }
 
-  std::uint32_t most_scans_;
+  std::uint32_t max_scans_;
   double lateral_margin_;  // m
   RangeImageGrid grid_;
   std::optional<Eigen::Vector3d> latest_;  // m, position of the sensor, world frame

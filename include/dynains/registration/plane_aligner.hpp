@@ -21,7 +21,7 @@ namespace dynains::detail {
 /// ones.
 template <class Visit>
 void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
-  constexpr double kNearest = 3.0, kFarthest = 50.0;  // m, horizontal
+  constexpr double kMinRange = 3.0, kMaxRange = 50.0;  // m, horizontal
   const std::size_t step = split.count / wanted + 1;
   std::uint32_t random = 1;
   for (std::size_t begin = 0; begin < split.count; begin += step) {
@@ -31,16 +31,16 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
     const double x = static_cast<double>(split.points.x[i]);
     const double y = static_cast<double>(split.points.y[i]);
     const double squared = x * x + y * y;
-    if (squared < kNearest * kNearest || squared > kFarthest * kFarthest) continue;
+    if (squared < kMinRange * kMinRange || squared > kMaxRange * kMaxRange) continue;
     visit(i, x, y, static_cast<double>(split.points.z[i]));
   }
 }
 
-/// At most kMost points of a scan (m, sensor frame), each with a flag for objects that are small
-/// enough to be vehicles or persons.
+/// At most kMaxCount points of a scan (m, sensor frame), each with a flag for objects that are
+/// small enough to be vehicles or persons.
 class AlignmentPoints {
  public:
-  static constexpr std::size_t kMost = 3000;
+  static constexpr std::size_t kMaxCount = 3000;
 
   /// Points on instances of at most this horizontal diagonal and height (m) are on objects.
   AlignmentPoints(double longest_object, double highest_object)
@@ -50,7 +50,7 @@ class AlignmentPoints {
     points_.clear();
     instance_of_.clear();
     boxes_.assign(instances.count, Eigen::AlignedBox3d());
-    visit_some(split, kMost, [&](std::size_t i, double x, double y, double z) {
+    visit_some(split, kMaxCount, [&](std::size_t i, double x, double y, double z) {
       points_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
       const bool has_instance = i >= split.ground_count && !instances.of_point.empty();
       const std::uint32_t instance =
@@ -141,7 +141,7 @@ class NormalEquations {
   const Vector& right() const { return right_; }
 
   /// Mean square of the distances, m^2.
-  double variance() const { return squares_ / std::max(weights_, kLeastWeight); }
+  double variance() const { return squares_ / std::max(weights_, kMinWeight); }
 
   /// Root mean square of the change of the distances by a step of the first unknowns, m.
   template <std::size_t kSteps>
@@ -151,7 +151,7 @@ class NormalEquations {
       for (std::size_t j = 0; j < i; ++j) sum += 2.0 * matrix_[i][j] * step[i] * step[j];
       sum += matrix_[i][i] * step[i] * step[i];
     }
-    return std::sqrt(std::max(sum, 0.0) / std::max(weights_, kLeastWeight));
+    return std::sqrt(std::max(sum, 0.0) / std::max(weights_, kMinWeight));
   }
 
   /// Solution. Each unknown must have an attraction.
@@ -169,7 +169,7 @@ class NormalEquations {
   }
 
  private:
-  static constexpr double kLeastWeight = 1e-12;  // against division by zero
+  static constexpr double kMinWeight = 1e-12;  // against division by zero
 
   Matrix with_attractions() const {
     Matrix all = matrix_;
@@ -235,7 +235,7 @@ class PlaneAligner {
   /// Forgets the errors of the sensor.
   void clear() {
     elevation_ = 0.0;
-    elevation_weight_ = kLeastWeight;
+    elevation_weight_ = kMinWeight;
   }
 
   /// Aligns points with planes, from a first estimate of the pose that is wrong by at most half a
@@ -246,7 +246,7 @@ class PlaneAligner {
     constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // edges, by iteration
     constexpr double kSmall = 0.01;                             // m, change by one iteration
     const double fine = 0.06 * planes.edge();                   // m
-    constexpr int kMostIterations = 3;
+    constexpr int kMaxIterations = 3;
     constexpr double kConverged = 0.002;  // m
     const PointsView points = selected.points();
     Vector found = {};
@@ -264,7 +264,7 @@ class PlaneAligner {
       if (equations.change(pose_step(step)) <= kSmall) break;  // left to the fine steps
       advance(step);
     }
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       find_planes(points, 1, planes, T, found);
       equations = sum_equations(fine, found, is_exact);
       if (advance(equations.solve()) <= kConverged) break;
@@ -294,11 +294,11 @@ class PlaneAligner {
   static constexpr double kUpright = 0.7;        // most z of the unit normal of a wall
   // Weights of the first estimate. They decide only in directions without information.
   static constexpr PoseStep kAttraction = {0.2, 0.2, 0.2, 100.0, 100.0, 100.0};
-  static constexpr double kLeastWeight = 8.0;  // of errors of the sensor: 0.4 deg, at 2 cm
-  static constexpr double kNone = 1e9;         // weight of an unknown that stays
-  static constexpr double kMemory = 0.97;      // of the weight of the elevation, by scan
-  static constexpr double kDeviations = 4.0;   // of a step that is half certain
-  static constexpr double kOfExact = 8.0;      // of one that shows that the pose is not exact
+  static constexpr double kMinWeight = 8.0;   // of errors of the sensor: 0.4 deg, at 2 cm
+  static constexpr double kNone = 1e9;        // weight of an unknown that stays
+  static constexpr double kMemory = 0.97;     // of the weight of the elevation, by scan
+  static constexpr double kDeviations = 4.0;  // of a step that is half certain
+  static constexpr double kOfExact = 8.0;     // of one that shows that the pose is not exact
 
   struct Match {
     VoxelPlanes::Plane* plane;
@@ -317,8 +317,8 @@ class PlaneAligner {
                    const Vector& found) {
     using Block = VoxelPlanes::Block;
     matches_.clear();
-    for (std::size_t begin = 0; begin < points.size(); begin += Block::kMost * step) {
-      const std::size_t end = std::min(points.size(), begin + Block::kMost * step);
+    for (std::size_t begin = 0; begin < points.size(); begin += Block::kMaxCount * step) {
+      const std::size_t end = std::min(points.size(), begin + Block::kMaxCount * step);
       Block block;
       for (std::size_t i = begin; i < end; i += step) {
         block.push_back(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
@@ -347,15 +347,15 @@ class PlaneAligner {
 
   // Calls `add(match, derivatives, weight)` for each match. `scale` (m): larger distances have
   // little weight (Geman and McClure 1987). The points of one plane share its error, so that all of
-  // them weigh at most as much as kMost points.
+  // them weigh at most as much as kMaxCount points.
   template <class Add>
   void weigh_matches(double scale, Add&& add) const {
-    constexpr double kMost = 8.0;
+    constexpr double kMaxCount = 8.0;
     for (const Match& match : matches_) {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
       const double loss = scale * scale / (scale * scale + match.distance * match.distance);
-      const double share = kMost / (kMost + static_cast<double>(match.plane->matches));
+      const double share = kMaxCount / (kMaxCount + static_cast<double>(match.plane->matches));
       add(match,
           Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
                  arm[0] * n[1] - arm[1] * n[0], match.errors[0], match.errors[1], match.errors[2]},
@@ -372,7 +372,7 @@ class PlaneAligner {
     for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -found[i], kAttraction[i]);
     equations.attract(6, -found[6], elevation_weight_);
     for (std::size_t i = 7; i < kUnknowns; ++i) {
-      equations.attract(i, -found[i], is_exact ? kLeastWeight : kNone);
+      equations.attract(i, -found[i], is_exact ? kMinWeight : kNone);
     }
     return equations;
   }
@@ -388,7 +388,7 @@ class PlaneAligner {
                       [](const Match& match) { return std::abs(match.distance) <= kInlier; }));
     const Equations::Matrix inverse = equations.inverse();
     elevation_ += found[6];
-    elevation_weight_ = std::max(kLeastWeight, kMemory / inverse[6][6]);
+    elevation_weight_ = std::max(kMinWeight, kMemory / inverse[6][6]);
     result.covariance = covariance_of(selected, equations, inverse, scale);
     PoseCovariance tested = result.covariance;
     if (is_exact && is_certain(result.found, tested)) {
@@ -436,11 +436,11 @@ class PlaneAligner {
 
   // Bands of equal sines of the elevation, 0.9 deg at the horizon. The outer ones have no end.
   static std::size_t band_of(float x, float y, float z) {
-    constexpr double kHighest = 0.5;  // sine
+    constexpr double kMaxSine = 0.5;  // sine
     const auto height = static_cast<double>(z);
     const double range = std::hypot(static_cast<double>(x), static_cast<double>(y), height);
     if (!(range > 0.0)) return 0;
-    const double place = (height / range + kHighest) / (2.0 * kHighest);  // [0, 1) within
+    const double place = (height / range + kMaxSine) / (2.0 * kMaxSine);  // [0, 1) within
     return static_cast<std::size_t>(
         std::min(std::max(place, 0.0) * kBands, static_cast<double>(kBands - 1)));
   }
@@ -511,7 +511,7 @@ class PlaneAligner {
   std::vector<Match> matches_;
   std::vector<Equations> groups_;  // parts of the equations
   double elevation_ = 0.0;         // rad, error of all elevations
-  double elevation_weight_ = kLeastWeight;
+  double elevation_weight_ = kMinWeight;
 };
 
 }  // namespace dynains::detail

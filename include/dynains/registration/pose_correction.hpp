@@ -35,7 +35,7 @@ class MotionPrediction {
   /// is known.
   std::optional<Pose> predict(const Pose& T_map_before) const {
     if (!T_before_newest_ || !(period_before_ > 0.0)) return std::nullopt;
-    const double ratio = std::min(period_ / period_before_, kMostRatio);
+    const double ratio = std::min(period_ / period_before_, kMaxRatio);
     return composed(T_map_before, scaled_motion(*T_before_newest_, ratio));
   }
 
@@ -69,7 +69,7 @@ class MotionPrediction {
   static constexpr double kAcceleration = 40.0;  // m/s^2
   static constexpr double kSlack = 0.1;          // m
   static constexpr double kOutlier = 5.0;        // ratio to the usual distance
-  static constexpr double kMostRatio = 10.0;
+  static constexpr double kMaxRatio = 10.0;
 
   // Distance (m) from the predicted pose that the strongest acceleration explains.
   double reached() const { return kAcceleration * period_ * 0.5 * (period_ + period_before_); }
@@ -147,8 +147,8 @@ class PoseCorrection final : public MotionStage {
 
  private:
   static constexpr std::size_t kInserted = 12000;  // points of a scan
-  static constexpr std::size_t kFewestMatches = 100;
-  static constexpr double kLeastInliers = 0.5;  // ratio to the matches
+  static constexpr std::size_t kMinMatches = 100;
+  static constexpr double kMinInliers = 0.5;  // ratio to the matches
 
   // Begins with a scan without planes. The motion goes on.
   void begin_planes(const Pose& T_world_level) {
@@ -169,9 +169,9 @@ class PoseCorrection final : public MotionStage {
     const PoseStep before = open_;
     open_ = {};
     const Alignment alignment = aligner_.align(selected_, planes_, T_guess, is_exact_);
-    if (alignment.matched < kFewestMatches) return;
+    if (alignment.matched < kMinMatches) return;
     if (static_cast<double>(alignment.inliers) <
-        kLeastInliers * static_cast<double>(alignment.matched)) {
+        kMinInliers * static_cast<double>(alignment.matched)) {
       misfit_ = EpochReason::kMisfit;
       return;
     }
@@ -209,8 +209,8 @@ class PoseCorrection final : public MotionStage {
   // fits anywhere.)
   void check_motion(const Pose& T_newest) {
     constexpr double kNear = 0.1, kNearDegrees = 0.5;  // m, deg
-    constexpr double kFewestPoints = 8.0;              // see PlaneAligner::upright_fit()
-    constexpr double kLeastRatio = 0.7;
+    constexpr double kMinPoints = 8.0;                 // see PlaneAligner::upright_fit()
+    constexpr double kMinRatio = 0.7;
     const Pose T_motion = composed(inverted(T_origin_newest_), T_newest);
     const std::optional<Pose> T_predicted = motion_.predict(T_origin_newest_);
     const PoseResidual error = T_predicted ? difference(*T_predicted, T_newest) : PoseResidual();
@@ -218,9 +218,8 @@ class PoseCorrection final : public MotionStage {
     bool has_jumped = is_impossible && !motion_.repeats_rejected(T_motion);
     if (!has_jumped && (error.translation > kNear || error.rotation > kNearDegrees)) {
       const double expected = aligner_.upright_fit(selected_.points(), planes_, *T_predicted);
-      has_jumped =
-          expected > kFewestPoints &&
-          aligner_.upright_fit(selected_.points(), planes_, T_newest) < kLeastRatio * expected;
+      has_jumped = expected > kMinPoints && aligner_.upright_fit(selected_.points(), planes_,
+                                                                 T_newest) < kMinRatio * expected;
     }
     if (has_jumped) misfit_ = EpochReason::kJump;
     if (misfit_) {

@@ -59,12 +59,12 @@ class VoxelPlanes {
 
   /// Some points, m. A block is looked up at once, so that its memory accesses overlap.
   struct Block {
-    static constexpr std::size_t kMost = 32;
-    double points[kMost][3];
-    SensorErrors errors[kMost];
+    static constexpr std::size_t kMaxCount = 32;
+    double points[kMaxCount][3];
+    SensorErrors errors[kMaxCount];
     std::size_t count = 0;
 
-    bool is_full() const { return count == kMost; }
+    bool is_full() const { return count == kMaxCount; }
     /// Adds the point (x, y, z) (m), transformed by `T`. The block must not be full.
     void push_back(const Pose& T, double x, double y, double z) {
       double(&point)[3] = points[count];
@@ -74,13 +74,13 @@ class VoxelPlanes {
   };
 
   /// Maximum number of voxels.
-  static constexpr std::size_t kMostVoxels = 24576;
+  static constexpr std::size_t kMaxVoxels = 24576;
 
   /// `edge`: of the voxels, m. Allocates the memory of a full map.
   explicit VoxelPlanes(double edge = 1.0) : edge_(edge), per_metre_(1.0 / edge) {
-    keys_.reserve(kMostVoxels);
-    moments_.reserve(kMostVoxels);
-    planes_.reserve(kMostVoxels);
+    keys_.reserve(kMaxVoxels);
+    moments_.reserve(kMaxVoxels);
+    planes_.reserve(kMaxVoxels);
   }
 
   double edge() const { return edge_; }
@@ -99,13 +99,13 @@ class VoxelPlanes {
       sensor_[static_cast<std::size_t>(axis)] = T_map_sensor(axis, 3);
     }
     ++scans_;
-    if (size() > kMostVoxels / 4 * 3) forget_oldest();
+    if (size() > kMaxVoxels / 4 * 3) forget_oldest();
   }
 
   /// Adds points of the current scan, and empties the block.
   void add(Block& block) {
-    VoxelKey keys[Block::kMost];
-    std::uint32_t numbers[Block::kMost];
+    VoxelKey keys[Block::kMaxCount];
+    std::uint32_t numbers[Block::kMaxCount];
     find_keys(block, keys);
     for (std::size_t i = 0; i < block.count; ++i) {
       numbers[i] = i > 0 && keys[i] == keys[i - 1] ? numbers[i - 1] : number_for(keys[i]);
@@ -122,8 +122,8 @@ class VoxelPlanes {
   /// Calls `visit(i, plane)` for each point of a block in a voxel with a plane.
   template <class Visit>
   void find(const Block& block, Visit&& visit) {
-    VoxelKey keys[Block::kMost];
-    std::uint32_t numbers[Block::kMost];
+    VoxelKey keys[Block::kMaxCount];
+    std::uint32_t numbers[Block::kMaxCount];
     find_keys(block, keys);
     for (std::size_t i = 0; i < block.count; ++i) {
       numbers[i] = table_.find(keys[i]);
@@ -141,12 +141,12 @@ class VoxelPlanes {
 
  private:
   // Fewer points lie on a plane by chance, for example in foliage.
-  static constexpr double kFewestPoints = 12.0;
-  static constexpr double kMostThickness = 0.06;  // standard deviation along the normal / edge
+  static constexpr double kMinPoints = 12.0;
+  static constexpr double kMaxThickness = 0.06;  // standard deviation along the normal / edge
 
-  static constexpr double kGrazing = 0.3;      // sine of the angle between beam and plane
-  static constexpr double kEdgeOn = 0.04;      // the same, of a plane that contains the beam
-  static constexpr double kLeastLength = 0.2;  // m, standard deviation along the beam
+  static constexpr double kGrazing = 0.3;    // sine of the angle between beam and plane
+  static constexpr double kEdgeOn = 0.04;    // the same, of a plane that contains the beam
+  static constexpr double kMinLength = 0.2;  // m, standard deviation along the beam
 
   // The points of a voxel, relative to its centre.
   struct Moments {
@@ -173,7 +173,7 @@ class VoxelPlanes {
 
   // Number of a voxel, which may be new; kNoIndex if the map is full. Prefetches its moments.
   std::uint32_t number_for(VoxelKey key) {
-    if (size() == kMostVoxels && table_.find(key) == kNoIndex) return kNoIndex;
+    if (size() == kMaxVoxels && table_.find(key) == kNoIndex) return kNoIndex;
     const std::uint32_t number = table_.insert(key);
     if (number == size()) {
       keys_.push_back(key);
@@ -205,7 +205,7 @@ class VoxelPlanes {
   Plane fit(VoxelKey key, const Moments& moments) const {
     Plane plane = {};
     plane.is_fitted = true;
-    if (moments.sums.count < kFewestPoints) return plane;
+    if (moments.sums.count < kMinPoints) return plane;
     const detail::Plane fitted = fit_plane(moments.sums);
     // Without the bias: the fit of three parameters takes up a part of the deviations.
     const double thickness_squared =
@@ -223,7 +223,7 @@ class VoxelPlanes {
             plane.normal[axis] * static_cast<double>(moments.errors[k][axis]) / moments.sums.count;
       }
     }
-    plane.is_flat = thickness_squared <= kMostThickness * kMostThickness * edge_ * edge_ &&
+    plane.is_flat = thickness_squared <= kMaxThickness * kMaxThickness * edge_ * edge_ &&
                     !is_trace_of_beam(plane, moments.sums);
     return plane;
   }
@@ -241,13 +241,13 @@ class VoxelPlanes {
     if (std::abs(across) < kEdgeOn * range) return true;
     const double length = std::sqrt(range * range - across * across);
     for (std::size_t k = 0; k < 3; ++k) beam[k] = (beam[k] - across * n[k]) / length;
-    return variance_along(points, beam) < kLeastLength * kLeastLength;
+    return variance_along(points, beam) < kMinLength * kMinLength;
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
   void forget_oldest() {
-    std::uint32_t age = kLongest;
-    while (count_since(age) > kMostVoxels / 2) age /= 2;
+    std::uint32_t age = kMaxLength;
+    while (count_since(age) > kMaxVoxels / 2) age /= 2;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size(); ++i) {
       if (scans_ - moments_[i].last_scan > age) continue;
@@ -268,13 +268,13 @@ class VoxelPlanes {
                       [&](const Moments& moments) { return scans_ - moments.last_scan <= age; }));
   }
 
-  static constexpr std::uint32_t kLongest = 64;  // scans
+  static constexpr std::uint32_t kMaxLength = 64;  // scans
 
   double edge_, per_metre_;
-  VoxelHashTable<> table_{kMostVoxels};  // numbers of the voxels
-  std::vector<VoxelKey> keys_;           // by voxel
-  std::vector<Moments> moments_;         // by voxel
-  std::vector<Plane> planes_;            // by voxel
+  VoxelHashTable<> table_{kMaxVoxels};  // numbers of the voxels
+  std::vector<VoxelKey> keys_;          // by voxel
+  std::vector<Moments> moments_;        // by voxel
+  std::vector<Plane> planes_;           // by voxel
   std::uint32_t scans_ = 0;
   std::array<double, 3> sensor_ = {};  // position at the newest scan, m
 };

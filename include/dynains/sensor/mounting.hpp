@@ -96,7 +96,7 @@ class MountingEstimator {
   /// The ground plane on the negative z side of the sensor (`side` 1), or on its positive z side
   /// (-1: mounted upside down). Empty if no plane is valid.
   std::optional<GroundHypothesis> find(double side) const {
-    if (cells_.size() < kFewestCells) return std::nullopt;
+    if (cells_.size() < kMinCells) return std::nullopt;
     const std::optional<GroundHypothesis> coarse = search(side);
     if (!coarse) return std::nullopt;
     GroundHypothesis ground = *coarse;
@@ -107,15 +107,15 @@ class MountingEstimator {
   }
 
  private:
-  static constexpr double kMaxDistance = 20.0;   // m; farther ground may lie in another plane
-  static constexpr double kCell = 0.5;           // m; one point per cell evens out the density
-  static constexpr double kMinDistance = 0.4;    // m; nearer points may lie on the housing
-  static constexpr double kLowest = 0.2;         // m, height of the sensor
-  static constexpr double kHighest = 5.0;        // m, height of the sensor
-  static constexpr double kLeastUpright = 0.64;  // cosine of a tilt of 50 deg
-  static constexpr double kOnGround = 0.12;      // m, largest distance of a ground cell
-  static constexpr double kBelow = 0.4;          // m; cells farther below contradict a plane
-  static constexpr std::size_t kFewestCells = 60;
+  static constexpr double kMaxDistance = 20.0;  // m; farther ground may lie in another plane
+  static constexpr double kCell = 0.5;          // m; one point per cell evens out the density
+  static constexpr double kMinDistance = 0.4;   // m; nearer points may lie on the housing
+  static constexpr double kMinHeight = 0.2;     // m, height of the sensor
+  static constexpr double kMaxHeight = 5.0;     // m, height of the sensor
+  static constexpr double kMinUpright = 0.64;   // cosine of a tilt of 50 deg
+  static constexpr double kOnGround = 0.12;     // m, largest distance of a ground cell
+  static constexpr double kBelow = 0.4;         // m; cells farther below contradict a plane
+  static constexpr std::size_t kMinCells = 60;
   static constexpr int kTrials = 3000;
   static constexpr std::size_t kScored = 2000;  // cells that score a plane
 
@@ -215,8 +215,8 @@ class MountingEstimator {
   }
 
   static bool is_possible(const GroundHypothesis& ground, double side) {
-    return ground.up.z() * side > kLeastUpright && ground.height > kLowest &&
-           ground.height < kHighest;
+    return ground.up.z() * side > kMinUpright && ground.height > kMinHeight &&
+           ground.height < kMaxHeight;
   }
 
   // Weighted least squares over the cells within `band` m of the plane. Near cells have a larger
@@ -249,7 +249,7 @@ class MountingEstimator {
       if (std::abs(distance) < kOnGround) ++on;
       if (distance < -kBelow) ++below;
     }
-    return on >= kFewestCells && on * 20 >= cells_.size() && below < on;
+    return on >= kMinCells && on * 20 >= cells_.size() && below < on;
   }
 
   std::vector<Eigen::Vector3d> cells_;  // m, sensor frame
@@ -348,7 +348,7 @@ class LevelFrame {
   bool is_new(Span<const std::size_t> counts) const {
     if (!sensor_.known()) return true;
     for (std::size_t i = 0; i < counts.size(); ++i) {
-      if (!is_seen_[i] && counts[i] >= kFewestOfSensor) return true;
+      if (!is_seen_[i] && counts[i] >= kMinOfSensor) return true;
     }
     return false;
   }
@@ -415,7 +415,7 @@ class LevelFrame {
     }
     const PointsView points = PointsView(own).subview(0, count);
     transform_points(points, PackTransform(inverted(T_scan_sensor)), own, 0);
-    is_seen_[i] = count >= kFewestOfSensor;
+    is_seen_[i] = count >= kMinOfSensor;
     SensorModel model = estimate_sensor_model(points);
     if (!model.known()) model = sensor_;
     const Eigen::Matrix3d R_level_cloud = sensor_.R_level_sensor();

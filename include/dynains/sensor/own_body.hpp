@@ -35,7 +35,7 @@ namespace detail {
 /// far from the sensor as a body may reach.
 class NearestReturns {
  public:
-  static constexpr float kFarthest = 4.5F;  // m, horizontal
+  static constexpr float kMaxRange = 4.5F;  // m, horizontal
 
   struct Return {
     float range = std::numeric_limits<float>::infinity();  // m
@@ -50,7 +50,7 @@ class NearestReturns {
     near_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const float x = points.x[i], y = points.y[i];
-      if (x * x + y * y < kFarthest * kFarthest) near_.push_back(x, y, points.z[i]);
+      if (x * x + y * y < kMaxRange * kMaxRange) near_.push_back(x, y, points.z[i]);
     }
     const BeamAngles angles = beam_angles(near_);
     nearest_.assign(by_direction_.size(), {});
@@ -183,8 +183,8 @@ inline double reach_of_body(std::vector<SteadyReturn> candidates) {
 /// memory and takes some tens of milliseconds, so call it once, before the first push: a stream
 /// cannot know it at its first scan.
 inline OwnBody estimate_own_body(const std::vector<PointBuffer>& scans) {
-  constexpr std::size_t kFewestScans = 8;
-  if (scans.size() < kFewestScans) return {};
+  constexpr std::size_t kMinScans = 8;
+  if (scans.size() < kMinScans) return {};
   const Mounting mounting = detail::usual_mounting(scans);
   detail::NearestReturns nearest(mounting);
   for (const PointBuffer& scan : scans) nearest.add(scan);

@@ -140,24 +140,24 @@ inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
 }  // namespace detail
 
 /// Points of a scan that estimate_sensor_model() asks for.
-inline constexpr std::size_t kFewestOfSensor = 500;
+inline constexpr std::size_t kMinOfSensor = 500;
 
 /// Estimates the angular sampling from one scan (m, sensor frame, finite coordinates). Sets the
 /// height of SensorModel::typical(); estimate_mounting() estimates the height. The result is not
-/// known() if the scan has fewer than kFewestOfSensor points, or no two points on one beam.
+/// known() if the scan has fewer than kMinOfSensor points, or no two points on one beam.
 /// Allocates memory, so call it for one scan of a sensor, not for each.
 inline SensorModel estimate_sensor_model(PointsView points) {
-  if (points.size() < kFewestOfSensor) return {};
-  constexpr double kBeamBand = 0.1;    // deg, range of the elevations of one beam
-  constexpr double kLeastStep = 0.01;  // deg
-  constexpr double kLeastGap = 0.08;   // deg, between beams
+  if (points.size() < kMinOfSensor) return {};
+  constexpr double kBeamBand = 0.1;  // deg, range of the elevations of one beam
+  constexpr double kMinStep = 0.01;  // deg
+  constexpr double kMinGap = 0.08;   // deg, between beams
   const detail::BeamAngles angles = detail::beam_angles(points);
   SensorModel model;
   model.height = SensorModel::typical().height;
   model.elevation_min = detail::percentile(angles.elevation, 0.0005);
   model.elevation_max = detail::percentile(angles.elevation, 0.9995);
   const std::vector<float> steps =
-      detail::gaps_in_bands(angles.elevation, angles.azimuth, kBeamBand, kLeastStep);
+      detail::gaps_in_bands(angles.elevation, angles.azimuth, kBeamBand, kMinStep);
   if (steps.empty()) return {};
   model.azimuth_step = std::clamp(detail::percentile(steps, 0.5), 0.05, 2.0);
   // Returns of one ring are closer together than those that are spread evenly.
@@ -168,7 +168,7 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     return model;
   }
   const std::vector<float> gaps =
-      detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, kLeastGap);
+      detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, kMinGap);
   const auto gap_at = [&](double ratio) {
     return gaps.empty() ? 1.0 : std::clamp(detail::percentile(gaps, ratio), 0.1, 5.0);
   };

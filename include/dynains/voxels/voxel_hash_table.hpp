@@ -135,8 +135,8 @@ class VoxelHashTable {
   }
 
   void grow() {
-    constexpr std::size_t kFewest = 64;
-    std::vector<Slot> old(slots_.empty() ? kFewest : 2 * slots_.size());
+    constexpr std::size_t kMin = 64;
+    std::vector<Slot> old(slots_.empty() ? kMin : 2 * slots_.size());
     old.swap(slots_);
     --shift_;
     for (const Slot& slot : old) {

@@ -9,7 +9,7 @@
 namespace dynains {
 namespace {
 
-constexpr std::size_t kMostChunks = 16;  // that are kept if their messages alternate
+constexpr std::size_t kMaxChunks = 16;  // that are kept if their messages alternate
 
 }  // namespace
 
@@ -47,10 +47,10 @@ void ChunkedLog::add_chunk(std::uint64_t position, Chunk header) {
                  "expected a chunk of at most " + std::to_string(file_.size() - header.content) +
                      " bytes, found the size " + std::to_string(header.compressed_size));
   }
-  if (header.uncompressed_size > most_decompressed(header.compressed_size)) {
+  if (header.uncompressed_size > max_decompressed(header.compressed_size)) {
     fail_at_byte(path_, position,
                  "expected a chunk of at most " +
-                     std::to_string(most_decompressed(header.compressed_size)) +
+                     std::to_string(max_decompressed(header.compressed_size)) +
                      " bytes, found the size " + std::to_string(header.uncompressed_size));
   }
   chunks_[position] = std::move(header);
@@ -166,7 +166,7 @@ ChunkedLog::LoadedChunk& ChunkedLog::make_room(std::uint64_t size) {
   std::uint64_t kept = 0;
   for (const LoadedChunk& loaded : loaded_) kept += loaded.records.capacity();
   std::optional<LoadedChunk> reused;
-  while (!loaded_.empty() && (kept + size > kMostMemory || loaded_.size() >= wanted_chunks_)) {
+  while (!loaded_.empty() && (kept + size > kMaxMemory || loaded_.size() >= wanted_chunks_)) {
     const auto oldest = std::min_element(loaded_.begin(), loaded_.end(), is_older);
     kept -= oldest->records.capacity();
     if (oldest->records.capacity() <= 2 * size) reused = std::move(*oldest);
@@ -181,11 +181,11 @@ void ChunkedLog::decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& r
   ++decompressions_;
   // Chunks are decompressed again if the messages of many alternate.
   decompressed_ += header.uncompressed_size;
-  if (decompressed_ > kMostMemory + kLargestRatio * (file_.size() + delivered_)) {
+  if (decompressed_ > kMaxMemory + kMaxRatio * (file_.size() + delivered_)) {
     fail_at_byte(path_, chunk, "expected chunks one after another, found messages that alternate");
   }
   const std::uint64_t before = std::exchange(header.decompression, decompressions_);
-  if (before != 0 && decompressions_ - before <= kMostChunks) wanted_chunks_ = kMostChunks;
+  if (before != 0 && decompressions_ - before <= kMaxChunks) wanted_chunks_ = kMaxChunks;
   file_.read(header.content, header.compressed_size, "a chunk", compressed_);
   if (header.compression.empty()) {
     records.swap(compressed_);

@@ -19,7 +19,7 @@ namespace dynains {
 /// messages. So a file is read in the same way whether its summary was written or not.
 ///
 /// Memory is bounded by the size of the file: 100 bytes of index for each byte, and 256 MiB of
-/// uncompressed chunks, of which each is at most most_decompressed() of its size. Work, too: 1,000
+/// uncompressed chunks, of which each is at most max_decompressed() of its size. Work, too: 1,000
 /// decompressed bytes for each byte of the file and of messages that are read.
 class ChunkedLog : public LogFile {
  public:
@@ -76,7 +76,7 @@ class ChunkedLog : public LogFile {
   void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
 
   /// Bytes from which the fields before the data of a record are read: names are short.
-  static constexpr std::uint64_t kLongestHead = 4096;
+  static constexpr std::uint64_t kMaxHead = 4096;
 
   RawFile file_;
 

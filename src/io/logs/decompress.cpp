@@ -79,14 +79,14 @@ Decompressed decompress_bz2(const Block& input, Block& output) {
 
 }  // namespace
 
-std::uint64_t most_decompressed(std::uint64_t compressed) {
+std::uint64_t max_decompressed(std::uint64_t compressed) {
   constexpr std::uint64_t kSmall = std::uint64_t{1} << 24U;
-  return std::clamp(std::min(compressed, kMostMemory) * kLargestRatio, kSmall, kMostMemory);
+  return std::clamp(std::min(compressed, kMaxMemory) * kMaxRatio, kSmall, kMaxMemory);
 }
 
 std::string decompress(const std::string& method, const Block& input, std::uint64_t size,
                        Block& output) {
-  output.resize(static_cast<std::size_t>(std::min(size, most_decompressed(input.size()))));
+  output.resize(static_cast<std::size_t>(std::min(size, max_decompressed(input.size()))));
   Decompressed result{0, "expected lz4, zstd, bz2 or none, found \"" + method + '"'};
   for (const std::string known : {"lz4", "zstd", "bz2"}) {
     if (method != known) continue;
@@ -115,7 +115,7 @@ std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::
   const auto size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
   if (size == ZSTD_CONTENTSIZE_ERROR) return "expected a frame of zstd";
   if (size == ZSTD_CONTENTSIZE_UNKNOWN) return "expected a frame of zstd that tells its size";
-  const std::uint64_t most = most_decompressed(bytes.size());
+  const std::uint64_t most = max_decompressed(bytes.size());
   if (size > most) {
     return "expected a frame of zstd of at most " + std::to_string(most) + " bytes, found " +
            std::to_string(size);

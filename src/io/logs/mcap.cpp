@@ -54,7 +54,7 @@ std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {
 }
 
 bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
-  const auto head = file_.read(position, std::min(size, kLongestHead), "a record");
+  const auto head = file_.read(position, std::min(size, kMaxHead), "a record");
   Bytes fields(path_, position, head.data(), head.size());
   const auto opcode = fields.number<std::uint8_t>("an opcode");
   if (opcode == mcap::kMessageIndex) {
@@ -90,7 +90,7 @@ void McapFile::take_header(std::uint64_t position, std::uint64_t size) {
 }
 
 void McapFile::take_chunk(std::uint64_t position, std::uint64_t size) {
-  const auto head = file_.read(position, std::min(size, kLongestHead), "a chunk");
+  const auto head = file_.read(position, std::min(size, kMaxHead), "a chunk");
   Bytes fields(path_, position, head.data(), head.size());
   Chunk chunk;
   fields.skip(kRecordHead + 16, "the times of a chunk");
@@ -161,7 +161,7 @@ void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
 void McapFile::copy_others(McapWriter& writer) {
   for (const std::uint64_t position : others_) {
     const std::uint64_t size = record_size(position).value_or(0);
-    const auto begin = file_.read(position, std::min(size, kLongestHead), "a record");
+    const auto begin = file_.read(position, std::min(size, kMaxHead), "a record");
     Bytes fields(path_, position, begin.data(), begin.size());
     const auto opcode = fields.number<std::uint8_t>("an opcode");
     fields.skip(kRecordHead - 1, "a length");

@@ -46,10 +46,10 @@ class MessageReader {
     if (!is_ros1() && !result.empty() && result.back() == '\0') result.pop_back();
     return result;
   }
-  /// Number of elements of a sequence, each of at least `least_size` bytes.
-  std::uint32_t length(std::size_t least_size, const char* purpose) {
+  /// Number of elements of a sequence, each of at least `min_size` bytes.
+  std::uint32_t length(std::size_t min_size, const char* purpose) {
     const auto count = number<std::uint32_t>(purpose);
-    if (count > remaining() / least_size) {
+    if (count > remaining() / min_size) {
       fail("expected " + std::to_string(count) + " elements of " + purpose + ", the message ends");
     }
     return count;

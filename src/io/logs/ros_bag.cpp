@@ -84,7 +84,7 @@ std::optional<std::uint64_t> RosBag::record_size(std::uint64_t position) {
 
 bool RosBag::take_record(std::uint64_t position, std::uint64_t size) {
   // The data of a chunk are not read here.
-  const auto bytes = file_.read(position, std::min(size, kLongestHead), "a record");
+  const auto bytes = file_.read(position, std::min(size, kMaxHead), "a record");
   Bytes rest(path_, position, bytes.data(), bytes.size());
   const Bytes header = next_header(rest);
   const auto opcode = number_in<std::uint8_t>(header, "op");

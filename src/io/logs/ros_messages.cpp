@@ -184,8 +184,8 @@ std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMes
   MessageReader in(message);
   std::vector<StampedPose> poses;
   if (is_transform_type(type)) {
-    constexpr std::size_t kLeastTransform = 72;  // bytes
-    const std::uint32_t count = in.length(kLeastTransform, "transforms");
+    constexpr std::size_t kMinTransform = 72;  // bytes
+    const std::uint32_t count = in.length(kMinTransform, "transforms");
     for (std::uint32_t i = 0; i < count; ++i) poses.push_back(read_transform(in));
   } else if (type == "geometry_msgs/TransformStamped") {
     poses.push_back(read_transform(in));

@@ -128,7 +128,7 @@ void SqliteBag::limit(std::uint64_t size) {
     sqlite3_db_config(database, program, 0, nullptr);
   }
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH, static_cast<int>(std::min(size + kSlack, most)));
-  most_rows_ = size;
+  max_rows_ = size;
   budget_ = static_cast<std::int64_t>(100 + size / 1000);
   sqlite3_progress_handler(database, kStepsOfProgress, spend, &budget_);
 }
@@ -155,7 +155,7 @@ std::map<std::string, bool> SqliteBag::columns_of(const std::string& table) {
 
 /// Counts a row that was read. A file with loops or links among its pages has rows without end.
 void SqliteBag::count_row() {
-  if (most_rows_-- == 0) fail(path_, "has more rows than its size allows");
+  if (max_rows_-- == 0) fail(path_, "has more rows than its size allows");
 }
 
 /// Definitions by type, which ROS 2 writes since Iron.

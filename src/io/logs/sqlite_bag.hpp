@@ -43,8 +43,8 @@ class SqliteBag final : public LogFile {
   SqliteStatement prepare(const std::string& sql);
   bool step(sqlite3_stmt* statement);
 
-  std::uint64_t most_rows_ = 0;  ///< that are still accepted
-  std::int64_t budget_ = 0;      ///< of the progress handler; outlives the database
+  std::uint64_t max_rows_ = 0;  ///< that are still accepted
+  std::int64_t budget_ = 0;     ///< of the progress handler; outlives the database
   SqliteDatabase database_;
   SqliteStatement select_message_;
   std::map<std::int64_t, std::uint32_t> topic_of_;  ///< by id in the database

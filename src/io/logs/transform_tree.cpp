@@ -11,9 +11,10 @@ namespace {
 
 /// Whether points 10 m away keep their place from one pose to another.
 bool are_alike(const Pose& a, const Pose& b) {
-  constexpr double kMost = 0.1;  // m
+  constexpr double kMaxDistance = 0.1;  // m
   const Pose T = a.inverse() * b;
-  return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() < kMost;
+  return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() <
+         kMaxDistance;
 }
 
 std::optional<Pose> pose_at(const Trajectory& trajectory, double time, double longest_gap) {

@@ -27,7 +27,7 @@ class TransformTree {
 
   /// `longest_gap`: s, between two poses of an edge that changes. The newest pose of an edge that
   /// hardly changes holds until the next one.
-  explicit TransformTree(double longest_gap = kLongestPoseGap) : longest_gap_(longest_gap) {}
+  explicit TransformTree(double longest_gap = kMaxPoseGap) : longest_gap_(longest_gap) {}
 
   /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
   /// that gives a frame a second parent is left out and counted.

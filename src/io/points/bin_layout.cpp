@@ -132,13 +132,13 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
 }
 
 void check_bin_content(const std::filesystem::path& file) {
-  constexpr std::uint64_t kMostBytes = 240 * 1024;  // a multiple of the size of every point
-  constexpr std::size_t kLeastPoints = 100;
+  constexpr std::uint64_t kMaxBytes = 240 * 1024;  // a multiple of the size of every point
+  constexpr std::size_t kMinPoints = 100;
   const BinLayout usual;
   const BinLayout doubles{4, true};
   RawFile raw(file);
-  const auto bytes = raw.read(0, std::min(raw.size(), kMostBytes), "points");
-  if (bytes.size() < kLeastPoints * point_size(usual)) return;
+  const auto bytes = raw.read(0, std::min(raw.size(), kMaxBytes), "points");
+  if (bytes.size() < kMinPoints * point_size(usual)) return;
   if (plausible_share(bytes, usual) < 0.9 && plausible_share(bytes, {3, true}) > 0.9) {
     fail(file, "does not hold float32 x y z intensity, but float64: the first number is " +
                    std::to_string(value_at(bytes, doubles, 0, 0)) +

@@ -21,7 +21,7 @@ std::optional<Pose> motion_at(const Trajectory& motion, double time) {
   const auto along = [&](std::size_t end) -> std::optional<Pose> {
     const double gap = times[end] - times[end - 1];
     const double beyond = std::max(times[end - 1] - time, time - times[end]);
-    if (gap > kLongestPoseGap || beyond > kLongestScan) return std::nullopt;
+    if (gap > kMaxPoseGap || beyond > kMaxScan) return std::nullopt;
     const double share = (time - times[end - 1]) / gap;
     return extrapolate(motion.poses[end - 1], motion.poses[end], share);
   };
@@ -76,7 +76,7 @@ void deskew(const Trajectory& motion, double stamp, const Pose& T_world_sensor,
   if (times.is_empty()) return;
   const double first = clock.after(stamp, times.first);
   const double last = clock.after(stamp, times.last);
-  if (std::max(std::abs(first), std::abs(last)) > kLongestScan) {
+  if (std::max(std::abs(first), std::abs(last)) > kMaxScan) {
     fail(place,
          "the scan cannot be de-skewed: expected times of points within 1 s of the time of the "
          "scan, " +

@@ -16,7 +16,7 @@ namespace dynains {
 /// time keep their place.
 ///
 /// `motion`: T_world_sensor with times, s. It is interpolated within gaps of at most
-/// kLongestPoseGap, and continued with constant velocity by at most kLongestScan. `stamp`: s,
+/// kMaxPoseGap, and continued with constant velocity by at most kMaxScan. `stamp`: s,
 /// `T_world_sensor`: the pose at that time.
 ///
 /// `clock` tells the seconds from the stamp to the time of a point. Points whose time cannot be

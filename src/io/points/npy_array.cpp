@@ -9,7 +9,7 @@ namespace dynains {
 namespace {
 
 constexpr std::string_view kNpyMagic("\x93NUMPY", 6);
-constexpr std::size_t kLargestNpyField = 1000000000;  // bytes
+constexpr std::size_t kMaxNpyField = 1000000000;  // bytes
 
 /// Parses the literal of Python in which a header describes its array.
 class NpyLiteral {
@@ -86,7 +86,7 @@ std::size_t add_npy_field(const NpyLiteral& literal, const std::string& name,
   std::uint32_t size = 0;
   const char* const begin = text.data() + std::min<std::size_t>(1, text.size());
   const auto [stop, error] = std::from_chars(begin, text.data() + text.size(), size);
-  if (text.empty() || error != std::errc{} || size == 0 || size > kLargestNpyField) {
+  if (text.empty() || error != std::errc{} || size == 0 || size > kMaxNpyField) {
     literal.fail("expected a type such as '<f4', found '" + type.substr(0, 40) + '\'');
   }
   struct Type {
@@ -125,7 +125,7 @@ void read_npy_type(NpyLiteral& literal, NpyArray& array) {
       // Several values in one field are no column.
       array.fields.back().type.reset();
       for (const std::uint64_t length : literal.shape()) {
-        if (length > 0 && size > kLargestNpyField / length) {
+        if (length > 0 && size > kMaxNpyField / length) {
           literal.fail("expected fields of at most 1 GB");
         }
         size *= static_cast<std::size_t>(length);

@@ -34,10 +34,10 @@ struct NpyArray {
 };
 
 /// Longest header that is read.
-inline constexpr std::size_t kLongestNpyHeader = std::size_t{1} << 16U;
+inline constexpr std::size_t kMaxNpyHeader = std::size_t{1} << 16U;
 
 /// Reads the header at the begin of `in`, which holds the first bytes of an array of `size` bytes,
-/// at least kLongestNpyHeader of them if there are as many. Throws IoError unless all items lie
+/// at least kMaxNpyHeader of them if there are as many. Throws IoError unless all items lie
 /// within `size`.
 NpyArray parse_npy_header(Bytes in, std::uint64_t size);
 

@@ -46,7 +46,7 @@ NpyPoints structured_points(const Bytes& place, const NpyArray& array, PointSink
 /// Points of an array whose last dimension is x y z, intensity if there is a fourth value, others.
 NpyPoints plain_points(const Bytes& place, const NpyArray& array, PointSink& sink) {
   const bool is_table =
-      array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMostHeaderItems;
+      array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMaxHeaderItems;
   if (!is_table || (array.is_column_major && array.shape.size() > 2)) {
     place.fail(
         "expected an array of N rows with x y z, or a structured array with the fields x, y and z");
@@ -84,7 +84,7 @@ void require_xyz(const std::filesystem::path& path, const PointSink& sink) {
 
 std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   RawFile raw(path);
-  const std::uint64_t wanted = with_points ? raw.size() : kLongestNpyHeader + 16;
+  const std::uint64_t wanted = with_points ? raw.size() : kMaxNpyHeader + 16;
   const auto bytes = raw.read(0, std::min(raw.size(), wanted), "an array");
   const Bytes place(raw.path(), 0, bytes.data(), bytes.size());
   const NpyArray array = parse_npy_header(place, raw.size());

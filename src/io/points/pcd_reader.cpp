@@ -103,7 +103,7 @@ Scalar scalar_of(const ByteReader& reader, const Field& field) {
 void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& header) {
   if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
   for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
-    if (header.fields.size() == kMostHeaderItems) reader.fail_on_line("expected fewer fields");
+    if (header.fields.size() == kMaxHeaderItems) reader.fail_on_line("expected fewer fields");
     Field field;
     field.name = name;
     header.fields.push_back(std::move(field));
@@ -187,7 +187,7 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
 PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
   PcdHeader header;
   std::string line;
-  for (std::size_t i = 0; i < kMostHeaderItems; ++i) {
+  for (std::size_t i = 0; i < kMaxHeaderItems; ++i) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected a line DATA");
     std::string_view rest = line;
     const std::string_view keyword = text::next_token(rest);

@@ -120,7 +120,7 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::size_t items = 0;
   for (;;) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected end_header");
-    if (++items > kMostHeaderItems) reader.fail_on_line("expected end_header before this line");
+    if (++items > kMaxHeaderItems) reader.fail_on_line("expected end_header before this line");
     std::string_view rest = line;
     const std::string_view keyword = text::next_token(rest);
     if (keyword == "end_header") break;

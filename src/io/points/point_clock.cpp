@@ -11,9 +11,9 @@ namespace dynains {
 namespace {
 
 constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
-constexpr double kAbsolute = 10.0;       // s; larger times count from the origin of stamps
-constexpr double kShortestShare = 0.05;  // of the interval between scans
-constexpr double kNoGap = 0.125;         // s; scans that are farther apart may be some of all scans
+constexpr double kAbsolute = 10.0;  // s; larger times count from the origin of stamps
+constexpr double kMinShare = 0.05;  // of the interval between scans
+constexpr double kNoGap = 0.125;    // s; scans that are farther apart may be some of all scans
 
 bool has_return(const float* xyz) {
   const float sum = std::abs(xyz[0]) + std::abs(xyz[1]) + std::abs(xyz[2]);
@@ -68,13 +68,13 @@ std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
 /// as those of a spinning sensor do in any order.
 bool are_random(const std::vector<double>& times, const std::vector<DirectedTime>& by_direction,
                 double span) {
-  constexpr double kMostLeaps = 0.5;
-  constexpr std::size_t kFewest = 100;
-  if (by_direction.size() < kFewest || !(share_of_leaps(times, span) > kMostLeaps)) return false;
+  constexpr double kMaxLeaps = 0.5;
+  constexpr std::size_t kMin = 100;
+  if (by_direction.size() < kMin || !(share_of_leaps(times, span) > kMaxLeaps)) return false;
   std::vector<double> directed;
   directed.reserve(by_direction.size());
   for (const DirectedTime& one : by_direction) directed.push_back(one.time);
-  return share_of_leaps(directed, span) > kMostLeaps;
+  return share_of_leaps(directed, span) > kMaxLeaps;
 }
 
 /// Whether no sector of 30 deg is empty.
@@ -133,12 +133,12 @@ double PointClockSearch::Sample::quantile(double share) const {
 /// A unit that is given decides alone, also for scans that overlap.
 double PointClockSearch::longest_scan() const {
   const bool is_known = period_ > 0.0 && !(unit_ > 0.0);
-  return is_known ? std::min(kLongestScan, 1.5 * period_) : kLongestScan;
+  return is_known ? std::min(kMaxScan, 1.5 * period_) : kMaxScan;
 }
 
 double PointClockSearch::shortest_scan() const {
   const double period = period_ > 0.0 ? std::min(period_, kKittiPeriod) : kKittiPeriod;
-  return kShortestShare * period;
+  return kMinShare * period;
 }
 
 /// Points whose time is farther from the median of their scan than a scan takes.
@@ -220,13 +220,13 @@ std::string PointClockSearch::random_text() const {
 
 /// A remark on scans that take another time than the sensor has from scan to scan.
 std::string PointClockSearch::duration_text(double unit) const {
-  constexpr double kMiddle = 0.9;     // of the points, as in duration()
-  constexpr double kLongest = 1.15;   // of the interval between scans
-  constexpr double kShortest = 0.45;  // likewise, if every second scan of a sensor was recorded
+  constexpr double kMiddle = 0.9;      // of the points, as in duration()
+  constexpr double kMaxLength = 1.15;  // of the interval between scans
+  constexpr double kMinLength = 0.45;  // likewise, if every second scan of a sensor was recorded
   const double whole = duration(unit) / kMiddle;
-  const bool is_long = whole > kLongest * period_;
+  const bool is_long = whole > kMaxLength * period_;
   const bool is_short =
-      do_most(&Sample::is_all_around) && period_ <= kNoGap && whole < kShortest * period_;
+      do_most(&Sample::is_all_around) && period_ <= kNoGap && whole < kMinLength * period_;
   if (!(period_ > 0.0) || !(is_long || is_short)) return {};
   return "times of points in units of " + text::to_text(unit) + " s give a scan " +
          (is_short ? "all around " : "") + "that takes " + rounded(whole) + " s, but scans are " +

@@ -14,13 +14,13 @@
 namespace dynains {
 
 /// Longest interval between the stamp of a scan and the time of one of its points, s.
-inline constexpr double kLongestScan = 1.0;
+inline constexpr double kMaxScan = 1.0;
 
 /// Clock of the column `time`.
 struct PointClock {
   double unit = 1.0;         ///< s per unit of the column
   bool is_absolute = false;  ///< times count from the origin of stamps, not from that of their scan
-  double longest_scan = kLongestScan;  ///< s, between two points of one scan
+  double longest_scan = kMaxScan;  ///< s, between two points of one scan
 
   /// Seconds from `stamp`, s, to `time`, in the unit of the column.
   double after(double stamp, double time) const {

@@ -10,7 +10,7 @@ namespace dynains {
 class PointSink;
 
 /// Lines, fields or columns that a header may have.
-inline constexpr std::size_t kMostHeaderItems = 1000;
+inline constexpr std::size_t kMaxHeaderItems = 1000;
 
 /// Read the columns, and the points as well if `with_points`. Return the number of points. Throw
 /// IoError unless the file can hold those of its header.

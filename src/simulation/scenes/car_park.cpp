@@ -24,10 +24,10 @@ struct Place {
 };
 
 /// Straight aisles joined by U-turns that alternate.
-std::vector<Bend> serpentine(double aisle, double least_length) {
+std::vector<Bend> serpentine(double aisle, double min_length) {
   std::vector<Bend> bends{{aisle, 0}};
   double length = aisle;
-  for (int turn = 1; length < least_length || bends.size() < 7; turn = -turn) {
+  for (int turn = 1; length < min_length || bends.size() < 7; turn = -turn) {
     bends.push_back({kPi * kAisle.radius, turn / kAisle.radius});
     bends.push_back({aisle, 0});
     length += kPi * kAisle.radius + aisle;
