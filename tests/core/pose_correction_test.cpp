@@ -27,10 +27,10 @@ using simulation::Sensor;
 using simulation::SimulatedScan;
 
 constexpr double kTolerance = 0.01;                    // m
-constexpr double kMaxObject = 18.0, kMaxObject = 4.5;  // m
+constexpr double kMaxLength = 18.0, kMaxHeight = 4.5;  // m, of objects
 constexpr double kDegrees = M_PI / 180.0;
 
-PoseCorrection new_correction() { return PoseCorrection(kTolerance, kMaxObject, kMaxObject); }
+PoseCorrection new_correction() { return PoseCorrection(kTolerance, kMaxLength, kMaxHeight); }
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
   const simulation::Config config = drive_of(scene, sensor, scans, 31);
@@ -143,7 +143,7 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
                     SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
                     SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
   static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 30);
-  residuals_of_exact({0.003, kMaxObject, kMaxObject}, scans, [&](GroundSplit& split) {
+  residuals_of_exact({0.003, kMaxLength, kMaxHeight}, scans, [&](GroundSplit& split) {
     for (std::size_t i = 0; i < split.count; ++i) {
       const Eigen::Vector3f p = fault({split.points.x[i], split.points.y[i], split.points.z[i]});
       split.points.x[i] = p.x();
