@@ -23,6 +23,8 @@ struct ScanAddress {
   std::size_t index = 0;
 };
 
+inline ScanAddress address_of(const ScanEntry& scan) { return {scan.file, scan.index}; }
+
 /// All members throw IoError with path, position and the expected content. Several threads may
 /// read.
 class ScanReader {

@@ -105,7 +105,44 @@ enum class ScanFormat { kBin, kPcd, kPly, kLas, kNpy, kXyz, kCsv, kNuScenes, kLo
 class LogScans;
 class ScanReader;
 struct PointClock;
-struct ScanAddress;
+
+/// One scan of a recording, without its points.
+struct ScanEntry {
+  std::filesystem::path file;  ///< of the points; for a log, the log
+  std::string name;            ///< file name without extension
+  std::uint64_t number = 0;    ///< the name if all names are numbers, else the index of the file
+  double time = 0.0;           ///< s, strictly increasing
+  std::size_t index = 0;       ///< among all clouds or files of scans, with and without a pose
+  Pose T_world_sensor = Pose::Identity();
+};
+
+/// Where the labels of a recording are.
+enum class LabelSource { kNone, kFiles, kColumn, kIntensity };
+
+/// What a recording holds except points and labels. Plain data that open_recording() fills.
+struct RecordingContents {
+  std::filesystem::path folder;       ///< path of the folder or log
+  std::filesystem::path scan_folder;  ///< `folder` or a subfolder
+  RecordingOptions options;           ///< as given, completed by what the recording states
+  ScanFormat format = ScanFormat::kBin;
+  PointFrame frame = PointFrame::kSensor;
+  LabelSource labels = LabelSource::kNone;
+  PointColumns columns;      ///< of the first scan
+  bool is_numbered = false;  ///< all names are numbers
+  bool has_times = true;     ///< times of scans are measured; else scans count as 0.1 s apart
+  bool has_viewpoints = false;
+  bool has_calibration = false;
+  Pose Tr = Pose::Identity();                           ///< of calib.txt
+  Trajectory trajectory;                                ///< rows of the poses as in their file
+  std::vector<std::optional<TrajectoryMatch>> matches;  ///< rows for each cloud or file of a scan
+  Trajectory motion;                                    ///< T_world_sensor, for de-skewing
+  std::shared_ptr<const PointClock> clock;              ///< for de-skewing
+  std::vector<ScanEntry> scans;                         ///< with a pose, unless none has one
+  std::vector<std::filesystem::path> files;             ///< without files of labels
+  std::optional<std::string> early_end;                 ///< of a truncated log
+  std::vector<std::string> notes;
+  std::vector<std::string> warnings;
+};
 
 /// Recorded scans with poses. Supported recordings:
 ///
@@ -169,41 +206,41 @@ class Recording {
   explicit Recording(const std::filesystem::path& path, const RecordingOptions& options = {});
 
   /// Path of the folder or log.
-  const std::filesystem::path& folder() const { return folder_; }
+  const std::filesystem::path& folder() const { return contents_.folder; }
   /// Folder of the scans: folder() or a subfolder; for a log, folder().
-  const std::filesystem::path& scan_folder() const { return scan_folder_; }
+  const std::filesystem::path& scan_folder() const { return contents_.scan_folder; }
   /// All files of the recording: scans with and without a pose, poses, times, calibration, labels,
   /// and RecordingOptions::sources.
   std::vector<std::filesystem::path> files() const;
-  std::size_t size() const { return scans_.size(); }
-  ScanFormat format() const { return format_; }
-  PointFrame frame() const { return frame_; }
+  std::size_t size() const { return contents_.scans.size(); }
+  ScanFormat format() const { return contents_.format; }
+  PointFrame frame() const { return contents_.frame; }
   /// Columns of the first scan in addition to x y z.
-  const PointColumns& columns() const { return columns_; }
-  bool has_labels() const { return labels_ != Labels::kNone; }
+  const PointColumns& columns() const { return contents_.columns; }
+  bool has_labels() const { return contents_.labels != LabelSource::kNone; }
   /// Whether scan i has labels: files of some scans may be missing.
   bool has_labels(std::size_t i) const;
   /// Whether read_scan() moves points to the sensor frame at the time of the scan.
-  bool is_deskewed() const { return options_.deskew; }
+  bool is_deskewed() const { return contents_.options.deskew; }
   /// Position of the sensor in the frame of the clouds, m.
-  const Eigen::Vector3d& sensor_origin() const { return options_.sensor_origin; }
+  const Eigen::Vector3d& sensor_origin() const { return contents_.options.sensor_origin; }
   /// Poses of several sensors in the frame of the clouds, m; empty for one.
-  const std::vector<Pose>& sensors() const { return options_.sensors; }
+  const std::vector<Pose>& sensors() const { return contents_.options.sensors; }
   /// Path, position and reason if a log is truncated. The clouds before that position are valid.
-  const std::optional<std::string>& early_end() const { return early_end_; }
+  const std::optional<std::string>& early_end() const { return contents_.early_end; }
   /// Automatic choices of files, frames and times, and excluded scans, one sentence each.
-  const std::vector<std::string>& notes() const { return notes_; }
+  const std::vector<std::string>& notes() const { return contents_.notes; }
   /// Defects of the recording that results depend on, one sentence each.
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::vector<std::string>& warnings() const { return contents_.warnings; }
 
   /// File name of scan i without extension.
-  const std::string& name(std::size_t i) const { return scans_.at(i).name; }
-  const std::filesystem::path& file(std::size_t i) const { return scans_.at(i).file; }
+  const std::string& name(std::size_t i) const { return contents_.scans.at(i).name; }
+  const std::filesystem::path& file(std::size_t i) const { return contents_.scans.at(i).file; }
   /// Name of scan i as a number if all names are numbers, else the index of its file.
-  std::uint64_t number(std::size_t i) const { return scans_.at(i).number; }
+  std::uint64_t number(std::size_t i) const { return contents_.scans.at(i).number; }
   /// Time of scan i, s, strictly increasing.
-  double time(std::size_t i) const { return scans_.at(i).time; }
-  const Pose& T_world_sensor(std::size_t i) const { return scans_.at(i).T_world_sensor; }
+  double time(std::size_t i) const { return contents_.scans.at(i).time; }
+  const Pose& T_world_sensor(std::size_t i) const { return contents_.scans.at(i).T_world_sensor; }
 
   /// Number of points of scan i, from the size of its file or from its header. Throws unless both
   /// are valid. Does not read points.
@@ -228,96 +265,33 @@ class Recording {
   /// The log of ROS, for those who copy it; null for other formats.
   const LogScans* log() const;
   /// Index of scan i among the clouds of the log, or the files of scans, with and without a pose.
-  std::size_t file_index(std::size_t i) const { return scans_.at(i).match; }
+  std::size_t file_index(std::size_t i) const { return contents_.scans.at(i).index; }
 
   // Members for comparisons with other conventions.
-  const RecordingOptions& options() const { return options_; }
-  const PoseConvention& convention() const { return options_.convention; }
-  double time_offset() const { return options_.time_offset; }
+  const RecordingOptions& options() const { return contents_.options; }
+  const PoseConvention& convention() const { return contents_.options.convention; }
+  double time_offset() const { return contents_.options.time_offset; }
   /// Pose of scan i under another convention; empty if its shift leads out of the trajectory.
   std::optional<Pose> pose_under(const PoseConvention& convention, std::size_t i) const;
   /// Pose of the sensor at `offset` (s) after the pose of scan i, by the times of the poses; empty
   /// without times and outside of the trajectory.
   std::optional<Pose> pose_after(std::size_t i, double offset) const;
-  bool has_quaternions() const { return trajectory_.order != QuaternionOrder::kNone; }
-  QuaternionOrder quaternion_order() const { return trajectory_.order; }
-  bool has_calibration() const { return has_calibration_; }
+  bool has_quaternions() const { return contents_.trajectory.order != QuaternionOrder::kNone; }
+  QuaternionOrder quaternion_order() const { return contents_.trajectory.order; }
+  bool has_calibration() const { return contents_.has_calibration; }
   /// Number of rows of the pose file.
-  std::size_t pose_count() const { return trajectory_.poses.size(); }
-  std::size_t scan_file_count() const { return matches_.size(); }
+  std::size_t pose_count() const { return contents_.trajectory.poses.size(); }
+  std::size_t scan_file_count() const { return contents_.matches.size(); }
   /// Number of scans that were excluded for lack of a pose.
   std::size_t missing_pose_count() const { return scan_file_count() - size(); }
 
  private:
-  struct Scan {
-    std::filesystem::path file;
-    std::string name;
-    std::uint64_t number = 0;
-    double time = 0.0;
-    std::size_t match = 0;  ///< index in matches_
-    Pose T_world_sensor = Pose::Identity();
-  };
-  enum class Labels { kNone, kFiles, kColumn, kIntensity };
-
-  void open_log();
-  void take_sensor_frame(const LogScans& log);
-  void open_nuscenes(const std::filesystem::path& tables);
-  void tell_lost_scans();
-  void list_scans();
-  bool find_scan_folder();
-  void check_names() const;
-  void read_poses();
-  void read_viewpoints();
-  void read_calibration(const std::filesystem::path& poses_file);
-  std::filesystem::path find_poses() const;
-  std::filesystem::path find_beside(const std::filesystem::path& poses_file,
-                                    const std::vector<const char*>& names) const;
-  std::optional<std::vector<double>> find_times(const std::filesystem::path& poses_file);
-  std::optional<std::vector<double>> times_of_names() const;
-  void match_scans(const std::filesystem::path& poses_file);
-  void take_times(const std::optional<std::vector<double>>& times);
-  void leave_unplaced();
-  void match_rows(const std::filesystem::path& poses_file);
-  bool match_indices();
-  void note_rows(const std::filesystem::path& poses_file);
-  void shift_times(const std::filesystem::path& poses_file);
-  void match_times(const std::filesystem::path& poses_file, const std::vector<double>& times);
-  void place_scans(const std::filesystem::path& poses);
-  void find_columns();
-  void find_sensors();
-  void read_sensors(std::size_t i, RecordedScan& scan) const;
-  bool has_labels_as_intensity() const;
-  Pose pose_of(const PoseConvention& convention, const TrajectoryMatch& match) const;
-  PointFrame guess_frame() const;
-  Pose to_sensor_pose(const PoseConvention& convention, const Pose& pose) const;
   std::optional<Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>> T_sensor_file(
       std::size_t i) const;
-  void prepare_deskewing();
-  void find_point_clock();
-  ScanAddress address(std::size_t i) const;
+  void read_sensors(std::size_t i, RecordedScan& scan) const;
 
-  std::filesystem::path folder_;
-  std::filesystem::path scan_folder_;
-  RecordingOptions options_;
+  RecordingContents contents_;
   std::shared_ptr<const ScanReader> reader_;  ///< shared by copies of the recording
-  ScanFormat format_ = ScanFormat::kBin;
-  PointFrame frame_ = PointFrame::kSensor;
-  Labels labels_ = Labels::kNone;
-  PointColumns columns_;
-  bool numbered_ = false;  ///< all names are numbers
-  bool has_times_ = true;  ///< times of scans are measured; else scans count as 0.1 s apart
-  bool has_viewpoints_ = false;
-  bool has_calibration_ = false;
-  Pose Tr_ = Pose::Identity();  ///< of calib.txt
-  Trajectory trajectory_;
-  std::vector<std::optional<TrajectoryMatch>> matches_;  ///< per scan file
-  Trajectory motion_;                                    ///< T_world_sensor, for de-skewing
-  std::shared_ptr<const PointClock> clock_;              ///< for de-skewing
-  std::vector<Scan> scans_;
-  std::vector<std::filesystem::path> files_;  ///< without files of labels
-  std::optional<std::string> early_end_;
-  std::vector<std::string> notes_;
-  std::vector<std::string> warnings_;
 };
 
 }  // namespace dynains
