@@ -30,10 +30,12 @@ using Avx2Packs = PackKind<8, 1>;
 
 #if defined(__x86_64__) && defined(__SSE2__)
 template <class Kernel>
-[[gnu::target("avx2"), gnu::flatten]] void with_avx2(Kernel& kernel) {
+[[gnu::target("avx2,bmi,bmi2,popcnt"), gnu::flatten]] void with_avx2(Kernel& kernel) {
   kernel(Avx2Packs());
 }
-inline bool has_avx2() { return __builtin_cpu_supports("avx2") != 0; }
+inline bool has_avx2() {
+  return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("bmi2") != 0;
+}
 #else
 template <class Kernel>
 void with_avx2(Kernel& kernel) {
