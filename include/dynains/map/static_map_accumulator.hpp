@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <deque>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -150,8 +151,8 @@ class StaticMapAccumulator {
       const std::size_t count = std::min(kBatch, points.size() - begin);
       locate(points, begin, count, to_corner, first, batch);
       if (!keep.empty()) drop(keep.subspan(begin, count), batch);
-      choose(count, batch);
-      insert_chosen(batch);
+      find_runs(count, batch);
+      insert_runs(batch);
     }
   }
 
@@ -202,14 +203,19 @@ class StaticMapAccumulator {
 
   // Consecutive points of a scan.
   static constexpr std::size_t kBatch = 512;
-  static constexpr std::int32_t kDropped = -1;
+  static constexpr std::int32_t kDropped = std::numeric_limits<std::int32_t>::min();
   struct Batch {
     alignas(64) float point[3][kBatch];         // m, relative to the corner of the block
-    alignas(64) std::int32_t block[3][kBatch];  // indices in the world
-    alignas(64) std::int32_t voxel[kBatch];     // index in the block, or kDropped
+    alignas(64) std::int32_t block[3][kBatch];  // indices in the world; the first may be kDropped
+    alignas(64) std::int32_t voxel[kBatch];     // index in the block
     alignas(64) std::int32_t recent[kBatch];    // place of the block in recent_
-    std::uint32_t chosen[kBatch];  // indices of the points to add unless their voxel has one
-    std::size_t chosen_count;
+    std::uint32_t run_end[kBatch];              // by run of points in one block
+    std::size_t count;
+
+    BlockIndex block_of(std::size_t i) const { return {block[0][i], block[1][i], block[2][i]}; }
+    bool is_in(const BlockIndex& other, std::size_t i) const {
+      return ((block[0][i] ^ other.x) | (block[1][i] ^ other.y) | (block[2][i] ^ other.z)) == 0;
+    }
   };
 
   template <int kValue>
@@ -267,42 +273,49 @@ class StaticMapAccumulator {
     const std::uint8_t* at = keep.begin();
     const auto find = [&] { return std::memchr(at, 0, static_cast<std::size_t>(keep.end() - at)); };
     while ((at = static_cast<const std::uint8_t*>(find())) != nullptr) {
-      batch.voxel[at++ - keep.begin()] = kDropped;
+      batch.block[0][at++ - keep.begin()] = kDropped;
     }
   }
 
-  // Chooses the first point of each run in one voxel, or all points if the map keeps all.
-  void choose(std::size_t count, Batch& batch) const {
+  // Finds the runs of points in one block, and prefetches their blocks.
+  void find_runs(std::size_t count, Batch& batch) const {
     detail::with_packs([&](auto packs) {
       // Local copies: the compiler must assume that a store changes members.
       const auto* const known = recent_.data();
       const std::int32_t* const recent = batch.recent;
-      const std::int32_t* const voxel = batch.voxel;
-      std::uint32_t* next = batch.chosen;
-      const auto choose_first = [&](std::size_t begin, std::size_t) {
-        __builtin_prefetch(known[recent[begin]]);
-        *next = static_cast<std::uint32_t>(begin);
-        next += voxel[begin] == kDropped ? 0 : 1;
-      };
-      if (keep_all_) {
-        for (std::size_t i = 0; i < count; ++i) choose_first(i, i + 1);
-      } else {
-        detail::for_each_run<decltype(packs)>(count, choose_first, batch.block[0], batch.block[1],
-                                              batch.block[2], batch.voxel);
-      }
-      batch.chosen_count = static_cast<std::size_t>(next - batch.chosen);
+      std::uint32_t* next = batch.run_end;
+      detail::for_each_run<decltype(packs)>(
+          count,
+          [&](std::size_t begin, std::size_t end) {
+            __builtin_prefetch(known[recent[begin]]);
+            *next++ = static_cast<std::uint32_t>(end);
+          },
+          batch.block[0], batch.block[1], batch.block[2]);
+      batch.count = count;
     });
   }
 
-  // Most chosen points find their voxel occupied.
-  void insert_chosen(const Batch& batch) {
-    for (std::size_t k = 0; k < batch.chosen_count; ++k) {
-      const std::uint32_t i = batch.chosen[k];
-      const BlockIndex index = {batch.block[0][i], batch.block[1][i], batch.block[2][i]};
-      detail::MapBlock*& known = recent_[static_cast<std::size_t>(batch.recent[i])];
-      if (known == nullptr || !(known->index == index)) known = &blocks_.find_or_add(index);
-      const bool is_occupied = (known->occupied >> batch.voxel[i] & 1U) != 0;
-      if (!is_occupied || keep_all_) add(batch, i, *known);
+  // Mostly, all voxels of a run have a point.
+  [[gnu::noinline]] void insert_runs(const Batch& batch) {
+    detail::MapBlock** const recent = recent_.data();
+    const bool keep_all = keep_all_;
+    std::size_t begin = 0;
+    for (const std::uint32_t* end = batch.run_end; begin < batch.count; ++end) {
+      const std::size_t first = begin;
+      begin = *end;
+      detail::MapBlock*& block = recent[batch.recent[first]];
+      if (block == nullptr || !batch.is_in(block->index, first)) {
+        if (batch.block[0][first] == kDropped) continue;
+        block = &blocks_.find_or_add(batch.block_of(first));
+      }
+      const std::int32_t* voxel = batch.voxel + first;
+      const std::int32_t* const last = batch.voxel + begin;
+      std::uint64_t wanted = keep_all ? ~std::uint64_t{0} : ~block->occupied;
+      do {
+        if ((wanted >> *voxel & 1U) == 0) continue;
+        add(batch, static_cast<std::size_t>(voxel - batch.voxel), *block);
+        if (!keep_all) wanted = ~block->occupied;
+      } while (++voxel != last);
     }
   }
 
