@@ -206,10 +206,16 @@ class CurvedVoxelClusterer {
       starts_.resize(blocks);
       run_before_.resize(blocks);
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t cell = cell_or_cluster_[i] - first_cell_;
-      occupied_[cell / detail::kWordBits] |= std::uint64_t{1} << cell % detail::kWordBits;
-    }
+    // Local copies: the compiler must assume that a store changes members.
+    const std::uint32_t* const cells = cell_or_cluster_.data();
+    std::uint64_t* const occupied = occupied_.data();
+    const auto first_cell = static_cast<std::uint32_t>(first_cell_);
+    detail::for_packs(count, [=](const auto& at) {
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        const std::uint32_t cell = cells[at.begin + k] - first_cell;
+        occupied[cell / detail::kWordBits] |= std::uint64_t{1} << cell % detail::kWordBits;
+      }
+    });
   }
 
   // Rows per elevation: one per range, and one for points beyond cluster_range.
@@ -366,9 +372,17 @@ class CurvedVoxelClusterer {
 
   // Replaces the cell of each point by its cluster number.
   void number_points(std::size_t count) {
-    detail::with_packs([&](auto) {
-      for (std::size_t i = 0; i < count; ++i) {
-        cell_or_cluster_[i] = number_of_run_[run_of(cell_or_cluster_[i] - first_cell_)];
+    std::uint32_t* const cells = cell_or_cluster_.data();
+    const std::uint64_t* const starts = starts_.data();
+    const std::uint32_t* const run_before = run_before_.data();
+    const std::uint32_t* const number_of_run = number_of_run_.data();
+    const auto first_cell = static_cast<std::uint32_t>(first_cell_);
+    detail::for_packs(count, [=](const auto& at) {
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        const std::uint32_t cell = cells[at.begin + k] - first_cell;
+        const std::size_t block = cell / detail::kWordBits;
+        const std::uint64_t up_to_cell = starts[block] << (~cell % detail::kWordBits);
+        cells[at.begin + k] = number_of_run[run_before[block] + detail::count_ones(up_to_cell)];
       }
     });
   }
