@@ -106,8 +106,7 @@ class InstanceSampler {
     for (std::size_t begin = 0; begin < points.size(); begin += kWordBits) {
       const PointsView block = points.subview(begin, std::min(kWordBits, points.size() - begin));
       find_supervoxels(block, instance_of.data() + begin);
-      meet_supervoxels(block.size(), out.group_of_point.data() + begin);
-      rank_points(begin, block.size(), out.group_of_point.data() + begin);
+      add_points(begin, block.size(), out.group_of_point.data() + begin);
     }
     order(points, instance_count, out);
   }
@@ -133,6 +132,7 @@ class InstanceSampler {
   // the rotation of the sensor frame.
   static constexpr float kPlacesPerMetre = 64.0F;
   static constexpr int kIgnoredBits = 3;  // of a rank
+  static constexpr std::int32_t kMaxRank = 0x1FFFFFFF;
   static constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
 
   void begin_scan() {
@@ -157,7 +157,7 @@ class InstanceSampler {
                               ~(instance == Int(static_cast<std::int32_t>(kNoCluster)));
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
-      rank.store(&rank_[at.begin]);
+      (rank >> kIgnoredBits & Int(kMaxRank)).store(&rank_[at.begin]);
       const Int xy = is_sampled & ((floor(px * per_metre) << kHalfBits) +
                                    (floor(py * per_metre) & Int((1 << kHalfBits) - 1)));
       const Int z = select(is_sampled, floor(pz * per_metre), Int(Supervoxel().z));
@@ -168,38 +168,38 @@ class InstanceSampler {
     });
   }
 
-  // Numbers the supervoxels of a block in the order of the points. For most points, the first slot
-  // of the hash holds their supervoxel.
-  void meet_supervoxels(std::size_t count, std::uint32_t* number_of_point) {
-    grow(supervoxels_, table_.size() + kWordBits);
-    table_.reserve(table_.size() + kWordBits);
+  // Adds the points of a block to the rows of their supervoxels, which are numbered in the order of
+  // the points. `begin`: index of the first point. For most points, the first slot of the hash
+  // holds the number. A row keeps the keys of the smallest ranks, then numbers, in ascending order.
+  void add_points(std::size_t begin, std::size_t count, std::uint32_t* number_of_point) {
+    const std::size_t capacity = table_.size() + kWordBits;
+    grow(supervoxels_, capacity);
+    table_.reserve(capacity);
+    if (keys_.size() < capacity * most_) keys_.resize(capacity * most_ * 9 / 8, kNoKey);
+    std::uint64_t* const keys = keys_.data();
+    const std::size_t most = most_;
     for (std::size_t i = 0; i < count; ++i) {
       const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
-      const SupervoxelTable::Slot& slot = table_.first_slot(static_cast<std::uint32_t>(hash_[i]));
-      number_of_point[i] = slot.key == supervoxel ? slot.number : meet_supervoxel(supervoxel, i);
-    }
-  }
-
-  std::uint32_t meet_supervoxel(const Supervoxel& supervoxel, std::size_t i) {
-    const std::uint32_t number = table_.insert(supervoxel, static_cast<std::uint32_t>(hash_[i]));
-    supervoxels_[number] = supervoxel;
-    return number;
-  }
-
-  // Adds the points of a block to the rows of their supervoxels. A row keeps the keys of the
-  // smallest ranks, then numbers, in ascending order.
-  void rank_points(std::size_t begin, std::size_t count, const std::uint32_t* number_of_point) {
-    const std::size_t keys = table_.size() * most_;
-    if (keys_.size() < keys) keys_.resize(keys + keys / 8, kNoKey);
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint64_t key =
-          std::uint64_t{static_cast<std::uint32_t>(rank_[i]) >> kIgnoredBits} << 32 | (begin + i);
-      std::uint64_t* const row = &keys_[number_of_point[i] * most_];
-      if (key >= row[most_ - 1]) continue;
-      std::size_t k = most_ - 1;
+      const auto hash = static_cast<std::uint32_t>(hash_[i]);
+      const SupervoxelTable::Slot& slot = table_.first_slot(hash);
+      const std::uint32_t number = slot.key == supervoxel ? slot.number : meet(i);
+      number_of_point[i] = number;
+      std::uint64_t* const row = keys + number * most;
+      const auto rank = static_cast<std::uint64_t>(rank_[i]);
+      if (rank >= row[most - 1] >> 32) continue;  // of equal ranks, the first point stays
+      const std::uint64_t key = rank << 32 | (begin + i);
+      std::size_t k = most - 1;
       for (; k > 0 && key < row[k - 1]; --k) row[k] = row[k - 1];
       row[k] = key;
     }
+  }
+
+  // Number of the supervoxel of a point of the block, which may be new.
+  [[gnu::noinline]] std::uint32_t meet(std::size_t i) {
+    const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
+    const std::uint32_t number = table_.insert(supervoxel, static_cast<std::uint32_t>(hash_[i]));
+    supervoxels_[number] = supervoxel;
+    return number;
   }
 
   static VoxelKey place_of(const Supervoxel& cell) {
@@ -231,7 +231,12 @@ class InstanceSampler {
       out.instance_of[to] = static_cast<std::uint32_t>(supervoxel.instance);
       ordered_[to] = static_cast<std::uint32_t>(number);
     }
-    for (std::uint32_t& number : out.group_of_point) number = group_of_number_[number];
+    for_packs(points.size(), [groups = out.group_of_point.data(),
+                              group_of_number = group_of_number_.data()](const auto& at) {
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        groups[at.begin + k] = group_of_number[groups[at.begin + k]];
+      }
+    });
     copy_samples(points, out.supervoxel_begin.back(), out);
   }
 
