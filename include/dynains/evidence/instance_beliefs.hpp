@@ -98,6 +98,7 @@ struct InstanceBeliefs {
     /// it back to 1.
     std::uint8_t hits = 0;
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
+    std::uint8_t counted = 0;  ///< what Counts holds of it: 0 nothing, 1 decided, 2 also moved
 
     float highest() const { return std::max(peak, level); }
     /// Whether it stays when its instance moves, since many references hit its place and none saw
@@ -193,23 +194,18 @@ class InstanceBeliefUpdater {
   static constexpr float kPartWeight = 0.5F;         // of a reference that passes a small part
   static constexpr std::uint8_t kTurnsByChance = 4;  // hit, free, hit, free, hit
 
-  // Counts of one supervoxel with `samples` samples.
-  Counts counts_of(const Belief& belief, std::uint32_t samples) const {
-    const bool free = is_free(belief);
-    return {samples, free ? samples : 0, free || belief.hits != 0 ? samples : 0};
-  }
-
   // `visible`: its samples, at most Visibility::kMaxBits, which
   // FreeSpaceConfig::supervoxel_samples ensures. `weight`: of free samples, see update(). `counts`:
   // of its instance.
   void update_supervoxel(const Visibility::Bits& visible, std::uint32_t samples, float weight,
                          Belief& belief, Counts& counts) const {
     if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
-    const Counts before = counts_of(belief, samples);
     update(belief, visible.count(), samples, weight);
-    const Counts now = counts_of(belief, samples);
-    counts.moved += now.moved - before.moved;
-    counts.decided += now.decided - before.decided;
+    const std::uint8_t now = is_free(belief) ? 2 : belief.hits != 0 ? 1 : 0;
+    if (now == belief.counted) return;
+    if ((now == 2) != (belief.counted == 2)) counts.moved += now == 2 ? samples : 0 - samples;
+    if ((now == 0) != (belief.counted == 0)) counts.decided += now != 0 ? samples : 0 - samples;
+    belief.counted = now;
   }
 
   // Updates what is known of an instance as a whole. `all`: its visible samples, at least one.
