@@ -19,6 +19,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/points.hpp"
+#include "dynains/simd/pack.hpp"
 
 namespace dynains {
 
@@ -204,12 +205,39 @@ class CloudView {
   static void copy_from(const void* erased, std::size_t begin, std::size_t count, float* x,
                         float* y, float* z) {
     const Cloud& cloud = *static_cast<const Cloud*>(erased);
-    for (std::size_t i = 0; i < count; ++i) {
+    std::size_t i = 0;
+    if constexpr (std::is_same_v<Cloud, RawPoints<float>>) {
+      const std::size_t stride = cloud.stride;  // a store could alias the member
+      const float* from = cloud.data + begin * stride;
+      for (; stride >= 4 && i + 4 <= count; i += 4, from += 4 * stride) {
+        transpose(from, stride, x + i, y + i, z + i);
+      }
+    }
+    for (; i < count; ++i) {
       const auto p = PointCloudTraits<Cloud>::point(cloud, begin + i);
       x[i] = p.x();
       y[i] = p.y();
       z[i] = p.z();
     }
+  }
+
+  // Writes the coordinates of four points with `stride` floats each, at least four.
+  static void transpose(const float* points, std::size_t stride, float* x, float* y, float* z) {
+    Floats4 a, b, c, d, ab, cd, axis;
+    load(points, a);
+    load(points + stride, b);
+    load(points + 2 * stride, c);
+    load(points + 3 * stride, d);
+    shuffle<0, 4, 1, 5>(a, b, ab);
+    shuffle<0, 4, 1, 5>(c, d, cd);
+    shuffle<0, 1, 4, 5>(ab, cd, axis);
+    store(axis, x);
+    shuffle<2, 3, 6, 7>(ab, cd, axis);
+    store(axis, y);
+    shuffle<2, 6, 3, 7>(a, b, ab);
+    shuffle<2, 6, 3, 7>(c, d, cd);
+    shuffle<0, 1, 4, 5>(ab, cd, axis);
+    store(axis, z);
   }
 
   const void* cloud_;

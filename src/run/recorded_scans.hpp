@@ -25,15 +25,8 @@ inline void take_sensors(const Recording& recording, RemoverConfig& config) {
 inline void copy_points(const RecordedScan& scan, PointBuffer& points) {
   const std::size_t size = scan.size();
   points.resize(size);
-  const float* const from = scan.xyzi.data();
-  float* const x = points.x.data();
-  float* const y = points.y.data();
-  float* const z = points.z.data();
-  for (std::size_t i = 0; i < size; ++i) {
-    x[i] = from[4 * i];
-    y[i] = from[4 * i + 1];
-    z[i] = from[4 * i + 2];
-  }
+  const RawPoints<float> cloud = points_of(scan);
+  detail::CloudView(cloud).copy(0, size, points.x.data(), points.y.data(), points.z.data());
 }
 
 /// Returns `work()`. A PoseError from it gets the name of scan i.
