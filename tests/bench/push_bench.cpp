@@ -1,5 +1,5 @@
 // Cost of a push by stage, on one thread: milliseconds, and instructions where the system lets a
-// program count its own.
+// program count its own. `bench_core [PUSHES [BEAMS]]`, for each preset.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -20,8 +20,9 @@
 namespace dynains::bench {
 namespace {
 
-// Scans of about 110,000 points on a long lane between pillars with one van, at 10 Hz and 10 m/s.
-std::vector<test::Scan> street_scans() {
+// Scans on a long lane between pillars with one van, at 10 Hz and 10 m/s; 80 beams make about
+// 110,000 points.
+std::vector<test::Scan> street_scans(int beams) {
   test::Scene scene;
   for (int i = -5; i < 12; ++i) {
     for (const double y : {-14.0, -9.0, 9.0, 14.0}) {
@@ -29,7 +30,7 @@ std::vector<test::Scan> street_scans() {
     }
   }
   scene.boxes.push_back(test::van(12.0, 3.5, {-6.0, 0.0, 0.0}));
-  return test::drive(scene, 16, 10.0);
+  return test::drive(scene, 16, 10.0, 0.0, beams);
 }
 
 // Counts the instructions of this program, in user space.
@@ -68,22 +69,27 @@ double median(std::vector<double> values) {
 
 using Rows = std::vector<std::pair<std::string, double>>;
 
-// Medians over the pushes after all references and verdicts of a full history, back and forth on
-// one lane, so that the map stops growing.
-Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>& scans) {
-  constexpr std::size_t kWarmUp = 48, kPushes = 96;
+// A function that is not inlined, so that callgrind can count it alone (.ci/cost).
+[[gnu::noinline]] StageTimes counted_push(DynaInsRemover& remover, const test::Scan& scan,
+                                          double time) {
+  return remover.push(scan.points, scan.T_world_sensor, time).times;
+}
+
+// Medians over the second half of the pushes, back and forth on one lane, so that the map stops
+// growing.
+Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>& scans,
+             std::size_t pushes) {
   InstructionCounter instructions;
   DynaInsRemover remover(config);
   std::vector<StageTimes> times;
   std::vector<double> millions;
-  for (std::size_t i = 0; i < kPushes; ++i) {
+  for (std::size_t i = 0; i < pushes; ++i) {
     const std::size_t at = i % (2 * scans.size());
     const test::Scan& scan = scans[at < scans.size() ? at : 2 * scans.size() - 1 - at];
     const std::uint64_t before = instructions.count();
-    const StageTimes spent =
-        remover.push(scan.points, scan.T_world_sensor, 0.1 * static_cast<double>(i)).times;
+    const StageTimes spent = counted_push(remover, scan, 0.1 * static_cast<double>(i));
     const std::uint64_t after = instructions.count();
-    if (i < kWarmUp) continue;
+    if (i < pushes / 2) continue;
     times.push_back(spent);
     millions.push_back(1e-6 * static_cast<double>(after - before));
   }
@@ -108,17 +114,19 @@ Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>
   add("all stages, ms", [](const StageTimes& spent) { return spent.total(); });
   const double counted = median(std::move(millions));
   if (counted > 0.0) rows.emplace_back("instructions, millions", counted);
+  rows.emplace_back("map, MB", 1e-6 * static_cast<double>(remover.map().memory_bytes()));
   return rows;
 }
 
 }  // namespace
 }  // namespace dynains::bench
 
-int main() {
+int main(int argc, char** argv) {
   using dynains::DynaInsRemover;
-  const auto scans = dynains::bench::street_scans();
-  const auto standard = dynains::bench::measure(DynaInsRemover::Config(), scans);
-  const auto paper = dynains::bench::measure(DynaInsRemover::Config::paper(), scans);
+  const std::size_t pushes = argc > 1 ? std::max(1UL, std::stoul(argv[1])) : 96;
+  const auto scans = dynains::bench::street_scans(argc > 2 ? std::stoi(argv[2]) : 80);
+  const auto standard = dynains::bench::measure(DynaInsRemover::Config(), scans, pushes);
+  const auto paper = dynains::bench::measure(DynaInsRemover::Config::paper(), scans, pushes);
   std::printf("%-24s %10s %10s\n", "median of a push", "default", "paper");
   for (std::size_t i = 0; i < paper.size(); ++i) {
     std::printf("%-24s %10.2f %10.2f\n", paper[i].first.c_str(), standard[i].second,

@@ -52,23 +52,23 @@ struct Scan {
 struct Scene {
   std::vector<Box> boxes;
 
-  /// 80 beams from -24.8 to +12 degrees, every 0.25 degrees of azimuth, 1 cm of range noise.
-  Scan scan(const Eigen::Isometry3d& T_world_sensor, double time) const {
-    constexpr int kBeams = 80;
+  /// `beam_count` beams from -24.8 to +12 degrees, every 0.25 degrees of azimuth, 1 cm of range
+  /// noise.
+  Scan scan(const Eigen::Isometry3d& T_world_sensor, double time, int beam_count = 80) const {
     constexpr int kAzimuths = 1440;
     constexpr double kRadians = M_PI / 180.0;
     Scan result{T_world_sensor, time, {}, {}};
     Random random(1000 + static_cast<std::uint64_t>(time * 1000.0));
     const Eigen::Vector3d origin = T_world_sensor.translation();
-    Eigen::Matrix<double, 2, kBeams> beams;  // cosine and sine of each elevation
-    for (int b = 0; b < kBeams; ++b) {
-      const double elevation = (-24.8 + 36.8 * b / (kBeams - 1)) * kRadians;
+    Eigen::Matrix2Xd beams(2, beam_count);  // cosine and sine of each elevation
+    for (int b = 0; b < beam_count; ++b) {
+      const double elevation = (-24.8 + 36.8 * b / (beam_count - 1)) * kRadians;
       beams.col(b) << std::cos(elevation), std::sin(elevation);
     }
     for (int a = 0; a < kAzimuths; ++a) {
       const double azimuth = (a + 0.25) * 0.25 * kRadians;
       const Eigen::Vector2d ahead(std::cos(azimuth), std::sin(azimuth));
-      for (int b = 0; b < kBeams; ++b) {
+      for (int b = 0; b < beam_count; ++b) {
         const Eigen::Vector3d ray(beams(0, b) * ahead.x(), beams(0, b) * ahead.y(), beams(1, b));
         const Eigen::Vector3d direction = T_world_sensor.linear() * ray;
         int object = kGroundObject;
@@ -108,10 +108,11 @@ inline Eigen::Isometry3d sensor_at(double x, double y = 0.0, double yaw = 0.0) {
 }
 
 /// `count` scans at 10 Hz along x at `speed` (m/s). The sensor is turned by `yaw` (rad).
-inline std::vector<Scan> drive(const Scene& scene, int count, double speed, double yaw = 0.0) {
+inline std::vector<Scan> drive(const Scene& scene, int count, double speed, double yaw = 0.0,
+                               int beam_count = 80) {
   std::vector<Scan> scans;
   for (int i = 0; i < count; ++i) {
-    scans.push_back(scene.scan(sensor_at(speed * 0.1 * i, 0.0, yaw), 0.1 * i));
+    scans.push_back(scene.scan(sensor_at(speed * 0.1 * i, 0.0, yaw), 0.1 * i, beam_count));
   }
   return scans;
 }
