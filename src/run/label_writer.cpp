@@ -16,9 +16,10 @@ namespace {
 
 using Id = std::uint16_t;  // of an instance in a file; ids beyond start again at 1
 
-constexpr std::uint32_t mos_class(PointLabel label) {
-  if (label == PointLabel::kDynamic) return kRunMoving;
-  return is_static(label) ? kRunStatic : kRunNotJudged;
+constexpr std::uint32_t mos_class(PointLabel label) {  // without branches, for vectors
+  static_assert(kRunNotJudged == 0);
+  return kRunMoving * std::uint32_t{label == PointLabel::kDynamic} +
+         kRunStatic * std::uint32_t{is_static(label)};
 }
 
 /// Inverse of mos_class(). `point`: x y z.
@@ -36,11 +37,14 @@ void fill_mos_labels(const ScanVerdict& verdict, std::vector<std::uint32_t>& lab
   const std::size_t count = verdict.labels.size();
   labels.resize(count);
   std::uint32_t all_ids = 0;
-  detail::with_packs([&](auto) {
+  detail::with_packs([&all_ids, count, from = verdict.labels.data(),
+                      instance = verdict.instances.data(), to = labels.data()](auto) {
+    std::uint32_t ids = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      all_ids |= verdict.instances[i];
-      labels[i] = mos_class(verdict.labels[i]) | verdict.instances[i] << 16U;
+      ids |= instance[i];
+      to[i] = mos_class(from[i]) | instance[i] << 16U;
     }
+    all_ids = ids;
   });
   if (all_ids <= std::numeric_limits<Id>::max()) return;
   for (std::size_t i = 0; i < count; ++i) {
