@@ -20,6 +20,7 @@
 #include "logs/log_scans.hpp"
 #include "nuscenes.hpp"
 #include "points/bin_layout.hpp"
+#include "points/point_clock.hpp"
 #include "poses/recording_poses.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"
@@ -117,13 +118,11 @@ void list_scans(RecordingContents& r) {
   }
 }
 
-void take_sensor_frame(RecordingContents& r, const LogScans& log) {
-  const auto T_cloud_sensor = log.T_cloud_frame(r.options.sensor_frame);
-  if (!T_cloud_sensor) {
-    fail(r.folder, "expected a transform from the frame of the clouds to frame " +
-                       r.options.sensor_frame + "; found transforms of " + log.known_frames());
-  }
-  r.options.sensor_origin = T_cloud_sensor->translation();
+/// Takes the sensors that the log tells.
+void take_sensors(RecordingContents& r, const LogScans& log) {
+  if (r.options.sensors.empty()) r.options.sensors = log.sensors();
+  if (!r.options.sensors.empty() || r.options.sensor_frame.empty()) return;
+  r.options.sensor_origin = log.T_cloud_frame(r.options.sensor_frame).translation();
 }
 
 /// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
@@ -152,10 +151,11 @@ std::unique_ptr<ScanReader> open_log(RecordingContents& r) {
     name << std::setw(6) << std::setfill('0') << i;
     r.scans.push_back({r.folder, name.str(), i, log->times()[i]});
   }
-  if (!r.options.sensor_frame.empty()) take_sensor_frame(r, *log);
+  take_sensors(r, *log);
+  if (log->is_merged() && !log->is_in_world()) r.clock = std::make_shared<const PointClock>();
   if (!has_file && !r.options.without_poses) {
     r.trajectory = log->trajectory();
-    if (r.options.deskew) r.motion = log->motion();
+    if (r.options.deskew || r.clock) r.motion = log->motion();
   }
   pose_by_stamps(r, r.folder);
   return make_log_reader(std::move(log));
@@ -326,7 +326,7 @@ OpenedRecording open_recording(const fs::path& path, const RecordingOptions& opt
   note_frame(r);
   const bool is_raw = options.without_poses && r.columns.time && !options.is_compensated;
   r.options.deskew = options.deskew || is_raw;
-  if (r.options.deskew) prepare_deskewing(r, *reader);
+  if (r.options.deskew || r.clock) prepare_deskewing(r, *reader);
   warn_of_lost_scans(r);
   return {std::move(r), std::move(reader)};
 }

@@ -115,7 +115,7 @@ void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   }
   read_sensors(i, scan);
   if (!contents_.options.self_boxes.empty()) clear_boxes(contents_.options.self_boxes, scan);
-  if (contents_.options.deskew && !contents_.motion.poses.empty())
+  if (contents_.clock && !contents_.motion.poses.empty())
     deskew(contents_.motion, time(i), T_world_sensor(i), *contents_.clock, file(i), scan);
 }
 
@@ -162,7 +162,7 @@ std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
 
 std::vector<double> Recording::point_offsets(std::size_t i, const RecordedScan& scan) const {
   std::vector<double> offsets;
-  if (!contents_.options.deskew || scan.time.size() != scan.size()) return offsets;
+  if (!contents_.clock || scan.time.size() != scan.size()) return offsets;
   const PointTimes times = times_of_scan(scan, *contents_.clock);
   for (const double point_time : scan.time) {
     offsets.push_back(times.holds(point_time) ? contents_.clock->after(time(i), point_time)

@@ -41,6 +41,16 @@ std::optional<std::vector<double>> numbers_in(std::string text, std::string_view
   return numbers;
 }
 
+std::vector<std::string> names_in(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::string_view rest = text;
+  std::vector<std::string> names;
+  for (auto name = next_token(rest); !name.empty(); name = next_token(rest)) {
+    names.emplace_back(name);
+  }
+  return names;
+}
+
 std::string listed(const std::vector<std::string>& names) {
   constexpr std::size_t kShown = 50;
   std::string text;

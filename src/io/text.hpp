@@ -32,6 +32,9 @@ std::string in_seconds(double time);
 /// text has other words.
 std::optional<std::vector<double>> numbers_in(std::string text, std::string_view separators);
 
+/// The names of a list such as "a, b".
+std::vector<std::string> names_in(std::string text);
+
 /// "a, b, c", at most 50 names and the number of others; "none" without names.
 std::string listed(const std::vector<std::string>& names);
 

@@ -32,11 +32,17 @@ class CloudEditor {
   CloudEditor(const RunPlan& plan, fs::path labels)
       : log_(*plan.sequence.log()), labels_(std::move(labels)), outputs_(plan.settings.outputs) {
     for (const LogMessage& message : log_.log().messages()) {
-      if (message.topic == log_.cloud_topic()) names_[place_of(message)];
+      if (log_.has_topic(message.topic)) parts_[place_of(message)];
     }
-    unjudged_ = names_.size() - plan.range.size();
+    unjudged_ = parts_.size();
     for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
-      names_[place_of(log_.clouds()[plan.sequence.file_index(i)])] = plan.sequence.name(i);
+      std::size_t begin = 0;
+      for (const LogCloud& cloud : log_.clouds(plan.sequence.file_index(i))) {
+        parts_[place_of(cloud.message)] = {plan.sequence.name(i), begin,
+                                           log_.point_count(plan.sequence.file_index(i))};
+        begin += cloud.points;
+        --unjudged_;
+      }
     }
   }
 
@@ -45,24 +51,33 @@ class CloudEditor {
   std::optional<std::string> operator()(const LogMessage& message,
                                         const SerialisedMessage& cloud) const {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-    const auto name = names_.find(place_of(message));
-    if (name == names_.end() || (!outputs_.mark_log && name->second.empty())) return std::nullopt;
-    const std::string& type = log_.log().topics()[log_.cloud_topic()].type;
+    const auto part = parts_.find(place_of(message));
+    if (part == parts_.end() || (!outputs_.mark_log && part->second.scan.empty())) {
+      return std::nullopt;
+    }
+    const std::string& type = log_.log().topics()[message.topic].type;
     const std::vector<std::uint8_t> classes =
-        classes_of(name->second, inspect_cloud(type, cloud).points);
+        classes_of(part->second, inspect_cloud(type, cloud).points);
     if (outputs_.mark_log) return with_labels(type, cloud, classes);
     const std::vector<std::uint8_t> keep = kept(classes);
     return without_points(type, cloud, keep);
   }
 
  private:
-  std::vector<std::uint8_t> classes_of(const std::string& name, std::size_t points) const {
+  /// The points of a cloud in a scan.
+  struct Part {
+    std::string scan;  ///< its name; empty: it has no labels
+    std::size_t begin = 0;
+    std::size_t scan_size = 0;
+  };
+
+  std::vector<std::uint8_t> classes_of(const Part& part, std::size_t points) const {
     std::vector<std::uint8_t> classes(points, static_cast<std::uint8_t>(kRunNotJudged));
-    if (name.empty()) return classes;
-    const fs::path file = labels_ / (name + ".label");
-    const std::vector<std::uint32_t> labels = read_run_labels(file, points);
+    if (part.scan.empty()) return classes;
+    const fs::path file = labels_ / (part.scan + ".label");
+    const std::vector<std::uint32_t> labels = read_run_labels(file, part.scan_size);
     for (std::size_t i = 0; i < points; ++i) {
-      classes[i] = static_cast<std::uint8_t>(class_of(labels[i]));
+      classes[i] = static_cast<std::uint8_t>(class_of(labels.at(part.begin + i)));
     }
     return classes;
   }
@@ -78,7 +93,7 @@ class CloudEditor {
   const LogScans& log_;
   fs::path labels_;
   const RunOutputs& outputs_;
-  std::map<Place, std::string> names_;  ///< of the clouds on the topic; empty: without labels
+  std::map<Place, Part> parts_;  ///< of all clouds on the topics
   std::size_t unjudged_ = 0;
 };
 
@@ -93,8 +108,11 @@ void check_log_output(const RunPlan& plan) {
   }
   if (target.extension() != ".mcap") throw ConfigError(flag + "expected a name that ends in .mcap");
   if (!plan.settings.outputs.mark_log) return;
-  const std::string& type = log->log().topics()[log->cloud_topic()].type;
-  if (!can_have_labels(type)) throw ConfigError("--mark: clouds of " + type + " have no labels");
+  for (std::uint32_t i = 0; i < log->log().topics().size(); ++i) {
+    const std::string& type = log->log().topics()[i].type;
+    if (!log->has_topic(i) || can_have_labels(type)) continue;
+    throw ConfigError("--mark: clouds of " + type + " have no labels");
+  }
   if (plan.sequence.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 

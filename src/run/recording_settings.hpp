@@ -111,7 +111,7 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
   visitor(Parameter{"pose_gap", o.pose_gap, closed(0.0, 1000.0), "s",
                     "longest time between two poses of a file for interpolation"});
   visitor(plain_text("cloud_topic", o.cloud_topic, "NAME",
-                     "topic of the clouds of a log [the only one]"));
+                     "topic of the clouds of a log, or A,B,C for several sensors [the only one]"));
   visitor(plain_text("frame_id", o.cloud_frame, "NAME",
                      "frame of the clouds of a log that count, if several sensors share their "
                      "topic [the only one]"));
@@ -124,8 +124,8 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                      "take the poses of a log from TF, in this fixed frame [the root of the "
                      "tree]"));
   visitor(plain_text("sensor_frame", o.sensor_frame, "NAME",
-                     "frame of the lidar in TF of a log; gives the sensor origin [that of the "
-                     "clouds]"));
+                     "frame of the lidar in TF of a log, or A,B,C for several; gives the sensor "
+                     "origin, or the sensors [that of the clouds]"));
 }
 
 }  // namespace dynains::program

@@ -119,6 +119,89 @@ TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
              ContainsSubstring("to frame radar; found transforms of base, lidar"));
 }
 
+TEST_CASE("Clouds of several topics within half a period are one scan, at one time") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "rig.mcap";
+  const Eigen::Isometry3d T_base_rear = pose_at(-2, 0);
+  const LogChannel rear = {"/rear", "sensor_msgs/msg/PointCloud2"};
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "rear", T_base_rear)});
+  for (const double time : {0.98, 1.04, 1.13, 1.38}) {  // twice, once, never, and too late
+    messages.push_back({3, nanoseconds(time), small_cloud(time, "rear")});
+  }
+  for (const double time : {0.9, 1.4}) {
+    messages.push_back(
+        {1, nanoseconds(time), transform(time, "odom", "base", pose_at(10 * time - 10, 0))});
+  }
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf, rear}, messages, {}));
+  RecordingOptions options;
+  options.cloud_topic = "/points, /rear";
+  const Recording recording(log, options);
+  REQUIRE(recording.size() == 5);
+  REQUIRE(recording.sensors().size() == 2);
+  CHECK(recording.sensors()[0].isApprox(Pose::Identity()));
+  CHECK(recording.sensors()[1].isApprox(kT_base_lidar.inverse() * T_base_rear, 1e-9));
+  CHECK(recording.point_count(0) == 6);
+  CHECK(recording.read_scan(0).sensor == std::vector<std::uint8_t>{0, 0, 1, 1, 1, 1});
+  CHECK(recording.read_scan(1).sensor == std::vector<std::uint8_t>{0, 0, 1, 1});
+  CHECK(recording.read_scan(2).sensor == std::vector<std::uint8_t>{0, 0});
+  CHECK(recording.read_scan(4).sensor == std::vector<std::uint8_t>{1, 1});
+  CHECK(recording.time(4) == Approx(1.38));
+
+  // Points of the second sensor were measured 0.03 s after the scan, by 0.3 m farther on.
+  const Eigen::Vector3d measured(1, 2, 3);
+  const Eigen::Vector3d expected =
+      (pose_at(1, 0) * kT_base_lidar).inverse() * (pose_at(1.3, 0) * T_base_rear * measured);
+  const RecordedScan scan = recording.read_scan(1);
+  CHECK(Eigen::Vector3f(scan.xyzi.data()).isApprox(measured.cast<float>()));
+  CHECK(Eigen::Vector3f(scan.xyzi.data() + 8).isApprox(expected.cast<float>(), 1e-5F));
+  REQUIRE(scan.time.size() == 4);
+  CHECK(scan.time[1] == 0.0);
+  CHECK(scan.time[3] == Approx(0.03));
+
+  options.without_poses = true;  // the odometry gets the times instead
+  const Recording unplaced(log, options);
+  const RecordedScan raw = unplaced.read_scan(1);
+  const Eigen::Vector3d at_its_time = unplaced.sensors()[1] * measured;
+  CHECK(Eigen::Vector3f(raw.xyzi.data() + 8).isApprox(at_its_time.cast<float>(), 1e-5F));
+  CHECK(unplaced.point_offsets(1, raw).back() == Approx(0.03));
+
+  options.cloud_topic = "/points,/points";
+  CHECK_THAT(log_error(log, options), ContainsSubstring("each topic once, found /points twice"));
+  messages.erase(messages.begin());
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf, rear}, messages, {}));
+  options.cloud_topic = "/points,/rear";
+  CHECK_THAT(
+      log_error(log, options),
+      ContainsSubstring("expected a transform from frame lidar of the clouds to frame rear"));
+}
+
+TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "rig.mcap";
+  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr, "base");
+  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "left", pose_at(1, 0))});
+  MessageWriter info(MessageEncoding::kCdr);
+  info.header(nanoseconds(1.1), "base").number(std::uint8_t{1}).number(std::uint8_t{1});
+  info.number(3U).raw("abc").number(2U);
+  const auto add = [&](const std::string& frame, std::uint32_t begin) {
+    info.header(nanoseconds(1.1), frame).string("/" + frame).number(std::uint8_t{0});
+    info.number(begin).number(1U);
+  };
+  add("lidar", 1);
+  add("left", 0);
+  messages.push_back({3, nanoseconds(1.1), info.bytes()});
+  const LogChannel infos = {"/info", "autoware_sensing_msgs/msg/ConcatenatedPointCloudInfo"};
+  write_text(log, mcap_file({kPoints, kTf, kStaticTf, infos}, messages, {}));
+  const Recording recording(log);
+  REQUIRE(recording.sensors().size() == 2);
+  const RecordedScan scan = recording.read_scan(1);
+  REQUIRE(scan.sensor.size() == 2);
+  CHECK(recording.sensors().at(scan.sensor[0]).isApprox(pose_at(1, 0), 1e-9));
+  CHECK(recording.sensors().at(scan.sensor[1]).isApprox(kT_base_lidar, 1e-9));
+  CHECK(recording.read_scan(2).sensor.empty());  // not told
+}
+
 TEST_CASE("A log of each format is a recording with clouds and with poses from transforms") {
   const TemporaryFolder folder;
   write_text(folder / "drive.mcap", drive_mcap());

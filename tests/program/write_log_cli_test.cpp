@@ -17,6 +17,7 @@
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
+#include "support/rig_log.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
@@ -165,6 +166,50 @@ TEST_CASE("run --mark adds the labels of the run to all clouds") {
   check_refused(start({"run", target, "--out", fixture.folder / "again", "--write-log",
                        fixture.folder / "twice.mcap", "--mark"}),
                 2, "have labels already");
+}
+
+TEST_CASE("A rig with a topic for each sensor is run as its merged clouds, and cleaned by topic") {
+  const TemporaryFolder folder;
+  const std::string rig = folder / "rig";
+  succeed(start({"simulate", rig, "--rig", "corners", "--sensor", "vlp16", "--scans", "25",
+                 "--pose-noise-translation", "0", "--pose-noise-rotation", "0"}));
+  const Recording merged(rig);
+  const std::string log = folder / "rig.mcap", clean = folder / "clean.mcap";
+  write_rig_log(merged, {0.0, 0.045}, merged.sensors(), log);
+  const Arguments topics = {"--cloud-topic", "/lidar0,/lidar1"};
+  const std::string out = folder / "out", of_rig = folder / "of_rig";
+  succeed(start({"run", rig, "--out", of_rig}));
+  succeed(start(Arguments{"run", log, "--out", out, "--write-log", clean} + topics));
+  const auto report = nlohmann::json::parse(read_text(fs::path(out) / "report.json"));
+  CHECK(report["scans"] == 24);
+
+  RecordingOptions options;
+  options.cloud_topic = topics[1];
+  const Recording before(log, options), after(clean, options);
+  REQUIRE(after.size() == 24);
+  std::size_t moving = 0, same = 0, points = 0;
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const RecordedScan scan = before.read_scan(i);
+    const std::string name = scan_name(i) + ".label";
+    const auto labels = read_labels(fs::path(out) / "labels" / name, scan.size());
+    const auto expected = read_labels(fs::path(of_rig) / "labels" / name, scan.size());
+    std::vector<float> kept;
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      const bool is_moving = (labels[k] & 0xffffU) == 251;
+      moving += is_moving ? 1 : 0;
+      same += is_moving == ((expected[k] & 0xffffU) == 251) ? 1 : 0;
+      if (!is_moving) kept.insert(kept.end(), {scan.xyzi[4 * k], scan.xyzi[4 * k + 1]});
+    }
+    points += scan.size();
+    std::vector<float> found;
+    const RecordedScan cleaned_scan = after.read_scan(i);
+    for (std::size_t k = 0; k < cleaned_scan.size(); ++k) {
+      found.insert(found.end(), {cleaned_scan.xyzi[4 * k], cleaned_scan.xyzi[4 * k + 1]});
+    }
+    CHECK(found == kept);
+  }
+  CHECK(moving > 0);
+  CHECK(static_cast<double>(same) > 0.995 * static_cast<double>(points));
 }
 
 TEST_CASE("A log that is a folder is written as one file, not into that folder") {

@@ -48,7 +48,7 @@ struct RecordingOptions {
   PoseConvention convention;
   double time_offset = 0.0;       ///< s; a scan at time t has the pose at t + time_offset
   double pose_gap = kMaxPoseGap;  ///< s, longest interval between poses for interpolation
-  std::string cloud_topic;        ///< for logs; empty: the only topic of clouds
+  std::string cloud_topic;        ///< for logs, "A,B" for several; empty: the only one of clouds
   std::string cloud_frame;        ///< for logs: of the clouds that count; empty: the only one
   std::string pose_topic;         ///< for logs; empty: the only topic of poses
   std::string pose_frame;  ///< for logs: fixed frame of transforms; empty: root of their tree
@@ -63,7 +63,8 @@ struct RecordingOptions {
   /// the recording, or one sensor.
   std::vector<Pose> sensors;
   int sensor_beams = 0;  ///< beams of one sensor, if `laser_number` counts those of all; 0: none
-  /// For logs: frame of the sensor; its transform to the frame of the clouds gives the origin.
+  /// For logs: frame of the sensor; its transform to the frame of the clouds gives the origin, or
+  /// the poses of several: "A,B".
   std::string sensor_frame;
   double point_time_unit = 0.0;  ///< s per unit of the times of points; 0: found by their span
   double point_unit = 1.0;       ///< m per unit of the coordinates of points
@@ -136,7 +137,7 @@ struct RecordingContents {
   Trajectory trajectory;                                ///< rows of the poses as in their file
   std::vector<std::optional<TrajectoryMatch>> matches;  ///< rows for each cloud or file of a scan
   Trajectory motion;                                    ///< T_world_sensor, for de-skewing
-  std::shared_ptr<const PointClock> clock;              ///< for de-skewing
+  std::shared_ptr<const PointClock> clock;              ///< if points move to the time of a scan
   std::vector<ScanEntry> scans;                         ///< with a pose, unless none has one
   std::vector<std::filesystem::path> files;             ///< without files of labels
   std::optional<std::string> early_end;                 ///< of a truncated log
@@ -190,8 +191,12 @@ struct RecordingContents {
 /// clouds; without such transforms, the poses are used as poses of the sensor. If the clouds are in
 /// the fixed frame of the poses, PointFrame is kWorld.
 ///
+/// Clouds of several topics within half a period of the first one are one scan, in the frame of the
+/// first topic. Transforms give the poses of their sensors. Their points move to the stamp of the
+/// scan by the poses, with RecordingOptions::deskew each from its own time.
+///
 /// Sensors of points (see Recording::sensors()) are in sensor/NAME.id (uint8 per point) in the
-/// folder of sensors.txt, or in a column, see PointFile.
+/// folder of sensors.txt, in a column, see PointFile, or in ConcatenatedPointCloudInfo of Autoware.
 ///
 /// With a sensor origin, points and poses are in a frame at the sensor with the axes of the clouds.
 ///

@@ -1,12 +1,16 @@
 #include "log_scans.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <set>
 #include <utility>
 
 #include "../failure.hpp"
 #include "../text.hpp"
 #include "decompress.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/median.hpp"
 
 namespace dynains {
 namespace {
@@ -72,29 +76,42 @@ LogScans::LogScans(const std::filesystem::path& path, const RecordingOptions& op
       options_(options),
       with_poses_(with_poses),
       transforms_(options.pose_gap) {
-  choose_cloud_topic();
+  choose_cloud_topics();
   if (with_poses) choose_pose_topic();
   read_log();
-  check_clouds();
+  for (const Source& source : sources_) check_clouds(source);
+  note_disordered();
+  form_scans();
+  find_sensors();
+  if (is_merged()) find_clocks();
   if (with_poses) place_scans();
 }
 
-void LogScans::choose_cloud_topic() {
+void LogScans::choose_cloud_topics() {
   const Topics clouds = filter(log_->topics(), is_cloud_type);
   if (clouds.empty()) {
     const std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
     fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()) + end);
   }
-  const std::string& wanted = options_.cloud_topic;
+  std::vector<std::string> wanted = text::names_in(options_.cloud_topic);
   if (wanted.empty() && clouds.size() > 1) {
     fail(log_->path(), "expected one topic with clouds, or --cloud-topic; found " + list(clouds));
   }
-  if (!wanted.empty() && !has(clouds, wanted)) {
-    fail(log_->path(), "expected clouds on topic " + wanted + "; found " + list(clouds));
+  if (wanted.empty()) wanted.push_back(clouds.front().name);
+  for (const std::string& name : wanted) {
+    if (!has(clouds, name)) {
+      fail(log_->path(), "expected clouds on topic " + name + "; found " + list(clouds));
+    }
+    const std::uint32_t topic = index_of(log_->topics(), named(clouds, name));
+    if (has_topic(topic)) fail(log_->path(), "expected each topic once, found " + name + " twice");
+    sources_.emplace_back().topic = topic;
+    notes_.push_back("clouds from topic " + name);
   }
-  const LogTopic chosen = wanted.empty() ? clouds.front() : named(clouds, wanted);
-  cloud_topic_ = index_of(log_->topics(), chosen);
-  notes_.push_back("clouds from topic " + chosen.name);
+}
+
+bool LogScans::has_topic(std::uint32_t topic) const {
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [&](const Source& source) { return source.topic == topic; });
 }
 
 /// A topic of poses comes before transforms.
@@ -128,34 +145,40 @@ void LogScans::choose_pose_topic() {
 }
 
 void LogScans::read_log() {
+  const auto is_wanted = [&](const LogTopic& topic) { return is_concatenation_type(topic.type); };
+  const bool with_transforms = with_poses_ || is_merged() || !options_.sensor_frame.empty() ||
+                               std::any_of(log_->topics().begin(), log_->topics().end(), is_wanted);
   for (const LogMessage& message : log_->messages()) {
     const LogTopic& topic = log_->topics()[message.topic];
-    if (message.topic == cloud_topic_) take_cloud(message);
-    const bool is_transform = is_readable(topic) && is_transform_type(topic.type);
-    const bool is_wanted = with_poses_ ? message.topic == pose_topic_ || is_transform
-                                       : !options_.sensor_frame.empty() && is_transform;
-    if (is_wanted) take_poses(message);
+    for (Source& source : sources_) {
+      if (message.topic == source.topic) take_cloud(message, source);
+    }
+    if (!is_readable(topic)) continue;
+    const bool is_transform = with_transforms && is_transform_type(topic.type);
+    if (is_transform || message.topic == pose_topic_) take_poses(message);
+    if (is_concatenation_type(topic.type)) {
+      Concatenation concatenation = read_concatenation(load(message));
+      concatenations_[concatenation.time] = std::move(concatenation.parts);
+    }
   }
   transforms_.sort();
   sort_by_time(poses_);
 }
 
-void LogScans::take_cloud(const LogMessage& message) {
+void LogScans::take_cloud(const LogMessage& message, Source& source) {
   const SerialisedMessage serialised = load(message);
   const CloudInfo cloud = inspect_cloud(log_->topics()[message.topic].type, serialised);
-  ++clouds_of_frames_[cloud.frame];
-  if (clouds_.empty()) {
-    cloud_frame_ = options_.cloud_frame.empty() ? cloud.frame : options_.cloud_frame;
-    columns_ = cloud.columns;
+  ++source.frames[cloud.frame];
+  if (source.clouds.empty()) {
+    source.frame = options_.cloud_frame.empty() ? cloud.frame : options_.cloud_frame;
+    source.columns = cloud.columns;
   }
-  if (cloud.frame != cloud_frame_) return;
-  if (!times_.empty() && !(cloud.time > times_.back())) {
+  if (cloud.frame != source.frame) return;
+  if (!source.clouds.empty() && !(cloud.time > source.clouds.back().time)) {
     ++disordered_;
     return;
   }
-  clouds_.push_back(message);
-  times_.push_back(cloud.time);
-  point_counts_.push_back(cloud.points);
+  source.clouds.push_back({message, cloud.time, cloud.points});
 }
 
 void LogScans::take_poses(const LogMessage& message) {
@@ -174,24 +197,135 @@ void LogScans::take_poses(const LogMessage& message) {
   }
 }
 
-void LogScans::check_clouds() {
-  if (clouds_.empty() || (clouds_of_frames_.size() > 1 && options_.cloud_frame.empty())) {
-    std::vector<std::string> found;
-    for (const auto& [frame, count] : clouds_of_frames_) {
-      found.push_back(frame + " (" + std::to_string(count) + ")");
-    }
-    fail(log_->path(),
-         "expected clouds of one frame, or --frame-id for those of one sensor; found "
-         "frames " +
-             text::listed(found));
+void LogScans::check_clouds(const Source& source) const {
+  if (!source.clouds.empty() && (source.frames.size() == 1 || !options_.cloud_frame.empty())) {
+    return;
   }
+  std::vector<std::string> found;
+  for (const auto& [frame, count] : source.frames) {
+    found.push_back(frame + " (" + std::to_string(count) + ")");
+  }
+  fail(log_->path(),
+       "expected clouds of one frame, or --frame-id for those of one sensor; found "
+       "frames " +
+           text::listed(found));
+}
+
+void LogScans::note_disordered() {
   if (disordered_ == 0) return;
+  std::size_t taken = 0;
+  for (const Source& source : sources_) taken += source.clouds.size();
   const std::string count = std::to_string(disordered_) + " of " +
-                            std::to_string(disordered_ + size()) +
+                            std::to_string(disordered_ + taken) +
                             " clouds have a stamp that is not after that of the cloud before";
-  if (disordered_ >= size()) fail(log_->path(), "expected stamps that increase: " + count);
-  const bool are_many = 10 * disordered_ > size();
+  if (disordered_ >= taken) fail(log_->path(), "expected stamps that increase: " + count);
+  const bool are_many = 10 * disordered_ > taken;
   (are_many ? warnings_ : notes_).push_back(count + ", and are left out");
+}
+
+/// A cloud belongs to the nearest scan, if that is near; a sensor may be missing or come twice.
+void LogScans::form_scans() {
+  std::vector<double> steps;
+  const std::vector<LogCloud>& first = sources_.front().clouds;
+  for (std::size_t i = 1; i < first.size(); ++i) steps.push_back(first[i].time - first[i - 1].time);
+  const double near = 0.5 * median(std::move(steps));
+  std::map<double, std::vector<LogCloud>> scans;
+  for (const Source& source : sources_) {
+    const bool is_first = &source == &sources_.front();
+    for (const LogCloud& cloud : source.clouds) {
+      auto scan = scans.lower_bound(cloud.time);
+      const bool has_before = scan != scans.begin();
+      if (has_before &&
+          (scan == scans.end() || cloud.time - std::prev(scan)->first < scan->first - cloud.time)) {
+        --scan;
+      }
+      const bool is_near = scan != scans.end() && std::abs(scan->first - cloud.time) <= near;
+      (is_near && !is_first ? scan->second : scans[cloud.time]).push_back(cloud);
+    }
+  }
+  for (auto& [time, clouds] : scans) {
+    times_.push_back(time);
+    scans_.push_back(std::move(clouds));
+  }
+  cloud_frame_ = sources_.front().frame;
+  columns_ = sources_.front().columns;
+  for (const Source& source : sources_) {
+    columns_.intensity |= source.columns.intensity;
+    columns_.ring |= source.columns.ring;
+    columns_.time |= source.columns.time;
+    columns_.label &= source.columns.label;
+  }
+}
+
+/// Several sensors are those of the options, of the topics, or of clouds that were put together
+/// before they were recorded.
+void LogScans::find_sensors() {
+  std::vector<std::string> frames = text::names_in(options_.sensor_frame);
+  if (frames.size() == 1) frames.clear();  // the origin of all
+  sensors_ = options_.sensors;
+  const bool are_given = !frames.empty() || !sensors_.empty();
+  if (!are_given && is_merged()) {
+    for (const Source& source : sources_) frames.push_back(source.frame);
+  }
+  for (const std::string& frame : frames) sensors_.push_back(T_cloud_frame(frame));
+  if (!are_given && !is_merged()) find_concatenated();
+  if (!is_merged()) return;
+  if (sensors_.size() != sources_.size()) {
+    throw ConfigError("expected one sensor for each of " + std::to_string(sources_.size()) +
+                      " topics, found " + std::to_string(sensors_.size()));
+  }
+  bool are_moved = are_given;  // before they were recorded
+  for (std::size_t k = 0; k < sources_.size(); ++k) {
+    if (sources_[k].frame == cloud_frame_) continue;
+    are_moved = true;
+    sources_[k].T_scan_cloud =
+        options_.sensors.empty() ? T_cloud_frame(sources_[k].frame) : sensors_[k];
+  }
+  if (are_moved) return;
+  sensors_.clear();
+  warnings_.push_back("the clouds of all topics are in frame " + cloud_frame_ +
+                      ", so their beams count as those of one sensor there; --sensor-frame A,B "
+                      "names the frames of the sensors");
+}
+
+/// The sensors whose points a topic of Autoware tells apart.
+void LogScans::find_concatenated() {
+  std::set<std::string> frames;
+  for (const auto& [time, parts] : concatenations_) {
+    for (const Concatenation::Part& part : parts) {
+      if (part.length > 0) frames.insert(part.frame);
+    }
+  }
+  concatenated_.assign(frames.begin(), frames.end());
+  try {
+    for (const std::string& frame : concatenated_) sensors_.push_back(T_cloud_frame(frame));
+  } catch (const IoError& error) {
+    warnings_.push_back("points of several sensors count as those of one: " +
+                        std::string(error.what()));
+    sensors_.clear();
+    concatenated_.clear();
+  }
+}
+
+/// The clocks of points, if the times of points count.
+void LogScans::find_clocks() {
+  if (!options_.deskew && (with_poses_ || options_.is_compensated)) return;
+  for (Source& source : sources_) {
+    if (!source.columns.time) continue;
+    std::vector<double> times;
+    for (const LogCloud& cloud : source.clouds) times.push_back(cloud.time);
+    const PointClockFinding finding =
+        find_clock(times, true, options_.point_time_unit, [&](std::size_t i) -> RecordedScan& {
+          read(source.clouds[i], part_);
+          return part_;
+        });
+    const std::string& topic = log_->topics()[source.topic].name;
+    if (!finding.clock && !finding.text.empty()) {
+      fail(log_->path(), topic + " cannot be de-skewed: " + finding.text);
+    }
+    if (!finding.text.empty()) warnings_.push_back(topic + ": " + finding.text);
+    source.clock = finding.clock;
+  }
 }
 
 void LogScans::place_scans() {
@@ -235,11 +369,13 @@ void LogScans::fail_without_poses() const {
                          "cloud at t");
 }
 
-std::optional<Pose> LogScans::T_cloud_frame(const std::string& frame) const {
-  return transforms_.find(cloud_frame_, frame, times_.front());
+Pose LogScans::T_cloud_frame(const std::string& frame) const {
+  const auto T_cloud_frame = transforms_.find(cloud_frame_, frame, times_.front());
+  if (T_cloud_frame) return *T_cloud_frame;
+  fail(log_->path(), "expected a transform from frame " + cloud_frame_ +
+                         " of the clouds to frame " + frame + "; found transforms of " +
+                         text::listed(transforms_.frames()));
 }
-
-std::string LogScans::known_frames() const { return text::listed(transforms_.frames()); }
 
 Trajectory LogScans::motion() const {
   Trajectory motion;
@@ -329,14 +465,64 @@ SerialisedMessage LogScans::load(const LogMessage& message) {
   return unpacked(*log_, log_->topics()[message.topic], message.time, bytes_, compressed_);
 }
 
+std::size_t LogScans::point_count(std::size_t i) const {
+  std::size_t count = 0;
+  for (const LogCloud& cloud : scans_.at(i)) count += cloud.points;
+  return count;
+}
+
+void LogScans::read(const LogCloud& cloud, RecordedScan& scan) {
+  read_cloud(log_->topics()[cloud.message.topic].type, load(cloud.message), scan);
+}
+
 void LogScans::read(std::size_t i, RecordedScan& scan) {
-  const LogMessage& message = clouds_.at(i);
-  read_cloud(log_->topics()[message.topic].type, load(message), scan);
+  const std::vector<LogCloud>& clouds = scans_.at(i);
+  if (is_merged()) {
+    scan.xyzi.clear();
+    scan.ring.clear();
+    scan.time.clear();
+    scan.sensor.clear();
+    for (const LogCloud& cloud : clouds) merge(cloud, times_[i], scan);
+    return;
+  }
+  read(clouds.front(), scan);
+  const auto parts = concatenations_.find(times_[i]);
+  if (concatenated_.empty() || parts == concatenations_.end()) return;
+  scan.sensor.assign(scan.size(), 0);
+  for (const Concatenation::Part& part : parts->second) {
+    const auto sensor = std::lower_bound(concatenated_.begin(), concatenated_.end(), part.frame);
+    const std::size_t begin = std::min(part.begin, scan.size());
+    std::fill_n(scan.sensor.begin() + static_cast<std::ptrdiff_t>(begin),
+                std::min(part.length, scan.size() - begin),
+                static_cast<std::uint8_t>(sensor - concatenated_.begin()));
+  }
+}
+
+/// Adds the points of one of several clouds. `time`: s, of the scan.
+void LogScans::merge(const LogCloud& cloud, double time, RecordedScan& scan) {
+  read(cloud, part_);
+  const auto is_its = [&](const Source& one) { return one.topic == cloud.message.topic; };
+  const auto source = std::find_if(sources_.begin(), sources_.end(), is_its);
+  for (std::size_t k = 0; k < part_.size(); ++k) {
+    Eigen::Map<Eigen::Vector3f> p(part_.xyzi.data() + 4 * k);
+    if (!p.isZero(0.0F)) p = (source->T_scan_cloud * p.cast<double>()).cast<float>();
+    const double after = source->clock ? source->clock->after(cloud.time, part_.time[k]) : 0.0;
+    scan.time.push_back(cloud.time - time + after);
+  }
+  scan.xyzi.insert(scan.xyzi.end(), part_.xyzi.begin(), part_.xyzi.end());
+  if (columns_.ring) part_.ring.resize(part_.size());
+  scan.ring.insert(scan.ring.end(), part_.ring.begin(), part_.ring.end());
+  scan.sensor.resize(scan.size(), static_cast<std::uint8_t>(source - sources_.begin()));
 }
 
 std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {
-  const LogMessage& message = clouds_.at(i);
-  return read_cloud_labels(log_->topics()[message.topic].type, load(message));
+  std::vector<std::uint32_t> labels;
+  for (const LogCloud& cloud : scans_.at(i)) {
+    const std::string& type = log_->topics()[cloud.message.topic].type;
+    const std::vector<std::uint32_t> more = read_cloud_labels(type, load(cloud.message));
+    labels.insert(labels.end(), more.begin(), more.end());
+  }
+  return labels;
 }
 
 }  // namespace dynains

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../points/point_clock.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
@@ -22,20 +23,38 @@ namespace dynains {
 SerialisedMessage unpacked(const LogFile& log, const LogTopic& topic, std::uint64_t time,
                            std::vector<std::uint8_t>& bytes, std::vector<std::uint8_t>& spare);
 
-/// Finds the cloud topic and the poses of a log. Reads it once from begin to end, checks every
-/// cloud, and keeps the poses and the addresses of the clouds. Throws IoError, also if the choice
-/// of a topic is not clear.
+/// A message with points.
+struct LogCloud {
+  LogMessage message;
+  double time = 0.0;  ///< s, stamp
+  std::size_t points = 0;
+};
+
+/// Finds the clouds and the poses of a log. Reads it once from begin to end, checks every cloud,
+/// and keeps the poses and the addresses of the clouds. Throws IoError, also if the choice of a
+/// topic is not clear.
+///
+/// A scan is one cloud, or, of several topics, all clouds within half a period of the stamp of one
+/// on the first topic, in the frame of that topic. Clouds without one there are a scan of their
+/// own.
 class LogScans {
  public:
   /// Without `with_poses`, poses of the log are not looked for.
   LogScans(const std::filesystem::path& path, const RecordingOptions& options, bool with_poses);
 
   const LogFile& log() const { return *log_; }
-  std::size_t size() const { return clouds_.size(); }
-  /// Places of the clouds; of topic cloud_topic(), which may have further ones.
-  const std::vector<LogMessage>& clouds() const { return clouds_; }
-  std::uint32_t cloud_topic() const { return cloud_topic_; }
-  /// Stamps of the clouds, s, increasing.
+  std::size_t size() const { return scans_.size(); }
+  /// The clouds of scan i, whose points follow each other in it. Their topics may have further
+  /// clouds, which are no scans.
+  const std::vector<LogCloud>& clouds(std::size_t i) const { return scans_.at(i); }
+  /// Whether messages of this topic are clouds of scans.
+  bool has_topic(std::uint32_t topic) const;
+  /// Whether scans have clouds of several topics: then the times of their points are in s from the
+  /// stamp of the scan.
+  bool is_merged() const { return sources_.size() > 1; }
+  /// Poses of the sensors in the frame of the clouds, m; empty if the log does not tell several.
+  const std::vector<Pose>& sensors() const { return sensors_; }
+  /// Stamps of the scans, s, increasing.
   const std::vector<double>& times() const { return times_; }
   /// T_world_sensor (T_world_body if the extrinsic calibration is the user's), at the times of the
   /// scans that have a pose plus `time_offset`; empty without poses.
@@ -44,14 +63,12 @@ class LogScans {
   Trajectory motion() const;
   /// Whether the frame of the clouds is the fixed frame of the poses.
   bool is_in_world() const { return is_in_world_; }
-  /// Pose of `frame` in the frame of the clouds at the time of the first one; empty if the log does
-  /// not connect them.
-  std::optional<Pose> T_cloud_frame(const std::string& frame) const;
-  /// Names of the frames with a transform, or "none".
-  std::string known_frames() const;
-  /// Columns of the first cloud.
+  /// Pose of `frame` in the frame of the clouds at the time of the first one. Throws IoError if the
+  /// log does not connect them.
+  Pose T_cloud_frame(const std::string& frame) const;
+  /// Columns of the first clouds.
   const PointColumns& columns() const { return columns_; }
-  std::size_t point_count(std::size_t i) const { return point_counts_.at(i); }
+  std::size_t point_count(std::size_t i) const;
   const std::vector<std::string>& notes() const { return notes_; }
   /// Defects that results depend on.
   const std::vector<std::string>& warnings() const { return warnings_; }
@@ -60,12 +77,30 @@ class LogScans {
   std::vector<std::uint32_t> read_labels(std::size_t i);
 
  private:
-  void choose_cloud_topic();
+  /// A topic of clouds.
+  struct Source {
+    std::uint32_t topic = 0;
+    std::string frame;                          ///< of the clouds that count
+    std::map<std::string, std::size_t> frames;  ///< and numbers of all clouds
+    std::vector<LogCloud> clouds;               ///< by stamp
+    PointColumns columns;                       ///< of the first cloud
+    Pose T_scan_cloud = Pose::Identity();       ///< from its frame to that of the first source
+    std::optional<PointClock> clock;            ///< if times of points count
+  };
+
+  void choose_cloud_topics();
   void choose_pose_topic();
   void read_log();
-  void take_cloud(const LogMessage& message);
+  void take_cloud(const LogMessage& message, Source& source);
   void take_poses(const LogMessage& message);
-  void check_clouds();
+  void check_clouds(const Source& source) const;
+  void note_disordered();
+  void form_scans();
+  void find_sensors();
+  void find_concatenated();
+  void find_clocks();
+  void read(const LogCloud& cloud, RecordedScan& scan);
+  void merge(const LogCloud& cloud, double time, RecordedScan& scan);
   void place_scans();
   void choose_frames();
   std::string body_frame() const;
@@ -77,16 +112,17 @@ class LogScans {
   std::unique_ptr<LogFile> log_;
   RecordingOptions options_;
   bool with_poses_;
-  std::uint32_t cloud_topic_ = 0;
+  std::vector<Source> sources_;
   std::optional<std::uint32_t> pose_topic_;  ///< without, poses come from transforms
-  std::string cloud_frame_;
-  std::map<std::string, std::size_t> clouds_of_frames_;  ///< of the topic
-  std::string pose_frame_;                               ///< fixed frame of the poses
+  std::string cloud_frame_;                  ///< of the first source
+  std::string pose_frame_;                   ///< fixed frame of the poses
   std::string posed_frame_;  ///< whose poses come from transforms: the sensor, or a body
   std::string pose_child_;   ///< moving frame of the poses; empty: the sensor
-  std::vector<LogMessage> clouds_;
+  std::vector<std::vector<LogCloud>> scans_;
   std::vector<double> times_;
-  std::vector<std::size_t> point_counts_;
+  std::vector<Pose> sensors_;
+  std::map<double, std::vector<Concatenation::Part>> concatenations_;  ///< by stamp
+  std::vector<std::string> concatenated_;  ///< frames of their sensors, in order
   std::size_t disordered_ = 0;  ///< clouds whose stamp is not after that of the cloud before
   PointColumns columns_;
   Trajectory poses_;  ///< of the pose topic
@@ -96,6 +132,7 @@ class LogScans {
   std::vector<std::string> notes_, warnings_;
   std::vector<std::uint8_t> bytes_;
   std::vector<std::uint8_t> compressed_;
+  RecordedScan part_;
 };
 
 }  // namespace dynains

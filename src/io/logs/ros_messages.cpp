@@ -136,6 +136,10 @@ bool is_transform_type(const std::string& type) {
   return type == "tf2_msgs/TFMessage" || type == "tf/tfMessage";
 }
 
+bool is_concatenation_type(const std::string& type) {
+  return type == "autoware_sensing_msgs/ConcatenatedPointCloudInfo";
+}
+
 bool is_pose_type(const std::string& type) {
   static constexpr const char* kTypes[] = {
       "nav_msgs/Odometry",
@@ -178,6 +182,24 @@ std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
     labels[i] = static_cast<std::uint32_t>(label);
   }
   return labels;
+}
+
+Concatenation read_concatenation(const SerialisedMessage& message) {
+  MessageReader in(message);
+  Concatenation result;
+  result.time = read_header(in).time;
+  in.take(2, "a success and a strategy");
+  in.take(in.length(1, "a configuration"), "a configuration");
+  constexpr std::size_t kMinPart = 25;  // bytes
+  result.parts.resize(in.length(kMinPart, "sources"));
+  for (Concatenation::Part& part : result.parts) {
+    part.frame = read_header(in).frame;
+    in.string("a topic");
+    in.number<std::uint8_t>("a status");
+    part.begin = in.number<std::uint32_t>("a begin");
+    part.length = in.number<std::uint32_t>("a length");
+  }
+  return result;
 }
 
 std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMessage& message) {

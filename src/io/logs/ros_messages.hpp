@@ -37,6 +37,16 @@ struct CloudInfo {
   PointColumns columns;
 };
 
+/// Which points of a cloud, put together from those of several sensors, are of which one.
+struct Concatenation {
+  struct Part {
+    std::string frame;  ///< of the sensor
+    std::size_t begin = 0, length = 0;
+  };
+  double time = 0.0;  ///< s, stamp of the cloud
+  std::vector<Part> parts;
+};
+
 /// A point of CustomMsg of Livox, bytes, without the padding between points of CDR.
 inline constexpr std::size_t kLivoxPoint = 19;
 
@@ -45,6 +55,10 @@ bool is_cloud_type(const std::string& type);
 
 /// Whether the type is that of a list of transforms: tf2_msgs/TFMessage, or tf/tfMessage.
 bool is_transform_type(const std::string& type);
+
+/// Whether read_concatenation() decodes the type:
+/// autoware_sensing_msgs/ConcatenatedPointCloudInfo.
+bool is_concatenation_type(const std::string& type);
 
 /// Whether read_poses() decodes the type: transforms, nav_msgs/Odometry, and
 /// geometry_msgs/PoseStamped, PoseWithCovarianceStamped and TransformStamped.
@@ -68,6 +82,9 @@ void read_cloud(const std::string& type, const SerialisedMessage& message, Recor
 /// The field `label` (also class) of a PointCloud2.
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
                                              const SerialisedMessage& message);
+
+/// Throws IoError that begins with the place of the message.
+Concatenation read_concatenation(const SerialisedMessage& message);
 
 /// Decodes all poses of a message. Throws IoError that begins with the place of the message, also
 /// if a pose is not finite or a quaternion not of length 1.

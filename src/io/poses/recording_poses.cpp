@@ -334,6 +334,7 @@ void place_scans(RecordingContents& r, const fs::path& poses) {
 }
 
 void find_point_clock(RecordingContents& r, const ScanReader& reader) {
+  if (r.clock) return;  // that of merged clouds
   std::vector<double> times;
   for (const ScanEntry& scan : r.scans) times.push_back(scan.time);
   RecordedScan scan;
@@ -416,12 +417,14 @@ void read_poses(RecordingContents& r) {
 
 /// The trajectory if it has times of its own, else the poses of the scans.
 void prepare_deskewing(RecordingContents& r, const ScanReader& reader) {
-  if (!r.columns.time) fail(r.folder, "de-skewing needs a time for each point, a column time");
+  if (!r.columns.time && !r.clock)
+    fail(r.folder, "de-skewing needs a time for each point, a column time");
   if (r.frame == PointFrame::kWorld) {
     fail(r.folder, "de-skewing needs points in the frame of the sensor");
   }
   find_point_clock(r, reader);
-  r.notes.push_back("points are de-skewed by their times");
+  r.notes.push_back(r.options.deskew ? "points are de-skewed by their times"
+                                     : "clouds move to the stamp of their scan by the poses");
   if (r.options.without_poses) return;
   const Trajectory& rows = r.motion.times.empty() ? r.trajectory : r.motion;
   const PoseConvention& convention = r.options.convention;

@@ -1,0 +1,61 @@
+// A recording of a rig as its robot records it: one topic for each sensor, with its own clock.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dynains/io/recording.hpp"
+#include "io/files.hpp"
+#include "io/log_writer.hpp"
+
+namespace dynains::test {
+
+/// Writes the points of sensor k of `rig` to topic /lidar<k>, in frame lidar<k> at
+/// `delays[k]` (s) after the stamp of their scan, where they were measured. `T_body_sensor` is what
+/// the log says about the sensors.
+inline void write_rig_log(const Recording& rig, const std::vector<double>& delays,
+                          const std::vector<Pose>& T_body_sensor,
+                          const std::filesystem::path& file) {
+  std::vector<LogChannel> channels = {{"/tf", "tf2_msgs/msg/TFMessage"},
+                                      {"/tf_static", "tf2_msgs/msg/TFMessage"}};
+  std::vector<WrittenMessage> messages;
+  for (std::size_t k = 0; k < delays.size(); ++k) {
+    const std::string name = "lidar" + std::to_string(k);
+    channels.push_back({"/" + name, "sensor_msgs/msg/PointCloud2"});
+    messages.push_back({1, 0, transform(0.0, "base", name, T_body_sensor[k])});
+  }
+  std::vector<CloudField> fields = kXyz;
+  fields.push_back({"label", 12, 6});
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    const Pose& T_world_body = rig.T_world_sensor(i);
+    messages.push_back(
+        {0, nanoseconds(rig.time(i)), transform(rig.time(i), "odom", "base", T_world_body)});
+    if (i + 1 == rig.size()) break;  // for its motion
+    const RecordedScan scan = rig.read_scan(i);
+    const std::vector<std::uint32_t> labels = rig.read_labels(i);
+    const double period = rig.time(i + 1) - rig.time(i);
+    for (std::size_t k = 0; k < delays.size(); ++k) {
+      const Pose T_world_then =
+          interpolate(T_world_body, rig.T_world_sensor(i + 1), delays[k] / period);
+      const Pose T_sensor_body = rig.sensors()[k].inverse() * T_world_then.inverse() * T_world_body;
+      ByteWriter points;
+      for (std::size_t p = 0; p < scan.size(); ++p) {
+        if (scan.sensor[p] != k) continue;
+        const Eigen::Vector3f xyz(scan.xyzi.data() + 4 * p);
+        const Eigen::Vector3f measured = (T_sensor_body * xyz.cast<double>()).cast<float>();
+        for (const float value : measured) points.number(value);
+        points.number(labels[p]);
+      }
+      const double time = rig.time(i) + delays[k];
+      messages.push_back({static_cast<std::uint16_t>(2 + k), nanoseconds(time),
+                          cloud_message(MessageEncoding::kCdr, time, "lidar" + std::to_string(k),
+                                        fields, 16, points.bytes())});
+    }
+  }
+  write_text(file, mcap_file(channels, messages, {}));
+}
+
+}  // namespace dynains::test
