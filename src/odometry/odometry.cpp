@@ -39,7 +39,9 @@ std::vector<Pose> turned(const Pose& T_map_near) {
 class Odometry::Loop {
  public:
   Loop(const Config& config, const DynaInsRemover::Config& remover)
-      : config_(config), remover_config_(remover), scan_(config.nearest, config.farthest) {}
+      : config_(config),
+        remover_config_(remover),
+        scan_(config.nearest, config.farthest, remover.sensors) {}
 
   OdometryResult push(const detail::CloudView& cloud, Span<const double> offsets, double time,
                       std::optional<Pose> T_odometry_sensor) {
@@ -198,7 +200,7 @@ class Odometry::Loop {
 
   void add_to_map(Span<const PointLabel> labels) {
     constexpr double kForget = 0.1;  // of the reach
-    map_.begin_scan(T_world_last_.translation());
+    map_.begin_scan(T_world_last_ * scan_.centre());
     for (const ScanPreparation::Point& point : scan_.map_points()) {
       if (!labels.empty() && labels[point.index] == PointLabel::kDynamic) continue;
       map_.insert(T_world_last_ * point.position);

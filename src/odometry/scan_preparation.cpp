@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <string>
 #include <utility>
 
+#include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
 #include "poses/cell_surfaces.hpp"
@@ -25,6 +27,13 @@ void ScanPreparation::take(const detail::CloudView& cloud, Span<const double> of
     float* const p = &measured_[3 * i];
     cloud.copy(i, 1, p, p + 1, p + 2);
   }
+  sensors_.resize(origins_.size() > 1 ? cloud.size() : 0);
+  if (!sensors_.empty()) cloud.copy_sensors(sensors_.data());
+  for (const std::uint8_t sensor : sensors_) {
+    if (sensor < origins_.size()) continue;
+    throw CloudError("a point is of sensor " + std::to_string(sensor) + ", there are " +
+                     std::to_string(origins_.size()));
+  }
   offsets_.assign(offsets.begin(), offsets.end());
   double sum = 0.0;
   std::size_t count = 0;
@@ -37,14 +46,22 @@ void ScanPreparation::take(const detail::CloudView& cloud, Span<const double> of
   choose_scale();
 }
 
+Eigen::Vector3d ScanPreparation::centre() const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& origin : origins_) sum += origin;
+  return sum / static_cast<double>(origins_.size());
+}
+
 void ScanPreparation::choose_scale() {
   constexpr double kNarrow = 4.0, kWide = 12.0;  // m, median ranges that end a scale of 1
   constexpr double kMinSize = 0.125;
   constexpr std::size_t kStep = 8;  // every 8th point
   std::vector<double> ranges;
   for (std::size_t i = 0; 3 * i < measured_.size(); i += kStep) {
-    const double range = Eigen::Map<const Eigen::Vector3f>(&measured_[3 * i]).norm();
-    if (range > kMinSize * nearest_ && range < farthest_) ranges.push_back(range);
+    const Eigen::Map<const Eigen::Vector3f> p(&measured_[3 * i]);
+    const double range = (p - origin_of(i).cast<float>()).norm();
+    if (!p.isZero(0.0F) && range > kMinSize * nearest_ && range < farthest_)
+      ranges.push_back(range);
   }
   if (ranges.empty()) return;
   const double middle = median(std::move(ranges));
@@ -90,8 +107,9 @@ void ScanPreparation::thin_out() {
   taken_.clear();
   for (std::size_t i = 0; 3 * i < cloud_.size(); ++i) {
     const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&cloud_[3 * i]).cast<double>();
-    const double squared = p.squaredNorm();
-    if (!(squared > nearest * nearest && squared < farthest_ * farthest_)) continue;
+    const double squared = (p - origin_of(i)).squaredNorm();
+    if (p.isZero(0.0) || !(squared > nearest * nearest && squared < farthest_ * farthest_))
+      continue;
     if (adds(taken_, voxel_at(p, small))) map_points_.push_back({p, i});
   }
   for (used_edge_ = std::max(edge_, small);; used_edge_ = std::max(kFiner * used_edge_, small)) {

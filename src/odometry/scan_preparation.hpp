@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "dynains/point_cloud_traits.hpp"
@@ -20,10 +21,15 @@ class ScanPreparation {
     std::size_t index;         ///< in the cloud
   };
 
-  /// `nearest`, `farthest`: m, range of the points that are used.
-  ScanPreparation(double nearest, double farthest) : nearest_(nearest), farthest_(farthest) {}
+  /// `nearest`, `farthest`: m, range of the points that are used, from `sensors` (at least one),
+  /// poses in the frame of the clouds.
+  ScanPreparation(double nearest, double farthest, const std::vector<Pose>& sensors)
+      : nearest_(nearest), farthest_(farthest) {
+    for (const Pose& sensor : sensors) origins_.push_back(sensor.translation());
+  }
 
-  /// Copies a scan. `offsets`: s from the stamp, empty or one per point.
+  /// Copies a scan. `offsets`: s from the stamp, empty or one per point. Throws CloudError for a
+  /// sensor without a pose.
   void take(const detail::CloudView& cloud, Span<const double> offsets);
   /// s from the stamp; 0 without offsets. A registration of points that are de-skewed to this time
   /// hardly changes with an error of the velocity.
@@ -43,7 +49,11 @@ class ScanPreparation {
   double expected_fit() const;
 
   /// All points, de-skewed.
-  RawPoints<float> cloud() const { return {cloud_.data(), cloud_.size() / 3, 3}; }
+  RawPoints<float> cloud() const {
+    return {cloud_.data(), cloud_.size() / 3, 3, sensors_.empty() ? nullptr : sensors_.data()};
+  }
+  /// Mean of the sensors, m.
+  Eigen::Vector3d centre() const;
   /// One point for each small voxel.
   const std::vector<Point>& map_points() const { return map_points_; }
   /// One point for each large voxel, about as many in every scan.
@@ -51,6 +61,9 @@ class ScanPreparation {
   Landmarks landmarks() const;
 
  private:
+  const Eigen::Vector3d& origin_of(std::size_t i) const {
+    return origins_[sensors_.empty() ? 0 : sensors_[i]];
+  }
   bool is_timed(std::size_t i) const;
   void deskew(const Pose& motion, double period);
   void thin_out();
@@ -58,11 +71,13 @@ class ScanPreparation {
 
   double nearest_;
   double farthest_;
+  std::vector<Eigen::Vector3d> origins_;  // m, of beams, by sensor
   double scale_ = 1.0;
   double edge_ = 1.0;       // m, of the large voxels
   double used_edge_ = 1.0;  // m, by this scan: smaller if it has few points
   double mean_offset_ = 0.0;
-  std::vector<float> measured_;  // points as they came
+  std::vector<float> measured_;        // points as they came
+  std::vector<std::uint8_t> sensors_;  // of points, of several
   std::vector<double> offsets_;
   std::vector<float> cloud_;
   std::vector<Point> map_points_;

@@ -33,7 +33,9 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
                         const std::function<void(std::size_t, std::size_t)>& progress,
                         std::vector<Pose>& poses) {
   const InterruptGuard interrupt;
-  Odometry odometry;
+  DynaInsRemover::Config remover = DynaInsRemover::Config::odometry();
+  take_sensors(recording, remover);
+  Odometry odometry({}, remover);
   PoseEstimate estimate;
   RecordedScan scan;
   ReadAhead scans(recording, range.first, range.last,

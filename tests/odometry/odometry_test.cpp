@@ -116,6 +116,35 @@ TEST_CASE("How well a scan has to fit follows its pattern: few points in a crowd
   CHECK(worst_error(drive(config, {})) < 0.1);
 }
 
+TEST_CASE("All sensors of a rig register together, and each point has the beam of its own") {
+  simulation::Config config =
+      drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 12, 4711);
+  config.rig = simulation::Rig::kCorners;
+  simulation::Simulator simulator(config);
+  DynaInsRemover::Config by_sensors = DynaInsRemover::Config::odometry();
+  by_sensors.sensors = simulator.mounts();
+  Odometry odometry({}, by_sensors);
+  DynaInsRemover remover(by_sensors);
+  const Pose T_first_world = simulator.scan(0).T_world_sensor.inverse();
+  double worst = 0.0;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    simulation::SimulatedScan scan = simulator.scan(i);
+    RawPoints<float> points = points_of(scan);
+    points.sensors = scan.sensors.data();
+    const OdometryResult found = odometry.push(points, {}, scan.time);
+    REQUIRE(found.loss == OdometryLoss::kNone);
+    const Pose T_exact = T_first_world * scan.T_world_sensor;
+    worst = std::max(worst, (found.T_world_sensor.translation() - T_exact.translation()).norm());
+    const FrameResult frame = remover.push(points, found.T_world_sensor, scan.time);
+    if (i == 0) continue;  // judged with the next one
+    const auto labels = frame.newest().labels;
+    CHECK(std::equal(labels.begin(), labels.end(), found.frame.newest().labels.begin()));
+    scan.sensors.back() = 2;
+    CHECK_THROWS_AS(odometry.push(points, {}, scan.time + 0.05), CloudError);
+  }
+  CHECK(worst < 0.1);
+}
+
 /// Median of the errors of the motion from scan to scan, m, for stamps `shift` s after the first
 /// point of each scan.
 double error_of_motion(const std::vector<simulation::SimulatedScan>& scans, double shift) {

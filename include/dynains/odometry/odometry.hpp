@@ -72,7 +72,8 @@ class Odometry {
  public:
   using Config = OdometryConfig;
 
-  /// `remover`: parameters of the removal. Throws ConfigError.
+  /// `remover`: parameters of the removal, and the sensors, whose points register together. Throws
+  /// ConfigError.
   explicit Odometry(const Config& config = {},
                     const DynaInsRemover::Config& remover = DynaInsRemover::Config::odometry());
   Odometry(Odometry&&) noexcept;
@@ -80,7 +81,8 @@ class Odometry {
   ~Odometry();
 
   /// Takes the next scan: any cloud with PointCloudTraits, in m, sensor frame; NaN, infinity and
-  /// the origin are no returns. `offsets`: for each point the seconds from `time` (s) until it was
+  /// the origin are no returns. Points of several sensors are in one frame, each as measured at its
+  /// time. `offsets`: for each point the seconds from `time` (s) until it was
   /// measured, or none if the points are all of one time; a point without a finite offset keeps its
   /// place. Throws CloudError if the numbers of offsets and points differ, and PoseError if the
   /// mean time of the points is not after that of the scan before; the state is then unchanged. A
