@@ -11,7 +11,9 @@
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
+#include "dynains/io/extrinsic.hpp"
 #include "pose_advice.hpp"
+#include "poses/sensor_agreement.hpp"
 #include "run_doubts.hpp"
 #include "start_check.hpp"
 
@@ -38,6 +40,33 @@ std::string text_of(const Mounting& mounting) {
       fixed(mounting.height, 2, " m over ground, tilted by ") + fixed(mounting.tilt(), 1, " deg");
   if (mounting.tilt() > 90.0) text += " (upside down)";
   return text;
+}
+
+/// A line for each of several sensors, and the pose of the one that is off most. Of two, the first
+/// is the reference.
+void add_sensors(const Recording& recording, std::ostream& text) {
+  const std::vector<SensorAgreement> sensors = compare_sensors(recording);
+  const SensorAgreement* worst = nullptr;
+  std::size_t number = 0;
+  for (std::size_t k = 0; k < sensors.size(); ++k) {
+    const SensorAgreement& one = sensors[k];
+    add_line(text, "sensor " + std::to_string(k),
+             fixed(one.points, 0, " points a scan, of which ") +
+                 fixed(100.0 * one.fit_of_scans, 0, " % fit to its other scans, ") +
+                 fixed(100.0 * one.fit_of_others, 0, " % to the other sensors"));
+    const bool is_reference = k == 0 && sensors.size() == 2;
+    if (is_reference || !one.is_off() || (worst != nullptr && one.distance <= worst->distance)) {
+      continue;
+    }
+    worst = &one;
+    number = k;
+  }
+  if (worst == nullptr) return;
+  text << "note: sensor " << number << " is off by "
+       << fixed(100.0 * worst->distance, 1, " cm and ")
+       << fixed(180.0 / M_PI * worst->angle, 2, " deg")
+       << " from where its points fit to those of the others: its row of --sensors would be\n      "
+       << extrinsic_text(worst->T_cloud_sensor) << '\n';
 }
 
 /// Possible problems of a run other than poses.
@@ -102,6 +131,7 @@ std::string describe(const Recording& recording, const Diagnosis& d,
                fixed(100.0 * d.ego_share, 1) + " % nearer than 2 m, 99 % within " +
                fixed(d.farthest, 0, " m"));
   add_line(text, "sensor", text_of(d.mounting));
+  add_sensors(recording, text);
   add_line(text, "motion",
            "median " + fixed(d.step, 2, " m from scan to scan, longest ") +
                fixed(d.longest_step, 2, " m"));

@@ -11,6 +11,7 @@
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "dynains/io/extrinsic.hpp"
 #include "run_sequence.hpp"
 
 namespace dynains::program {
@@ -89,6 +90,10 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreeme
   report["scans_without_pose"] = sequence.missing_pose_count();
   report["log_ends_early"] = sequence.early_end().has_value();
   report["points"] = results.points();
+  for (std::size_t k = 0; k < sequence.sensors().size(); ++k) {
+    report["sensors"].push_back(
+        {{"pose", extrinsic_text(sequence.sensors()[k])}, {"points", timing.sensor_points[k]}});
+  }
   report["labels"] = {{"invalid", labels[PointLabel::kInvalid]},
                       {"out_of_range", labels[PointLabel::kOutOfRange]},
                       {"ground", labels[PointLabel::kGround]},

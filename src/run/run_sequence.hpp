@@ -60,6 +60,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
                            frame.began_epoch, frame.plausibility, recording.time(i)});
     if (const auto& residual = frame.pose_residual)
       timing.rows.back().pose_residual.emplace(residual->translation, residual->rotation);
+    for (const std::uint8_t sensor : scan.sensor) ++timing.sensor_points[sensor];
     results.take_newest(frame);
     if (frame.finished) take_final(*frame.finished);
     if (!keep_going(timing.rows.size())) break;

@@ -1,7 +1,9 @@
 // Milliseconds of each scan and stage, and errors of the poses.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,6 +26,7 @@ struct TimingRow {
 
 struct RunTiming {
   std::vector<TimingRow> rows;
+  std::array<std::uint64_t, 256> sensor_points{};  ///< by sensor, of several
   double flush = 0.0;     ///< ms for the verdicts that were open after the last scan
   double pipeline = 0.0;  ///< ms in the pipeline, all of the above included
 };
