@@ -28,7 +28,7 @@ class JudgedScans {
         files_(folder / "labels", folder / "causes"),
         keep_moving_(keep_moving) {}
 
-  /// Calls `visit(position, label)` for the points of scan i that are judged.
+  /// Calls `visit(position, label, sensor)` for the points of scan i that are judged.
   template <class Visit>
   void visit(std::size_t i, const Pose& T_place_sensor, Visit&& visit) {
     recording_.read_scan(i, scan_);
@@ -37,7 +37,8 @@ class JudgedScans {
       PointLabel label = verdict_.labels[k];
       if (label == PointLabel::kInvalid || label == PointLabel::kOutOfRange) continue;
       if (label == PointLabel::kDynamic && keep_moving_) label = PointLabel::kStatic;
-      visit(T_place_sensor * scan_.point(k).position, label);
+      const std::size_t sensor = scan_.sensor.empty() ? 0 : scan_.sensor[k];
+      visit(T_place_sensor * scan_.point(k).position, label, sensor);
     }
   }
 
@@ -92,22 +93,25 @@ PlacedGrid grid_of_run(const fs::path& folder, const Recording& recording,
   std::size_t done = 0;
   progress(done);
   for (const std::size_t i : scans) {
-    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label) {
+    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t) {
       if (label != PointLabel::kDynamic) floors.add(point, label == PointLabel::kGround);
     });
     if (!progress(++done)) return {};
   }
   floors.finish(config.min_height, config.resolution);
   grid::GridMaker maker(config, floors);
-  std::vector<Eigen::Vector3d> ends;
+  std::vector<Pose> sensors = recording.sensors();
+  if (sensors.empty()) sensors.push_back(Pose::Identity());
   for (const std::size_t i : scans) {
-    ends.clear();
+    std::vector<std::vector<Eigen::Vector3d>> ends(sensors.size());
     maker.begin_scan();
-    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label) {
+    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
       maker.add(point, label == PointLabel::kDynamic);
-      ends.push_back(point);
+      ends.at(k).push_back(point);
     });
-    maker.add_beams(pose(i).translation(), ends);
+    for (std::size_t k = 0; k < sensors.size(); ++k) {
+      maker.add_beams(pose(i) * sensors[k].translation(), ends[k]);
+    }
     if (!progress(++done)) return {};
   }
   return {maker.grid(), place.head<2>()};
