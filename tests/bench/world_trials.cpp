@@ -33,6 +33,7 @@ struct Options {
   std::uint64_t worlds = 10;
   int scans = 60;
   std::string world = "default";  ///< parameters that are not drawn, such as "scene=room"
+  bool rigs = false;
   std::vector<std::string> settings;
 };
 
@@ -52,8 +53,18 @@ program::ParameterValues values_of(const std::string& list) {
   return values;
 }
 
+/// A robot has its own rig, a vehicle one of the others. Scans of rigs are whole.
+void add_rig(simulation::Config& config) {
+  using simulation::Rig;
+  constexpr Rig kOfVehicles[] = {Rig::kRoofTwo, Rig::kRoofThree, Rig::kCorners};
+  const bool is_robot = config.sensor_height > 0.0 && config.sensor_height < 1.2;
+  config.rig = is_robot ? Rig::kRobot : kOfVehicles[config.seed % 3];
+  config.rolling_shutter = false;
+}
+
 simulation::Config world_of(std::uint64_t seed, const Options& options) {
   simulation::Config config = simulation::random_world(seed);
+  if (options.rigs) add_rig(config);
   values_of(options.world).apply(config);
   config.scans = options.scans;
   return config;
@@ -64,6 +75,7 @@ std::string name_of(const simulation::Config& config) {
   text << config.seed << ' ' << plain_value(config.scene) << ' ' << plain_value(config.sensor)
        << ' ' << plain_value(config.gait) << std::setprecision(2) << ' ' << config.sensor_height
        << "m " << config.ego_speed << "m/s " << config.rate << "Hz";
+  if (config.rig != simulation::Rig::kNone) text << ' ' << plain_value(config.rig);
   return text.str();
 }
 
@@ -80,7 +92,8 @@ void judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bi
   };
   DynaInsRemover remover(config);
   for (const simulation::SimulatedScan& scan : scans) {
-    const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4};
+    const std::uint8_t* const sensors = scan.sensors.empty() ? nullptr : scan.sensors.data();
+    const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4, sensors};
     const FrameResult frame = remover.push(points, scan.T_world_sensor_noisy, scan.time);
     if (frame.finished) keep(*frame.finished);
   }
@@ -141,6 +154,7 @@ Options parse(int argc, char** argv) {
   app.add_option("--from", options.from, "first seed [1]");
   app.add_option("--worlds", options.worlds, "number of seeds [10]");
   app.add_option("--scans", options.scans, "scans of each world [60]");
+  app.add_flag("--rigs", options.rigs, "several sensors in each world");
   app.add_option("--world", options.world, "name=value,...: parameters that are not drawn");
   app.add_option("SETTING", options.settings, "name=value,...: parameters of the remover");
   try {
@@ -161,9 +175,11 @@ void run(const Options& options) {
   for (std::uint64_t seed = options.from; seed < options.from + options.worlds; ++seed) {
     const simulation::Config world = world_of(seed, options);
     const Scans scans = test::simulate(world);
+    const std::vector<Pose> mounts = simulation::Simulator(world).mounts();
     InMap in_map;
     for (const auto& scan : scans) in_map.emplace_back(scan.labels.size(), std::uint8_t{0});
     for (std::size_t s = 0; s < settings.size(); ++s) {
+      if (!mounts.empty()) configs[s].sensors = mounts;
       judge(scans, configs[s], static_cast<unsigned>(s), in_map);
     }
     const evaluation::Evaluation result = test::evaluate(scans, in_map, settings);
