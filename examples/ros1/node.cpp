@@ -6,15 +6,21 @@
 //               ~dynamic       its moving points
 //               ~map           the map of scans with a final verdict (30 scans later), latched
 //               ~residual      geometry_msgs/PoseWithCovarianceStamped: the aligned motion
+//               ~odom          with ~publish_odom: geometry_msgs/PoseStamped, and its transform
 //   parameters  ~fixed_frame   a frame without jumps ["odom"]
+//               ~odometry      poses are found by the clouds alone; then there is no map [false]
+//               ~publish_odom  [false]
 //               ~tf_timeout    how long a cloud waits for its transform, s [0.2]
 //               ~queue         clouds that wait [10]
 //               ~map_period    time between two maps, s [2]
 //               ~preset        "default", "paper", "published", "offline" or "odometry" ["default"]
 //               all parameters of the remover, by their names
+#include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <geometry_msgs/TransformStamped.h>
 #include <ros/ros.h>
 #include <sensor_msgs/PointCloud2.h>
+#include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 
 #include <cstdint>
@@ -64,6 +70,7 @@ Loop::Config read_loop_config(const PrivateParameters& parameters) {
   Loop::Config config;
   config.patience = parameters("tf_timeout", config.patience);
   config.map_period = parameters("map_period", config.map_period);
+  config.odometry = parameters("odometry", config.odometry);
   const int capacity = parameters("queue", static_cast<int>(config.capacity));
   if (capacity < 1) throw dynains::ConfigError("queue = " + std::to_string(capacity) + " < 1");
   config.capacity = static_cast<std::size_t>(capacity);
@@ -74,10 +81,12 @@ class RemoverNode {
  public:
   RemoverNode()
       : fixed_frame_(parameters_("fixed_frame", std::string("odom"))),
+        has_odom_(parameters_("publish_odom", false)),
         listener_(transforms_),
         static_(parameters_.node.advertise<Cloud>("static", kQueue)),
         dynamic_(parameters_.node.advertise<Cloud>("dynamic", kQueue)),
         residual_(parameters_.node.advertise<Residual>("residual", kQueue)),
+        odom_(parameters_.node.advertise<geometry_msgs::PoseStamped>("odom", kQueue)),
         map_(parameters_.node.advertise<Cloud>("map", 1, true)),
         loop_(read_config(parameters_), read_loop_config(parameters_)),
         worker_([this] { return step(); }),
@@ -97,9 +106,7 @@ class RemoverNode {
   Worker::Wait step() {
     const bool has_cleaned = loop_.clean_next(
         ros::Time::now().toSec(), [this](const Cloud::ConstPtr& cloud) { return pose_of(*cloud); },
-        [this](const Cloud::ConstPtr& cloud, const dynains::FrameResult& frame) {
-          publish(*cloud, frame);
-        });
+        [this](const Cloud::ConstPtr& cloud, const Cleaned& cleaned) { publish(*cloud, cleaned); });
     loop_.publish_map(ros::WallTime::now().toSec(), map_.getNumSubscribers() > 0,
                       [this](const auto& map) {
                         Cloud message = map_message<Cloud>(map, fixed_frame_);
@@ -115,13 +122,23 @@ class RemoverNode {
                      [&](const ros::Time& newest) { return newest < stamp; });
   }
 
-  void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
+  /// A cloud that is not judged passes whole.
+  void publish(const Cloud& cloud, const Cleaned& cleaned) {
     newest_ = cloud.header.stamp;
-    static_.publish(dynains::static_points(cloud, frame.newest().labels));
-    dynamic_.publish(dynains::dynamic_points(cloud, frame.newest().labels));
-    if (frame.pose_residual) {
-      residual_.publish(residual_message<Residual>(*frame.pose_residual, cloud.header));
+    const bool is_judged = !cleaned.labels.empty();
+    static_.publish(is_judged ? dynains::static_points(cloud, cleaned.labels) : cloud);
+    if (is_judged) dynamic_.publish(dynains::dynamic_points(cloud, cleaned.labels));
+    if (cleaned.frame.pose_residual) {
+      residual_.publish(residual_message<Residual>(*cleaned.frame.pose_residual, cloud.header));
     }
+    if (!has_odom_ || !cleaned.T_odom_sensor) return;
+    geometry_msgs::PoseStamped odom;
+    odom.header = cloud.header;
+    odom.header.frame_id = fixed_frame_;
+    set_pose(*cleaned.T_odom_sensor, odom.pose);
+    odom_.publish(odom);
+    broadcaster_.sendTransform(transform_message<geometry_msgs::TransformStamped>(
+        *cleaned.T_odom_sensor, fixed_frame_, cloud.header));
   }
 
   void on_timer(const ros::WallTimerEvent&) {
@@ -134,9 +151,11 @@ class RemoverNode {
   ros::NodeHandle public_;
   PrivateParameters parameters_;
   std::string fixed_frame_;
+  bool has_odom_;
   tf2_ros::Buffer transforms_;
   tf2_ros::TransformListener listener_;  // runs in a separate thread
-  ros::Publisher static_, dynamic_, residual_, map_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+  ros::Publisher static_, dynamic_, residual_, odom_, map_;
   ros::Time newest_;
   Loop loop_;
   Worker worker_;

@@ -25,6 +25,9 @@ struct LoopCounts {
   std::string last_reason;                             ///< of the newest cloud that was left out
   double busy = 0.0;                                   ///< s, in the remover and in publishers
   double slowest = 0.0;                                ///< s, of one cloud
+  double latency = 0.0;                                ///< s, from stamps to results, sum
+  std::size_t lost = 0;                                ///< clouds without a pose by the odometry
+  std::string loss;                                    ///< why, of the newest one
   std::size_t misfits = 0;                             ///< scans whose pose does not fit
   std::size_t failures = 0;                            ///< messages that could not be published
   std::size_t residuals = 0;
@@ -126,6 +129,10 @@ inline void tell_problems(const LoopCounts& counts, const LoopState& state, Diag
   }
   if (state.suspicion != dynains::Suspicion::kNone) tell(Level::kError, text_of(state.suspicion));
   if (state.time_doubt != dynains::TimeDoubt::kNone) tell(Level::kWarn, text_of(state.time_doubt));
+  if (counts.lost > 0) {
+    tell(Level::kError, "track is lost: " + std::to_string(counts.lost) +
+                            " clouds pass with their moving points (" + counts.loss + ')');
+  }
   if (counts.misfits > 0) {
     tell(Level::kWarn, "poses that do not fit to their scans: " + std::to_string(counts.misfits));
   }
@@ -170,6 +177,8 @@ inline Diagnosis diagnose(const LoopCounts& counts, const LoopTotals& totals,
   add("cleaned since the start", std::to_string(totals.taken));
   add("left out since the start", std::to_string(totals.left_out));
   add("resets since the start", std::to_string(totals.resets));
+  add("latency (ms)", mean_thousandths(counts.latency, counts.taken));
+  add("lost", std::to_string(counts.lost));
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <string>
 
+#include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains_ros {
@@ -53,16 +54,11 @@ inline std::array<double, 36> covariance_of_message(const dynains::PoseResidual&
   return result;
 }
 
-/// The aligned motion since the previous scan, with its covariance, as a
-/// geometry_msgs/PoseWithCovarianceStamped. `header`: that of the newest cloud. The frame of the
-/// message is that of the sensor at the previous scan.
-template <class Message, class Header>
-Message residual_message(const dynains::PoseResidual& residual, const Header& header) {
-  Message message;
-  message.header = header;
-  auto& pose = message.pose.pose;
-  const Eigen::Vector3d p = residual.T_previous_aligned.translation();
-  const Eigen::Quaterniond q(Eigen::Matrix3d(residual.T_previous_aligned.linear()));
+/// Sets a geometry_msgs/Pose.
+template <class Message>
+void set_pose(const dynains::Pose& T, Message& pose) {
+  const Eigen::Vector3d p = T.translation();
+  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear()));
   pose.position.x = p.x();
   pose.position.y = p.y();
   pose.position.z = p.z();
@@ -70,6 +66,35 @@ Message residual_message(const dynains::PoseResidual& residual, const Header& he
   pose.orientation.y = q.y();
   pose.orientation.z = q.z();
   pose.orientation.w = q.w();
+}
+
+/// The transform of a pose of `child` in `frame`, as a geometry_msgs/TransformStamped.
+template <class Message, class Header>
+Message transform_message(const dynains::Pose& T, const std::string& frame, const Header& child) {
+  Message message;
+  message.header = child;
+  message.header.frame_id = frame;
+  message.child_frame_id = child.frame_id;
+  const Eigen::Vector3d p = T.translation();
+  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear()));
+  message.transform.translation.x = p.x();
+  message.transform.translation.y = p.y();
+  message.transform.translation.z = p.z();
+  message.transform.rotation.x = q.x();
+  message.transform.rotation.y = q.y();
+  message.transform.rotation.z = q.z();
+  message.transform.rotation.w = q.w();
+  return message;
+}
+
+/// The aligned motion since the previous scan, with its covariance, as a
+/// geometry_msgs/PoseWithCovarianceStamped. `header`: that of the newest cloud. The frame of the
+/// message is that of the sensor at the previous scan.
+template <class Message, class Header>
+Message residual_message(const dynains::PoseResidual& residual, const Header& header) {
+  Message message;
+  message.header = header;
+  set_pose(residual.T_previous_aligned, message.pose.pose);
   const std::array<double, 36> covariance = covariance_of_message(residual);
   for (std::size_t i = 0; i < covariance.size(); ++i) message.pose.covariance[i] = covariance[i];
   return message;

@@ -1,5 +1,6 @@
 #include "ros_common/remover_loop.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <memory>
@@ -44,8 +45,8 @@ struct Node {
         [&](const Cloud&) {
           return PoseAnswer{T_world_sensor, true, ""};
         },
-        [&](const Cloud&, const dynains::FrameResult& frame) {
-          labels.emplace_back(frame.newest().labels.begin(), frame.newest().labels.end());
+        [&](const Cloud&, const Cleaned& cleaned) {
+          labels.emplace_back(cleaned.labels.begin(), cleaned.labels.end());
         });
   }
 };
@@ -130,9 +131,52 @@ TEST_CASE("a bad cloud and a failing publisher are counted, and the loop goes on
       [](const Cloud&) {
         return PoseAnswer{dynains::Pose::Identity(), true, ""};
       },
-      [](const Cloud&, const dynains::FrameResult&) { throw std::runtime_error("full"); }));
+      [](const Cloud&, const Cleaned&) { throw std::runtime_error("full"); }));
   const Diagnosis diagnosis = node.loop.report(1.0);
   CHECK(diagnosis.message == "messages that could not be published: 1");
+}
+
+TEST_CASE("with odometry, clouds alone are cleaned, and pass whole after a loss") {
+  Loop::Config config;
+  config.odometry = true;
+  Loop loop(dynains::DynaInsRemover::Config::odometry(), config);
+  const std::vector<dynains::test::Scan> drive = scans(12);
+  std::size_t moving = 0, whole = 0, posed = 0;
+  double x = 0.0;
+  const auto push = [&](const dynains::test::Scan& scan, double stamp) {
+    loop.add(message_of(scan, stamp), stamp);
+    return loop.clean_next(
+        stamp + 0.02, [](const Cloud&) -> PoseAnswer { throw std::logic_error("no pose"); },
+        [&](const Cloud&, const Cleaned& cleaned) {
+          whole += cleaned.labels.empty() ? 1 : 0;
+          posed += cleaned.T_odom_sensor ? 1 : 0;
+          if (cleaned.T_odom_sensor) x = cleaned.T_odom_sensor->translation().x();
+          moving += static_cast<std::size_t>(std::count(
+              cleaned.labels.begin(), cleaned.labels.end(), dynains::PointLabel::kDynamic));
+        });
+  };
+  for (const dynains::test::Scan& scan : drive) REQUIRE(push(scan, 100.0 + scan.time));
+  CHECK(posed == 12);
+  CHECK(whole == 0);
+  CHECK(moving > 0);
+  const double way =
+      (drive.front().T_world_sensor.inverse() * drive.back().T_world_sensor).translation().norm();
+  CHECK(x == Approx(way).margin(0.2));
+  const Diagnosis diagnosis = loop.report(1.0);
+  CHECK(diagnosis.level == Diagnosis::Level::kOk);
+  CHECK(diagnosis.values[diagnosis.values.size() - 2].first == "latency (ms)");
+  CHECK(std::stod(diagnosis.values[diagnosis.values.size() - 2].second) > 20.0);
+
+  dynains::test::Scan empty = drive.front();  // a sensor that is covered
+  for (auto& point : empty.points) point.setZero();
+  REQUIRE(push(empty, 101.5));
+  CHECK(whole == 1);
+  CHECK_THAT(loop.report(1.0).message,
+             ContainsSubstring("track is lost: 1 clouds pass with their moving points (too few"));
+  const double before = x;
+  for (const dynains::test::Scan& scan : drive) REQUIRE(push(scan, 110.0 + scan.time));
+  CHECK(posed == 23);  // the first cloud after the gap is lost, the others begin where it was
+  CHECK(x == Approx(before + way).margin(0.5 + 0.2 * way));
 }
 
 TEST_CASE("a worker works when it is woken, and ends at once") {

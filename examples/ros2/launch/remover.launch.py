@@ -1,6 +1,7 @@
 """The remover as a component of a container of its own, with intra-process communication.
 
 ros2 launch dynains_ros remover.launch.py points:=/velodyne_points
+ros2 launch dynains_ros remover.launch.py points:=/livox/lidar odometry:=true  # before any SLAM
 """
 
 from launch import LaunchDescription
@@ -14,6 +15,8 @@ from launch_ros.substitutions import FindPackageShare
 ARGUMENTS = {
     "points": ("points", "topic of the clouds"),
     "fixed_frame": ("odom", "frame without jumps"),
+    "odometry": ("false", "poses are found by the clouds alone, without transforms"),
+    "publish_odom": ("false", "with odometry: publish odom and its transform"),
     "namespace": ("dynains", "namespace of the node and its topics static, dynamic and map"),
     "use_sim_time": ("false", "time of /clock, for logs that are played"),
     "parameters": (PathJoinSubstitution([FindPackageShare("dynains_ros"), "config",
@@ -28,6 +31,8 @@ def generate_launch_description():
         namespace=value("namespace"), remappings=[("points", value("points"))],
         parameters=[value("parameters"),
                     {"fixed_frame": value("fixed_frame"),
+                     "odometry": ParameterValue(value("odometry"), value_type=bool),
+                     "publish_odom": ParameterValue(value("publish_odom"), value_type=bool),
                      "use_sim_time": ParameterValue(value("use_sim_time"), value_type=bool)}],
         extra_arguments=[{"use_intra_process_comms": True}])
     container = ComposableNodeContainer(

@@ -2,9 +2,11 @@
 
 #if __has_include(<tf2_ros/buffer.hpp>)  // newer releases
 #include <tf2_ros/buffer.hpp>
+#include <tf2_ros/transform_broadcaster.hpp>
 #include <tf2_ros/transform_listener.hpp>
 #else
 #include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 #endif
 
@@ -13,7 +15,9 @@
 #include <cstdint>
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
 #include <geometry_msgs/msg/pose_with_covariance_stamped.hpp>
+#include <geometry_msgs/msg/transform_stamped.hpp>
 #include <memory>
+#include <nav_msgs/msg/odometry.hpp>
 #include <optional>
 #include <rclcpp_components/register_node_macro.hpp>
 #include <sensor_msgs/msg/point_cloud2.hpp>
@@ -33,6 +37,8 @@ namespace {
 using Cloud = sensor_msgs::msg::PointCloud2;
 using Residual = geometry_msgs::msg::PoseWithCovarianceStamped;
 using Diagnostics = diagnostic_msgs::msg::DiagnosticArray;
+using Odometry = nav_msgs::msg::Odometry;
+using Transform = geometry_msgs::msg::TransformStamped;
 using Loop = RemoverLoop<Cloud::ConstSharedPtr>;
 
 /// Declares parameters that are fixed while the node runs: rclcpp refuses to change them.
@@ -96,6 +102,10 @@ Loop::Config declare_loop(rclcpp::Node& node) {
               static_cast<std::int64_t>(config.capacity)));
   config.map_period = declare({"map_period", "least time between two maps [s]", true, 0.0, 3600.0},
                               config.map_period);
+  config.odometry = declare({"odometry",
+                             "poses are found by the clouds alone, without transforms; then there "
+                             "is no map"},
+                            config.odometry);
   return config;
 }
 
@@ -123,6 +133,8 @@ class RemoverNode::Work {
         fixed_frame_(
             FixedParameters(node)({"fixed_frame", "frame without jumps, in which the map is built"},
                                   std::string("odom"))),
+        has_odom_(FixedParameters(node)(
+            {"publish_odom", "with odometry: publish odom and its transform"}, false)),
         loop_(declare_remover(node), declare_loop(node)),
         transforms_(node.get_clock()),
         listener_(transforms_, &node, true, tf2_ros::DynamicListenerQoS(),
@@ -134,6 +146,10 @@ class RemoverNode::Work {
     residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
     auto map_options = options;
     map_options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
+    if (has_odom_) {
+      odom_ = node.create_publisher<Odometry>("odom", sensor, options);
+      broadcaster_.emplace(node);
+    }
     map_ = node.create_publisher<Cloud>("map", rclcpp::QoS(1).reliable().transient_local(),
                                         map_options);
     diagnostics_ = node.create_publisher<Diagnostics>("/diagnostics", 10);
@@ -159,8 +175,8 @@ class RemoverNode::Work {
     const bool has_cleaned = loop_.clean_next(
         node_.now().seconds(),
         [this](const Cloud::ConstSharedPtr& cloud) { return pose_of(*cloud); },
-        [this](const Cloud::ConstSharedPtr& cloud, const dynains::FrameResult& frame) {
-          publish(*cloud, frame);
+        [this](const Cloud::ConstSharedPtr& cloud, const Cleaned& cleaned) {
+          publish(*cloud, cleaned);
         });
     const std::chrono::duration<double> uptime =
         std::chrono::steady_clock::now().time_since_epoch();
@@ -179,21 +195,30 @@ class RemoverNode::Work {
                      [&](const auto& newest) { return tf2_ros::fromMsg(newest) < stamp; });
   }
 
-  /// Messages are moved to readers of this process.
-  void publish(const Cloud& cloud, const dynains::FrameResult& frame) {
+  /// Messages are moved to readers of this process. A cloud that is not judged passes whole.
+  void publish(const Cloud& cloud, const Cleaned& cleaned) {
     newest_ = cloud.header.stamp;
+    const bool is_judged = !cleaned.labels.empty();
     if (has_readers(*static_)) {
-      static_->publish(
-          std::make_unique<Cloud>(dynains::static_points(cloud, frame.newest().labels)));
+      static_->publish(std::make_unique<Cloud>(
+          is_judged ? dynains::static_points(cloud, cleaned.labels) : cloud));
     }
-    if (has_readers(*dynamic_)) {
-      dynamic_->publish(
-          std::make_unique<Cloud>(dynains::dynamic_points(cloud, frame.newest().labels)));
+    if (is_judged && has_readers(*dynamic_)) {
+      dynamic_->publish(std::make_unique<Cloud>(dynains::dynamic_points(cloud, cleaned.labels)));
     }
-    if (frame.pose_residual) {
+    if (cleaned.frame.pose_residual) {
       residual_->publish(std::make_unique<Residual>(
-          residual_message<Residual>(*frame.pose_residual, cloud.header)));
+          residual_message<Residual>(*cleaned.frame.pose_residual, cloud.header)));
     }
+    if (!has_odom_ || !cleaned.T_odom_sensor) return;
+    auto odom = std::make_unique<Odometry>();
+    odom->header = cloud.header;
+    odom->header.frame_id = fixed_frame_;
+    odom->child_frame_id = cloud.header.frame_id;
+    set_pose(*cleaned.T_odom_sensor, odom->pose.pose);
+    odom_->publish(std::move(odom));
+    broadcaster_->sendTransform(
+        transform_message<Transform>(*cleaned.T_odom_sensor, fixed_frame_, cloud.header));
   }
 
   static bool has_readers(const rclcpp::PublisherBase& publisher) {
@@ -228,11 +253,14 @@ class RemoverNode::Work {
 
   RemoverNode& node_;
   std::string fixed_frame_;
+  bool has_odom_;
   Loop loop_;
   tf2_ros::Buffer transforms_;
   tf2_ros::TransformListener listener_;  // has a thread of its own
   rclcpp::Publisher<Cloud>::SharedPtr static_, dynamic_, map_;
   rclcpp::Publisher<Residual>::SharedPtr residual_;
+  rclcpp::Publisher<Odometry>::SharedPtr odom_;
+  std::optional<tf2_ros::TransformBroadcaster> broadcaster_;
   rclcpp::Publisher<Diagnostics>::SharedPtr diagnostics_;
   builtin_interfaces::msg::Time newest_;  // used by the worker alone
   std::string told_;                      // the last report
