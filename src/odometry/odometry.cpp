@@ -59,8 +59,8 @@ class Odometry::Loop {
     Pose T_last_newest = T_predicted;
     result.loss = register_scan(period, T_last_newest, result);
     const bool is_lost = result.loss != OdometryLoss::kNone;
-    const bool is_taken = !is_lost || T_odometry_sensor;
-    if (is_lost && T_odometry_sensor) {
+    const bool is_taken = !is_lost || T_odometry_sensor || result.loss == OdometryLoss::kGap;
+    if (is_lost && is_taken) {
       T_last_newest = T_predicted;
       scan_.prepare(T_last_newest, period);
       if (result.loss != OdometryLoss::kFewPoints) begin_map();
@@ -125,7 +125,6 @@ class Odometry::Loop {
 
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
-    if (is_after_gap(period)) return OdometryLoss::kGap;
     constexpr int kMaxTurns = 4;
     constexpr double kConverged = 0.02;  // m
     for (int turn = 0; turn < kMaxTurns; ++turn) {
@@ -133,6 +132,7 @@ class Odometry::Loop {
       const std::vector<Eigen::Vector3d>& points = scan_.keypoints();
       if (points.size() < kMinMatches) return OdometryLoss::kFewPoints;
       if (scan_count_ == 0) return OdometryLoss::kNone;
+      if (is_after_gap(period)) return OdometryLoss::kGap;
       if (first_) start_map(T_last_newest, period);
       const Pose T_predicted = T_world_last_ * T_last_newest;
       std::optional<Registration> best;

@@ -39,7 +39,9 @@ void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
 
 void write_poses(const OdometryFlags& flags) {
   Recording recording = flags.recording.open_without_poses(flags.is_compensated);
-  OutputFile file(flags.out, existing_by(flags.force), InputFiles(recording));
+  const bool is_own = flags.force && is_own_trajectory(flags.out);
+  OutputFile file(flags.out, is_own ? Existing::kOurs : existing_by(flags.force),
+                  InputFiles(recording));
   const PoseEstimate estimate =
       estimate_with_progress(recording, flags.window, flags.one_thread, flags.quiet);
   write_trajectory(file.path(), recording);
@@ -68,6 +70,13 @@ PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& wind
         if (done > 0) progress->update(done);
       });
   progress.reset();
+  if (!estimate.lost_scans.empty()) {
+    print_warning(std::to_string(estimate.lost_scans.size()) + " scans from " +
+                  recording.name(estimate.lost_scans.front()) + " to " +
+                  recording.name(estimate.lost_scans.back()) +
+                  ": no hold, they fit to no scan before, and their motion is that of the scans "
+                  "before");
+  }
   if (estimate.uncertain_scans > 0) {
     print_warning("the surfaces of " + std::to_string(estimate.uncertain_scans) + " of " +
                   std::to_string(recording.size()) +
@@ -91,7 +100,8 @@ void add_odometry_command(CLI::App& app) {
   command.add_flag("-q,--quiet", flags->quiet, "print errors only");
   command.footer(
       "Registers each scan to a map of earlier ones, without what moves. The first scan is the "
-      "frame of the poses. Exits with\n3 if it loses track, after it has written the poses "
+      "frame of the poses. Exits with\n3 if it loses track for good, after it has written the "
+      "poses "
       "before.");
   command.callback([flags] { write_poses(*flags); });
 }

@@ -1,13 +1,16 @@
 #include "estimate_poses.hpp"
 
+#include <algorithm>
 #include <future>
-#include <ostream>
+#include <sstream>
 #include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/odometry/odometry.hpp"
 #include "interrupt.hpp"
+#include "io/fingerprint.hpp"
+#include "io/input_file.hpp"
 #include "io/text.hpp"
 #include "read_ahead.hpp"
 #include "recorded_scans.hpp"
@@ -28,7 +31,7 @@ std::string loss_at(const Recording& recording, std::size_t scan, std::size_t do
   return text + "; " + std::to_string(done) + " scans before it have poses";
 }
 
-/// Poses of the scans before the first one that is lost. Reads the recording until it returns.
+/// Poses of the scans up to the last one that is not lost. Reads the recording until it returns.
 PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool one_thread,
                         const std::function<void(std::size_t, std::size_t)>& progress,
                         std::vector<Pose>& poses) {
@@ -38,6 +41,8 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
   Odometry odometry({}, remover);
   PoseEstimate estimate;
   RecordedScan scan;
+  std::optional<std::string> loss;  // since the last scan that is not lost
+  std::size_t known = 0;            // scans up to it
   ReadAhead scans(recording, range.first, range.last,
                   one_thread ? std::launch::deferred : std::launch::async);
   progress(0, range.size());
@@ -46,9 +51,12 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
     const std::vector<double> offsets = recording.point_offsets(i, scan);
     const OdometryResult result = odometry.push(points_of(scan), offsets, recording.time(i));
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-    if (result.loss != OdometryLoss::kNone) {
-      estimate.loss = loss_at(recording, i, poses.size(), result);
-      break;
+    if (result.loss == OdometryLoss::kNone) {
+      known = poses.size() + 1;
+      loss.reset();
+    } else {
+      if (!loss) loss = loss_at(recording, i, poses.size(), result);
+      estimate.lost_scans.push_back(poses.size());
     }
     if (result.free_directions > 0) ++estimate.uncertain_scans;
     TimingRow& row = estimate.timing.rows.emplace_back();
@@ -57,6 +65,11 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
     poses.push_back(result.T_world_sensor);
     progress(poses.size(), range.size());
   }
+  poses.resize(known, Pose::Identity());
+  estimate.timing.rows.resize(known);
+  std::vector<std::size_t>& lost = estimate.lost_scans;
+  lost.erase(std::lower_bound(lost.begin(), lost.end(), known), lost.end());
+  estimate.loss = loss;
   return estimate;
 }
 
@@ -76,19 +89,37 @@ PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool
   return estimate;
 }
 
+namespace {
+
+std::string trajectory_head(const std::string& rows) {
+  Fingerprint fingerprint;
+  fingerprint.add(rows);
+  return "# dynains odometry " + fingerprint.text() + '\n';
+}
+
+}  // namespace
+
 void write_trajectory(const std::filesystem::path& file, const Recording& recording) {
-  AtomicFile writer(file);
-  std::ostream& out = writer.stream();
-  text::exact(out);
-  out << "# time x y z qx qy qz qw\n";
+  std::ostringstream rows;
+  text::exact(rows);
+  rows << "# time x y z qx qy qz qw\n";
   for (std::size_t i = 0; i < recording.size(); ++i) {
     const Pose& T = recording.T_world_sensor(i);
     const Eigen::Vector3d t = T.translation();
     const Eigen::Quaterniond q(T.linear());
-    out << recording.time(i) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
-        << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+    rows << recording.time(i) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
+         << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
   }
+  AtomicFile writer(file);
+  writer.stream() << trajectory_head(rows.str()) << rows.str();
   writer.commit();
+}
+
+bool is_own_trajectory(const std::filesystem::path& file) {
+  if (!is_file(file)) return false;
+  const std::string content = read_text_file(file);
+  const std::size_t end = content.find('\n') + 1;  // npos + 1 is 0
+  return content.substr(0, end) == trajectory_head(content.substr(end));
 }
 
 }  // namespace dynains::program

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "run_timing.hpp"
@@ -22,20 +23,26 @@ struct LostTrack : std::runtime_error {
 struct PoseEstimate {
   /// Where and why the odometry lost track, one sentence; empty: it did not.
   std::optional<std::string> loss;
+  /// Scans that fit to none before, though later ones do: their motion is the predicted one.
+  std::vector<std::size_t> lost_scans;
   /// Scans whose surfaces do not determine all directions of motion.
   std::size_t uncertain_scans = 0;
   RunTiming timing;  ///< began_epoch and plausibility of the scans
 };
 
-/// Gives poses to the scans in `window`, up to the first one that the odometry loses, and leaves
-/// out the others. The first scan is the world frame. Calls `progress(done, total)` before the
-/// first scan and after each; a signal ends the command. `one_thread`: this thread also reads.
+/// Gives poses to the scans in `window`, up to the last one that the odometry does not lose, and
+/// leaves out the others. The first scan is the world frame. Calls `progress(done, total)` before
+/// the first scan and after each; a signal ends the command. `one_thread`: this thread also reads.
 /// Throws IoError, ConfigError for a window with fewer than two scans, LostTrack if fewer have
 /// poses, and Interrupted.
 PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
                             const std::function<void(std::size_t, std::size_t)>& progress);
 
-/// Writes "time x y z qx qy qz qw" for each scan. Throws IoError.
+/// Writes "time x y z qx qy qz qw" for each scan, below a line with the fingerprint of these rows.
+/// Throws IoError.
 void write_trajectory(const std::filesystem::path& file, const Recording& recording);
+
+/// Whether write_trajectory() has written the file as it is. Throws IoError.
+bool is_own_trajectory(const std::filesystem::path& file);
 
 }  // namespace dynains::program

@@ -1,4 +1,5 @@
 // Recordings without poses: dynains odometry, dynains run --odometry and what they say.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -17,17 +18,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A simulated hall without its poses. `lost_from`: these scans are those of a street.
+/// A simulated hall without its poses. `lost_from` to `found_from`: these scans are of a street.
 class Unposed {
  public:
-  explicit Unposed(int scans = 12, int lost_from = 1000) {
+  explicit Unposed(int scans = 12, int lost_from = 1000, int found_from = 1000) {
     simulate("hall", scans);
     const fs::path velodyne = sequence() / "velodyne";
     if (lost_from < scans) {
       const fs::path street = folder_ / "street";
       succeed(start({"simulate", street, "--scene", "urban", "--sensor", "vlp16", "--scans",
                      std::to_string(scans), "-q"}));
-      for (int i = lost_from; i < scans; ++i) {
+      for (int i = lost_from; i < std::min(scans, found_from); ++i) {
         const std::string name = (i < 10 ? "00000" : "0000") + std::to_string(i) + ".bin";
         fs::copy_file(street / "velodyne" / name, velodyne / name,
                       fs::copy_options::overwrite_existing);
@@ -77,6 +78,16 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
             .code == 0);
   CHECK(read_trajectory(poses).poses.back().matrix() == found.poses.back().matrix());
 
+  // In the recording, poses of the odometry are replaced, and those of others are not.
+  const fs::path inside = recording.sequence() / "poses.txt";
+  const std::vector<std::string> again = {"odometry", recording.sequence(), "--out", inside, "-q",
+                                          "--force"};
+  succeed(start(again));
+  CHECK(start(again).code == 0);
+  write_text(inside, read_text(inside) + "\n");
+  check_refused(start(again), 1, "is a part of");
+  fs::remove(inside);
+
   const fs::path out = recording / "out";
   succeed(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}));
   CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
@@ -98,6 +109,19 @@ TEST_CASE("After a loss of track, the scans before it have results") {
   CHECK(outcome.code == 3);
   CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000008"));
   CHECK(count_entries(out / "labels") == 8);
+}
+
+TEST_CASE("Scans that fit to none before are named, and the odometry goes on behind them") {
+  const Unposed recording(14, 8, 10);
+  const fs::path poses = recording / "poses.txt";
+  const Outcome outcome = start({"odometry", recording.sequence(), "--out", poses, "-q"});
+  CHECK(outcome.code == 0);
+  CHECK_THAT(outcome.err, ContainsSubstring("2 scans from 000008 to 000009: no hold"));
+  const Trajectory found = read_trajectory(poses);
+  REQUIRE(found.poses.size() == 14);
+  const Pose exact =
+      recording.exact().T_world_sensor(0).inverse() * recording.exact().T_world_sensor(13);
+  CHECK((found.poses[13].translation() - exact.translation()).norm() < 0.1);
 }
 
 TEST_CASE("The odometry says about the clouds what a run says") {

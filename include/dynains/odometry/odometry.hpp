@@ -39,7 +39,7 @@ enum class OdometryLoss : unsigned char {
   kNone,
   kFewPoints,  ///< too few points for a registration
   kNoOverlap,  ///< the scan does not fit to the map anywhere near the predicted pose
-  kGap         ///< scans are missing for longer than a motion can be predicted
+  kGap         ///< scans are missing for longer than a motion can be predicted: the map begins anew
 };
 
 constexpr std::array<const char*, 4> value_names(OdometryLoss) {
@@ -86,7 +86,8 @@ class Odometry {
   /// measured, or none if the points are all of one time; a point without a finite offset keeps its
   /// place. Throws CloudError if the numbers of offsets and points differ, and PoseError if the
   /// mean time of the points is not after that of the scan before; the state is then unchanged. A
-  /// lost scan does not enter the map.
+  /// lost scan does not enter the map, which the next ones are registered to, until a gap: then the
+  /// predicted motion stays, and the map begins anew.
   template <class Cloud>
   OdometryResult push(const Cloud& cloud, Span<const double> offsets, double time) {
     return register_scan(detail::CloudView(cloud), offsets, time, std::nullopt);
