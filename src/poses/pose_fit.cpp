@@ -31,6 +31,7 @@ class ChainScan {
 };
 
 constexpr double kMaxFromGuess = 1.5;  // m
+constexpr double kOpen = 0.025;        // m, uncertainty of a direction that planes leave open
 
 /// Guesses of the motion to the next scan: as given, none, the given distance in each direction,
 /// less than `farthest` (m), and the motion at another place.
@@ -133,7 +134,6 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
 std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainScan& b,
                                                 const Pose& given, const std::vector<Pose>& guesses,
                                                 double farthest) {
-  constexpr double kOpen = 0.025;  // m, uncertainty of a direction that planes leave open
   constexpr double kWorse = 1.02;  // ratio of gaps
   // Poses that are exact need no other guesses, unless they stand, as those of another recording.
   auto forth = register_near(a.surfaces(), b.points(), given);
@@ -246,8 +246,7 @@ std::vector<std::size_t> starts_of_chains(const Recording& recording) {
 /// one scan to the next at another place.
 std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t number,
                                        std::size_t first, const std::optional<Pose>& elsewhere) {
-  constexpr std::size_t kMaxLength = 9;  // scans
-  constexpr double kFar = 3.0;           // m, at points kLever away
+  constexpr double kFar = 3.0;  // m, at points kLever away
   const auto read = [&](std::size_t i) {
     return ChainScan(sampled_points(recording.read_scan(i)));
   };
@@ -263,7 +262,7 @@ std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t n
   const double farthest = longest_way(recording.time(first + 1) - recording.time(first));
   add(first + 1, first_guesses(motion_between(recording, first, first + 1), elsewhere, farthest),
       farthest);
-  for (std::size_t step = 3; step <= kMaxLength && !motions.empty(); step *= 3) {
+  for (std::size_t step = 3; step <= kMaxSpan && !motions.empty(); step *= 3) {
     const Pose T = motions.back().T_first_second;
     if (extent_of(T) > kFar || first + step >= recording.size()) break;
     const Pose guess = T * T * T;
@@ -299,6 +298,37 @@ std::vector<RegisteredMotion> register_motions(
   return motions;
 }
 
+bool are_poses_exact(const Recording& recording) {
+  constexpr std::size_t kPlaces = 3, kDense = 20000;  // points; of more, a third is enough
+  constexpr double kTelling = 2.0;                    // m, at points kLever away
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (extent_of(motion_between(recording, first, i)) < kTelling) continue;
+    pairs.emplace_back(first, i);
+    first = i;
+  }
+  const std::size_t places = std::min(kPlaces, pairs.size());
+  const auto is_confirmed = [&](std::size_t place) {
+    const auto [from, to] =
+        pairs[place * (pairs.size() - 1) / std::max<std::size_t>(1, places - 1)];
+    const auto read = [&](std::size_t i) {
+      const RecordedScan scan = recording.read_scan(i);
+      return RegistrationScan(finite_points(scan, scan.size() < kDense ? 1 : 3));
+    };
+    const RegistrationScan a = read(from), b = read(to);
+    const auto meets = [](const RegistrationScan& one, const RegistrationScan& other,
+                          const Pose& given) {
+      const auto found = register_near(one.surfaces(), other.points(), given);
+      return is_certain(found) && is_exact(found->T_a_b, given);
+    };
+    const Pose given = motion_between(recording, from, to);
+    return meets(a, b, given) && meets(b, a, given.inverse());
+  };
+  const std::vector<bool> confirmed = in_two_threads(places, is_confirmed);
+  return places > 0 && std::find(confirmed.begin(), confirmed.end(), false) == confirmed.end();
+}
+
 namespace {
 
 /// Weights of the axes of residuals, at most 1, from the differences of both registrations.
@@ -317,12 +347,11 @@ Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
 }  // namespace
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Pose& T_body_sensor, bool only_steps) {
+                         const Pose& T_body_sensor, std::size_t gap) {
   std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
   const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
-    const bool is_step = motion.second == motion.first + 1;
-    if (only_steps && !is_step) continue;
+    if (gap > 0 && motion.second != motion.first + gap) continue;
     const auto T_body = body(motion);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);

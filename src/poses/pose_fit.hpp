@@ -14,6 +14,7 @@ namespace dynains {
 
 inline constexpr double kExact = 0.03;  ///< m at points 10 m away; registrations are worse rarely
 inline constexpr std::size_t kMinMotions = 6;  ///< registered, for a decision
+inline constexpr std::size_t kMaxSpan = 9;     ///< scans, of a registered motion
 
 /// Motion of the sensor between two scans, by their registration.
 struct RegisteredMotion {
@@ -35,6 +36,11 @@ std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);
 
+/// Whether the given poses are exact and determined at up to three places: scans between
+/// which they move by 2 m meet within kExact, forth and back, from the given motion. A fraction of
+/// the work of register_motions(); false says nothing. Throws IoError.
+bool are_poses_exact(const Recording& recording);
+
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
 
@@ -51,9 +57,9 @@ struct MotionError {
   std::size_t pairs = 0;
 };
 
-/// `T_body_sensor`: of the body that moves. `only_steps`: between neighbouring scans alone.
+/// `T_body_sensor`: of the body that moves. `gap`: of scans that many apart alone; 0: of all.
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
-                         const Pose& T_body_sensor = Pose::Identity(), bool only_steps = false);
+                         const Pose& T_body_sensor = Pose::Identity(), std::size_t gap = 0);
 
 /// MotionError::at_points of all motions.
 double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body);

@@ -169,8 +169,8 @@ void write_grid(const RunPlan& plan, const fs::path& folder, const OutsideOutput
   outcome.grid = made.summary();
 }
 
-/// Throws ConfigError if the scans disagree with the poses. Returns the agreement.
-Agreement check_before(const RunPlan& plan, const RunListener& listener) {
+/// Throws ConfigError if the scans disagree with the poses.
+void check_before(const RunPlan& plan, const RunListener& listener) {
   const RunSettings& settings = plan.settings;
   check_ranges(plan.sequence, plan.range, settings.config,
                settings.recording_flags.contains("--point-units"));
@@ -181,7 +181,6 @@ Agreement check_before(const RunPlan& plan, const RunListener& listener) {
     throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
                       "; or run with these poses and clouds by --accept-poses");
   }
-  return start.agreement;
 }
 
 /// Where the files are written that appear at the end.
@@ -224,7 +223,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
                          OutsideOutputs& outside) {
   std::vector<std::string> warnings = plan.sequence.warnings();
   const RunListener listener = with_memory(caller, warnings);
-  const Agreement agreement = check_before(plan, listener);
+  check_before(plan, listener);
   std::optional<SessionWriter> session;
   std::optional<SessionAlignment> alignment;
   // The results that are replaced may have added the session already.
@@ -277,7 +276,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   }
   nlohmann::ordered_json told = to_json(doubts, plan.sequence);
   told["warnings"] = warnings;
-  outcome.report = make_report(plan, agreement, told, results, timing);
+  outcome.report = make_report(plan, told, results, timing);
   if (!outcome.grid.is_null()) outcome.report["grid"] = outcome.grid;
   if (second_pass) {
     outcome.report["second_pass"] = {{"places", second_pass->place_count()},

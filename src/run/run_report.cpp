@@ -68,9 +68,8 @@ Statistics statistics(std::vector<double> values) {
   return {quantile(0.5), quantile(0.95), quantile(0.99), values.back()};
 }
 
-nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
-                                   const nlohmann::ordered_json& doubts, const RunResults& results,
-                                   const RunTiming& timing) {
+nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_json& doubts,
+                                   const RunResults& results, const RunTiming& timing) {
   const Recording& sequence = plan.sequence;
   const RunSettings& settings = plan.settings;
   const LabelCounts& labels = results.labels();
@@ -105,8 +104,6 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreeme
   report["wall_milliseconds"] = wall;
   report["share_outside_pipeline"] = std::clamp(1.0 - timing.pipeline / wall, 0.0, 1.0);
   report["peak_memory_bytes"] = peak_memory_bytes();
-  report["pose_agreement"] = nullptr;
-  if (agreement.points > 0) report["pose_agreement"] = agreement.share;
   report["pose_residual"] = pose_residual_to_json(timing);
   report["doubts"] = doubts;
   report["preset"] = settings.preset;

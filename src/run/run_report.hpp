@@ -22,11 +22,9 @@ struct Statistics {
 };
 Statistics statistics(std::vector<double> values);
 
-/// `agreement`: of the scans under the poses, by a sample. `doubts`: see to_json(RunDoubts), and
-/// "warnings".
-nlohmann::ordered_json make_report(const RunPlan& plan, const Agreement& agreement,
-                                   const nlohmann::ordered_json& doubts, const RunResults& results,
-                                   const RunTiming& timing);
+/// `doubts`: see to_json(RunDoubts), and "warnings".
+nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_json& doubts,
+                                   const RunResults& results, const RunTiming& timing);
 
 /// The folder of a run.
 const OutputKind& run_output_kind();

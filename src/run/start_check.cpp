@@ -15,17 +15,20 @@
 #include "dynains/median.hpp"
 #include "pose_advice.hpp"
 #include "poses/landmarks.hpp"
+#include "poses/pose_fit.hpp"
 
 namespace dynains::program {
 namespace {
 
-/// Judges the poses as `dynains check` does.
-void check_poses(const Recording& recording, bool accepts_poses, StartCheck& result) {
+/// Judges the poses as `dynains check` does, unless a few places confirm them.
+void check_poses(const Recording& recording, StartCheck& result) {
+  const bool is_usual =
+      recording.frame() == PointFrame::kSensor && recording.sensor_origin().isZero(0.0);
+  if (is_usual && are_poses_exact(recording)) return;
   Diagnosis d = diagnose(recording, /*pairs=*/3);
   if (d.verdict == PoseVerdict::kUnknown) d = diagnose(recording);  // the places may be empty
-  result.agreement = d.as_given;
   if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;
-  const bool may_run = accepts_poses || d.sound() || d.verdict == PoseVerdict::kUnknown;
+  const bool may_run = d.sound() || d.verdict == PoseVerdict::kUnknown;
   (may_run ? result.warnings.emplace_back() : result.refusal) = advice(recording, d);
 }
 
@@ -86,8 +89,8 @@ StartCheck check_start(const Recording& recording, const ScanRange& range,
                        const RemoverConfig& config, bool accepts_poses) {
   constexpr std::size_t kMinScans = 8;
   StartCheck result;
-  const bool has_given_poses = !recording.options().without_poses;
-  if (has_given_poses && range.size() >= kMinScans) check_poses(recording, accepts_poses, result);
+  const bool are_judged = !accepts_poses && !recording.options().without_poses;
+  if (are_judged && range.size() >= kMinScans) check_poses(recording, result);
   if (!result.refusal.empty()) return result;
   const auto warn_if = [&](const std::optional<std::string>& remark) {
     if (remark) result.warnings.push_back(*remark);

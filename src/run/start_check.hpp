@@ -7,7 +7,6 @@
 
 #include "dynains/config.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/poses/diagnosis.hpp"
 #include "scan_range.hpp"
 
 namespace dynains::program {
@@ -24,14 +23,12 @@ std::optional<std::string> remark_on_lone_scans(const Recording& recording, cons
                                                 const RemoverConfig& config);
 
 struct StartCheck {
-  Agreement agreement;  ///< of a sample of scans; of no points if poses are not judged
   std::vector<std::string> warnings;
   std::string refusal;  ///< why the run must not begin; empty: it may
 };
 
-/// Judges the poses as `dynains check` does, and the clouds of `range`. Poses of an odometry of
-/// this program, and those of fewer than eight scans, are not judged. With `accepts_poses`,
-/// findings on poses are warnings. Throws IoError.
+/// Judges the poses, and the clouds of `range`. Poses of an odometry of this program, those of
+/// fewer than eight scans, and all with `accepts_poses` are not judged. Throws IoError.
 StartCheck check_start(const Recording& recording, const ScanRange& range,
                        const RemoverConfig& config, bool accepts_poses);
 

@@ -11,6 +11,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "poses/in_two_threads.hpp"
+#include "poses/pose_fit.hpp"
 #include "poses/scan_registration.hpp"
 #include "simulation/config.hpp"
 #include "support/box_room.hpp"
@@ -76,6 +77,20 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
   CHECK_FALSE(is_accepted(
       diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }))));
   CHECK_FALSE(is_accepted(diagnose(drive.with_poses(Noise(0.2)))));
+}
+
+TEST_CASE("Exact poses are confirmed at a few places, and no others") {
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 4));
+  CHECK(are_poses_exact(Recording(drive.path())));
+  CHECK_FALSE(are_poses_exact(drive.with_poses(Noise(0.1))));
+  CHECK_FALSE(are_poses_exact(
+      drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); })));
+  CHECK_FALSE(
+      are_poses_exact(drive.with_poses([](std::size_t, const Pose&) { return Pose::Identity(); })));
+  CHECK_FALSE(are_poses_exact(drive.with_poses([](std::size_t, Pose T) {
+    T.translation() *= 1.05;
+    return T;
+  })));
 }
 
 TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexact") {

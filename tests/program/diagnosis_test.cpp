@@ -284,7 +284,7 @@ TEST_CASE("check and run report a problem in one sentence") {
   CHECK_FALSE(fs::exists(out / "wrong"));
   const Outcome warned = start({"run", seq, "-o", out / "wrong", "-q", "--accept-poses"});
   CHECK(warned.code == 0);
-  CHECK_THAT(warned.err, StartsWith("dynains: warning: Scans agree under other options (--invert"));
+  CHECK_THAT(warned.err, !ContainsSubstring("Scans agree under other options"));
   const Outcome fine = start({"run", seq, "-o", out / "right", "-q", "--invert-poses"});
   CHECK(fine.code == 0);
   CHECK(fine.err.empty());
