@@ -172,11 +172,12 @@ class NewMap {
     Json report = out_.marker();
     report.erase(kField);
     file_->put_in_place([&] {
-      out_.mark_with(report, kRemappedMap);
+      out_.mark_with(report, file_->path());
       publish_more();
     });
+    report = out_.marker();
     report[kField] = description;
-    out_.mark_with(report, kRemappedMap);
+    out_.mark_with(report, path_);
   }
 
  private:

@@ -1,5 +1,7 @@
 #include "input_files.hpp"
 
+#include <system_error>
+
 #include "dynains/errors.hpp"
 #include "io/scan_files.hpp"
 
@@ -18,7 +20,10 @@ void InputFiles::add(const Recording& recording) {
 
 void InputFiles::add_results(const fs::path& out) {
   add_owner(out, false);
-  for (const char* const below : {"labels", "online", "causes"}) add(out / below);
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out, error)) {
+    if (entry.is_directory(error)) add(entry.path());
+  }
 }
 
 void InputFiles::refuse(const FileIdentity& identity, const fs::path& output) const {

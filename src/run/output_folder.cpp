@@ -1,8 +1,10 @@
 #include "output_folder.hpp"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +22,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kPartialEnd = ".partial";
 const Json::json_pointer kComplete("/complete");
+const Json::json_pointer kContents("/contents");
 
 /// The folder of an OutputFile.
 const OutputKind& file_kind() {
@@ -80,13 +83,12 @@ Folder::Rename check_output(const Folder& folder, const std::string& name, Exist
 }
 
 Json content_of(const fs::path& file) {
-  constexpr std::size_t kBlock = std::size_t{1} << 20U;
   std::ifstream stream = open_input(file);
   Fingerprint fingerprint;
-  std::string block(kBlock, '\0');
+  std::array<char, std::size_t{1} << 16U> block;
   std::uint64_t bytes = 0;
-  while (stream.read(block.data(), kBlock), stream.gcount() > 0) {
-    fingerprint.add(block.data(), static_cast<std::size_t>(stream.gcount()));
+  while (stream.read(block.data(), block.size()), stream.gcount() > 0) {
+    fingerprint.add_words(block.data(), static_cast<std::size_t>(stream.gcount()));
     bytes += static_cast<std::uint64_t>(stream.gcount());
   }
   if (stream.bad()) throw IoError(file.string() + ": cannot be read");
@@ -171,6 +173,35 @@ void ResultFolder::check(const InputFiles& inputs) const {
       });
 }
 
+Json ResultFolder::contents() const {
+  Json contents = Json::object();
+  std::map<std::string, Fingerprint> folders;
+  visit_entries(
+      [&](const Folder& parent, const std::string& name, const Folder::Entry& entry, bool is_ours) {
+        const bool is_direct = &parent == &folder_;
+        if (!is_ours || entry.kind != Folder::Kind::kFile || (is_direct && name == kind_.marker))
+          return;
+        const Json content = content_of(parent.path() / name);
+        if (is_direct) {
+          contents[listed_name(name)] = content;
+        } else {
+          folders[parent.path().filename().string()].add(name + content.dump());
+        }
+      });
+  for (const auto& [name, fingerprint] : folders) contents[listed_name(name)] = fingerprint.text();
+  return contents;
+}
+
+void ResultFolder::check_contents() const {
+  const Json none = Json::object(), now = is_complete() ? contents() : none;
+  for (const auto& [name, content] : now.items()) {
+    if (!marker_.contains(kContents)) return;  // of an earlier version
+    if (has(marker_, kContents / name, content)) continue;
+    throw IoError((path() / name).string() + ": has changed since dynains " + kind_.command +
+                  " wrote it; move it away, or choose another folder");
+  }
+}
+
 void ResultFolder::mark(Json marker, const OutputListing& listing) {
   for (const std::string& name : folder_.names()) {
     if (target_of_temporary(name) == kind_.marker)
@@ -194,10 +225,12 @@ void ResultFolder::remove_results() const {
   folder_.remove_file(kind_.marker);
 }
 
-void ResultFolder::mark_with(const Json& marker, const std::string& file) {
+void ResultFolder::mark_with(Json marker, const fs::path& file) {
+  const std::string name = listed_name(file.filename().string());
   OutputListing listing = listing_;
-  listing.files.insert(listed_name(file));
-  mark(marker, listing);
+  listing.files.insert(name);
+  if (marker.contains(kContents)) marker[kContents][name] = content_of(file);
+  mark(std::move(marker), listing);
 }
 
 PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
@@ -278,6 +311,7 @@ OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
                     ": holds earlier results; choose another folder, or replace them by --force");
     }
     found.check(inputs);
+    found.check_contents();
     Folder(place.parent_path()).check_replaceable(place.filename().string());
     if (!found.folder().names().empty()) earlier_.emplace(std::move(found));
   }
@@ -310,6 +344,7 @@ void OutputFolder::keep_unfinished(const Json& marker) {
 
 void OutputFolder::finish(Json marker, const std::function<void()>& put_others) {
   marker["complete"] = true;
+  marker[kContents] = partial_->results().contents();
   partial_->results().mark(marker, listing_);
   sync_files(path());
   partial_->keep();  // the results are whole

@@ -80,11 +80,15 @@ class ResultFolder {
 
   /// Throws if any file is not listed, or is one of `inputs`.
   void check(const InputFiles& inputs) const;
+  /// content_of() the listed files, and a fingerprint of each listed folder, by name.
+  nlohmann::ordered_json contents() const;
+  /// Throws if complete results are not as they were written.
+  void check_contents() const;
   /// Replaces the marker, with this listing in the field `outputs`. It is on the disk afterwards.
   void mark(nlohmann::ordered_json marker, const OutputListing& listing);
-  /// Replaces the marker, and lists one more file. A file that is not listed counts as one of the
-  /// user.
-  void mark_with(const nlohmann::ordered_json& marker, const std::string& file);
+  /// Replaces the marker, and lists one more file, whose content is that of `file` of this name. A
+  /// file that is not listed counts as one of the user.
+  void mark_with(nlohmann::ordered_json marker, const std::filesystem::path& file);
   /// Removes the listed files, and at last the marker. Files of others stay.
   void remove_results() const;
 
@@ -154,9 +158,10 @@ class OutputFolder {
   Existing owns(const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Writes `marker` with "complete" set, syncs the results, and calls `put_others()`. The results
-  /// replace the target at last, so a complete marker there means that the other outputs are in
-  /// place. The results stay in path() if `put_others()` fails. Throws IoError.
+  /// Writes `marker` with "complete" and the contents set, syncs the results, and calls
+  /// `put_others()`. The results replace the target at last, so a complete marker there means that
+  /// the other outputs are in place. The results stay in path() if `put_others()` fails. Throws
+  /// IoError.
   void finish(
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 

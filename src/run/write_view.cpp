@@ -188,7 +188,7 @@ fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
   write_page(page.path(), out.path(), recording, {scans.front(), scans.back()},
              out.field<double>("/configuration/map_voxel"), max_points);
-  page.put_in_place([&] { out.mark_with(out.marker(), kViewPage); });
+  page.put_in_place([&] { out.mark_with(out.marker(), page.path()); });
   return out.path() / kViewPage;
 }
 
