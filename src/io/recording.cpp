@@ -11,10 +11,10 @@
 #include "dynains/io/kitti.hpp"
 #include "failure.hpp"
 #include "input_file.hpp"
+#include "io/poses/recording_poses.hpp"
 #include "open_recording.hpp"
 #include "points/deskew.hpp"
 #include "points/point_clock.hpp"
-#include "poses/recording_poses.hpp"
 #include "text.hpp"
 
 namespace dynains {
