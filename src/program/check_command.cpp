@@ -57,7 +57,7 @@ void check(const CheckFlags& given) {
 
 void add_check_command(CLI::App& app) {
   CLI::App& command = *app.add_subcommand(
-      "check", "Tell in seconds whether a recording will work, and which option it needs");
+      "check", "Report within seconds whether a recording will work, and which options it needs");
   const auto flags = std::make_shared<CheckFlags>(command);
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "

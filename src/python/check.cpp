@@ -127,7 +127,7 @@ void bind_check(py::module_& module) {
       .def("__repr__", [](const CheckedRecording& checked) { return checked.text; });
 
   const std::string doc =
-      "Tells in seconds whether a recording will work, and which options it needs.\n\n"
+      "Reports within seconds whether a recording will work, and which options it needs.\n\n"
       "recording: a Recording, or its path and by name:\n" +
       describe_settings<program::RecordingSettings>() +
       "Returns a Diagnosis. Raises IoError if a file is broken.";

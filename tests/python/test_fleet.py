@@ -153,7 +153,7 @@ def test_a_recording_that_fails_is_reported_and_does_not_stop_the_others(drives,
 def test_the_warnings_of_a_run_are_part_of_its_result(drives, tmp_path):
     job = (str(drives / "drive1"), str(tmp_path / "out"))
     result = fleet._clean_one(*job, {"pose_units": "mm", "accept_poses": True})
-    assert any("pass --pose-units m" in warning for warning in result["warnings"])
+    assert any("see: dynains check" in warning for warning in result["warnings"])
 
 
 def test_wrong_arguments_of_a_fleet(drives, tmp_path, capsys):

@@ -104,7 +104,7 @@ def test_poses_that_do_not_fit(drive, tmp_path):
     poses = {"poses": drive / "poses_mm.txt"}
     with pytest.raises(dynains.ConfigError, match="pose-units"):
         dynains.run(drive, tmp_path / "out", **poses)
-    with pytest.warns(RuntimeWarning, match="pass --pose-units mm"):
+    with pytest.warns(RuntimeWarning, match="under the poses.*see: dynains check"):
         dynains.run(drive, tmp_path / "out", accept_poses=True, **poses)
 
 
