@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "cell_surfaces.hpp"
+#include "given_motion.hpp"
 #include "scan_registration.hpp"
 
 namespace dynains {
@@ -116,7 +117,7 @@ std::vector<SensorAgreement> compare_sensors(const Recording& recording) {
     const Pose T = register_to_others(of_sensor[k]);
     agreement.T_cloud_sensor = T * sensors[k];
     agreement.distance = (agreement.T_cloud_sensor.translation() - sensors[k].translation()).norm();
-    agreement.angle = Eigen::AngleAxisd(T.linear()).angle();
+    agreement.angle = angle_of(T.linear());
   }
   return result;
 }

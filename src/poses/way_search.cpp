@@ -69,7 +69,7 @@ double mean_gap(const Landmarks& a, const Landmarks& b, const Pose& T_a_b) {
 
 std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pose& T_a_b,
                                const Eigen::Vector3d& direction, double farthest) {
-  constexpr double kMaxGap = 0.4;  // m; traffic of another speed must not pull at the minimum
+  constexpr double kMaxPull = 0.4;  // m; traffic of another speed must not pull at the minimum
   const Points of_a = thinned(a.points());
   const Points of_b = thinned(b.points());
   if (of_a.size() < kMinLandmarks || of_b.size() < kMinLandmarks) return std::nullopt;
@@ -89,7 +89,8 @@ std::optional<Pose> search_way(const Landmarks& a, const Landmarks& b, const Pos
 
   const auto gap_at = [&](double displacement) {
     const Pose T = moved(T_a_b, displacement * direction);
-    return 0.5 * (gap_of(a, decisive_b, T, kMaxGap) + gap_of(b, decisive_a, T.inverse(), kMaxGap));
+    return 0.5 *
+           (gap_of(a, decisive_b, T, kMaxPull) + gap_of(b, decisive_a, T.inverse(), kMaxPull));
   };
   double best = coarse;
   double least = gap_at(best);

@@ -1,6 +1,7 @@
 #include "output_folder.hpp"
 
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
+#include "io/failure.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
 
@@ -87,11 +89,12 @@ Json content_of(const fs::path& file) {
   Fingerprint fingerprint;
   std::array<char, std::size_t{1} << 16U> block;
   std::uint64_t bytes = 0;
+  errno = 0;
   while (stream.read(block.data(), block.size()), stream.gcount() > 0) {
     fingerprint.add_words(block.data(), static_cast<std::size_t>(stream.gcount()));
     bytes += static_cast<std::uint64_t>(stream.gcount());
   }
-  if (stream.bad()) throw IoError(file.string() + ": cannot be read");
+  if (stream.bad()) fail_by_system(file, "cannot be read", errno);
   return {{"bytes", bytes}, {"fingerprint", fingerprint.text()}};
 }
 

@@ -99,6 +99,7 @@ inline Tree without_measurements(Tree tree) {
                                 "share_outside_pipeline", "peak_memory_bytes"}) {
         json.erase(field);
       }
+      if (json.contains("contents")) json["contents"].erase("timing.csv");
       item.bytes = json.dump();
     }
     if (ends_with(name, "timing.csv")) {
