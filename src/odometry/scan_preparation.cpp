@@ -16,7 +16,7 @@
 namespace dynains::odometry {
 namespace {
 
-constexpr double kMaxLength = 0.5;     // s from the stamp, of offsets that can be right
+constexpr double kMaxOffset = 0.5;     // s from the stamp, of offsets that can be right
 constexpr std::size_t kWanted = 2000;  // keypoints
 
 }  // namespace
@@ -54,40 +54,40 @@ Eigen::Vector3d ScanPreparation::centre() const {
 
 void ScanPreparation::choose_scale() {
   constexpr double kNarrow = 4.0, kWide = 12.0;  // m, median ranges that end a scale of 1
-  constexpr double kMinSize = 0.125;
+  constexpr double kMinScale = 0.125;
   constexpr std::size_t kStep = 8;  // every 8th point
   std::vector<double> ranges;
   for (std::size_t i = 0; 3 * i < measured_.size(); i += kStep) {
     const Eigen::Map<const Eigen::Vector3f> p(&measured_[3 * i]);
     const double range = (p - origin_of(i).cast<float>()).norm();
-    if (!p.isZero(0.0F) && range > kMinSize * nearest_ && range < farthest_)
+    if (!p.isZero(0.0F) && range > kMinScale * nearest_ && range < farthest_)
       ranges.push_back(range);
   }
   if (ranges.empty()) return;
   const double middle = median(std::move(ranges));
   while (scale_ < 1.0 && middle > kWide * scale_) scale_ *= 2.0;
-  while (scale_ > kMinSize && middle < kNarrow * scale_) scale_ *= 0.5;
+  while (scale_ > kMinScale && middle < kNarrow * scale_) scale_ *= 0.5;
 }
 
 /// Whether a point is a return with a time.
 bool ScanPreparation::is_timed(std::size_t i) const {
   const Eigen::Map<const Eigen::Vector3f> p(&measured_[3 * i]);
-  return std::abs(offsets_[i]) <= kMaxLength && p.allFinite() && !p.isZero(0.0F);
+  return std::abs(offsets_[i]) <= kMaxOffset && p.allFinite() && !p.isZero(0.0F);
 }
 
 /// Moves points by the nearest of equally spaced poses of the sensor.
 void ScanPreparation::deskew(const Pose& motion, double period) {
   constexpr double kStep = 0.0005;  // s
-  constexpr auto kSteps = static_cast<std::size_t>(4.0 * kMaxLength / kStep);
+  constexpr auto kSteps = static_cast<std::size_t>(4.0 * kMaxOffset / kStep);
   std::vector<Pose> T_mean_point(kSteps + 1);
   for (std::size_t k = 0; k <= kSteps; ++k) {
-    const double time = static_cast<double>(k) * kStep - 2.0 * kMaxLength;
+    const double time = static_cast<double>(k) * kStep - 2.0 * kMaxOffset;
     T_mean_point[k] = extrapolate(Pose::Identity(), motion, time / period);
   }
   for (std::size_t i = 0; i < offsets_.size(); ++i) {
     if (!is_timed(i)) continue;
     Eigen::Map<Eigen::Vector3f> p(&cloud_[3 * i]);
-    const double time = offsets_[i] - mean_offset_ + 2.0 * kMaxLength;
+    const double time = offsets_[i] - mean_offset_ + 2.0 * kMaxOffset;
     p = (T_mean_point[static_cast<std::size_t>(std::lround(time / kStep))] * p.cast<double>())
             .cast<float>();
   }
@@ -147,10 +147,10 @@ Landmarks ScanPreparation::landmarks() const {
 }
 
 void ScanPreparation::adapt() {
-  constexpr double kMinSize = 0.3, kMaxSize = 1.5;  // m
+  constexpr double kMinEdge = 0.3, kMaxEdge = 1.5;  // m
   const double share = static_cast<double>(keypoints_.size()) / static_cast<double>(kWanted);
-  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kMinSize,
-                     scale_ * kMaxSize);
+  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kMinEdge,
+                     scale_ * kMaxEdge);
 }
 
 }  // namespace dynains::odometry

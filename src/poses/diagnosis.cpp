@@ -253,8 +253,8 @@ double coarse_step(const std::vector<Pose>& poses) {
 
 /// PoseFlaws::period, by scans in the middle of the recording.
 std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
-  constexpr std::size_t kMaxCount = 80;
-  const std::size_t last_period = std::min(kMaxCount, recording.size() / 2);
+  constexpr std::size_t kMaxPeriod = 80;
+  const std::size_t last_period = std::min(kMaxPeriod, recording.size() / 2);
   const std::size_t first = (recording.size() - 2 * last_period) / 2;
   Agreement neighbours;
   for (std::size_t period = 1; period < last_period; ++period) {

@@ -104,7 +104,7 @@ class RangeImage {
   static void collect(const RangeImageGrid& grid, PointsView points,
                       Span<const std::uint8_t> moving, std::int32_t* nearest) {
     const ImageLocator locator(grid);
-    static constexpr detail::PackConstant kMaxCount(kMaxRange), kScale(kCentimetres),
+    static constexpr detail::PackConstant kMaxMetres(kMaxRange), kScale(kCentimetres),
         kFine(kPlaces), kFirst(0.0F), kLast(kPlaces - 1);
     detail::with_packs([&](auto packs) {
       using Packs = decltype(packs);
@@ -123,7 +123,7 @@ class RangeImage {
           const auto byte = [](const Float& within) {
             return truncate(max(min(within * kFine, Float(kLast)), Float(kFirst)));
           };
-          const Int centimetres = truncate(min(metres, Float(kMaxCount)) * kScale) & Int(~kMoving);
+          const Int centimetres = truncate(min(metres, Float(kMaxMetres)) * kScale) & Int(~kMoving);
           located.cell.store(&cell[place.begin]);
           ((centimetres << 16) + (byte(located.column) << 8) + byte(located.row))
               .store(&value[place.begin]);

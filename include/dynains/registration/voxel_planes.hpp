@@ -246,7 +246,7 @@ class VoxelPlanes {
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.
   void forget_oldest() {
-    std::uint32_t age = kMaxLength;
+    std::uint32_t age = kMaxAge;
     while (count_since(age) > kMaxVoxels / 2) age /= 2;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < size(); ++i) {
@@ -268,7 +268,7 @@ class VoxelPlanes {
                       [&](const Moments& moments) { return scans_ - moments.last_scan <= age; }));
   }
 
-  static constexpr std::uint32_t kMaxLength = 64;  // scans
+  static constexpr std::uint32_t kMaxAge = 64;  // scans
 
   double edge_, per_metre_;
   VoxelHashTable<> table_{kMaxVoxels};  // numbers of the voxels
