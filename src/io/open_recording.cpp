@@ -118,7 +118,7 @@ void list_scans(RecordingContents& r) {
   }
 }
 
-/// Takes the sensors that the log tells.
+/// Takes the sensors of the log.
 void take_sensors(RecordingContents& r, const LogScans& log) {
   if (r.options.sensors.empty()) r.options.sensors = log.sensors();
   if (!r.options.sensors.empty() || r.options.sensor_frame.empty()) return;
@@ -192,7 +192,7 @@ bool has_labels_as_intensity(const RecordingContents& r, const ScanReader& reade
   bool has_moving = false, has_static = false;
   RecordedScan scan;
   for (const std::size_t i : {std::size_t{0}, r.scans.size() / 2, r.scans.size() - 1}) {
-    reader.read(address_of(r.scans[i]), nullptr, scan);
+    reader.read(r.scans[i], nullptr, scan);
     for (std::size_t k = 3; k < scan.xyzi.size(); k += 4) {
       const float intensity = scan.xyzi[k];
       if (intensity != 0.0F && intensity != 1.0F) return false;
@@ -203,7 +203,7 @@ bool has_labels_as_intensity(const RecordingContents& r, const ScanReader& reade
 }
 
 void find_columns(RecordingContents& r, const ScanReader& reader) {
-  r.columns = reader.columns(address_of(r.scans.front()));
+  r.columns = reader.columns(r.scans.front());
   if (r.columns.label) r.labels = LabelSource::kColumn;
   if (is_folder(r.folder / "labels")) r.labels = LabelSource::kFiles;
   if (r.labels != LabelSource::kNone || !has_labels_as_intensity(r, reader)) return;

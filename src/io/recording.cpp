@@ -94,7 +94,7 @@ std::vector<fs::path> Recording::files() const {
 const LogScans* Recording::log() const { return reader_->log(); }
 
 std::uint64_t Recording::point_count(std::size_t i) const {
-  return reader_->point_count(address_of(contents_.scans.at(i)));
+  return reader_->point_count(contents_.scans.at(i));
 }
 
 /// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
@@ -109,7 +109,7 @@ std::optional<FileTransform> Recording::T_sensor_file(std::size_t i) const {
 
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   const std::optional<FileTransform> T = T_sensor_file(i);
-  reader_->read(address_of(contents_.scans.at(i)), T ? &*T : nullptr, scan);
+  reader_->read(contents_.scans.at(i), T ? &*T : nullptr, scan);
   if (contents_.frame == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
@@ -155,8 +155,7 @@ bool Recording::has_labels(std::size_t i) const {
 
 std::vector<std::uint32_t> Recording::read_labels(std::size_t i) const {
   if (contents_.labels == LabelSource::kIntensity) return labels_of_intensity(read_scan(i));
-  if (contents_.labels != LabelSource::kFiles)
-    return reader_->read_labels(address_of(contents_.scans.at(i)));
+  if (contents_.labels != LabelSource::kFiles) return reader_->read_labels(contents_.scans.at(i));
   return dynains::read_labels(label_file(contents_.folder, name(i)), point_count(i));
 }
 

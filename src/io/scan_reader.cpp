@@ -25,16 +25,16 @@ class BinReader final : public ScanReader {
  public:
   BinReader(const BinLayout& layout, bool has_ring) : layout_(layout), has_ring_(has_ring) {}
 
-  PointColumns columns(const ScanAddress&) const override {
+  PointColumns columns(const ScanEntry&) const override {
     PointColumns columns;
     columns.intensity = layout_.columns > 3;
     columns.ring = has_ring_;
     return columns;
   }
-  std::uint64_t point_count(const ScanAddress& scan) const override {
+  std::uint64_t point_count(const ScanEntry& scan) const override {
     return count_bin_points(scan.file, layout_, !has_ring_);
   }
-  void read(const ScanAddress& scan, const FileTransform* T_target_file,
+  void read(const ScanEntry& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     points.ring.clear();
     points.time.clear();
@@ -44,7 +44,7 @@ class BinReader final : public ScanReader {
              : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
     transform(T_target_file, points);
   }
-  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+  std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {
     fail(scan.file, "has no labels");
   }
 
@@ -56,13 +56,13 @@ class BinReader final : public ScanReader {
 /// Files of read_points().
 class PointFileReader final : public ScanReader {
  public:
-  PointColumns columns(const ScanAddress& scan) const override {
+  PointColumns columns(const ScanEntry& scan) const override {
     return read_point_file_header(scan.file).columns;
   }
-  std::uint64_t point_count(const ScanAddress& scan) const override {
+  std::uint64_t point_count(const ScanEntry& scan) const override {
     return read_point_file_header(scan.file).point_count;
   }
-  void read(const ScanAddress& scan, const FileTransform* T_target_file,
+  void read(const ScanEntry& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     PointFile file = read_points(scan.file);
     points.xyzi.resize(4 * file.positions.size());
@@ -77,7 +77,7 @@ class PointFileReader final : public ScanReader {
     points.time = std::move(file.time);
     points.sensor = std::move(file.sensor);
   }
-  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+  std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {
     PointFile points = read_points(scan.file);
     if (points.label.size() != points.positions.size()) {
       fail(scan.file, "expected a column \"label\", as in the first scan");
@@ -91,11 +91,11 @@ class LogReader final : public ScanReader {
  public:
   explicit LogReader(std::unique_ptr<LogScans> scans) : scans_(std::move(scans)) {}
 
-  PointColumns columns(const ScanAddress&) const override { return scans_->columns(); }
-  std::uint64_t point_count(const ScanAddress& scan) const override {
+  PointColumns columns(const ScanEntry&) const override { return scans_->columns(); }
+  std::uint64_t point_count(const ScanEntry& scan) const override {
     return scans_->point_count(scan.index);
   }
-  void read(const ScanAddress& scan, const FileTransform* T_target_file,
+  void read(const ScanEntry& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -103,7 +103,7 @@ class LogReader final : public ScanReader {
     }
     transform(T_target_file, points);
   }
-  std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const override {
+  std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {
     const std::lock_guard<std::mutex> lock(mutex_);
     return scans_->read_labels(scan.index);
   }

@@ -17,14 +17,6 @@ class LogScans;
 /// From the coordinates of a file to those that are wanted, with the unit of length.
 using FileTransform = Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>;
 
-/// A scan of a recording: a file, or a cloud of a log by its index.
-struct ScanAddress {
-  std::filesystem::path file;
-  std::size_t index = 0;
-};
-
-inline ScanAddress address_of(const ScanEntry& scan) { return {scan.file, scan.index}; }
-
 /// All members throw IoError with path, position and the expected content. Several threads may
 /// read.
 class ScanReader {
@@ -32,15 +24,15 @@ class ScanReader {
   virtual ~ScanReader() = default;
 
   /// Columns in addition to x y z.
-  virtual PointColumns columns(const ScanAddress& scan) const = 0;
+  virtual PointColumns columns(const ScanEntry& scan) const = 0;
   /// Points by the header or the size of the file. Throws unless both are valid.
-  virtual std::uint64_t point_count(const ScanAddress& scan) const = 0;
+  virtual std::uint64_t point_count(const ScanEntry& scan) const = 0;
   /// Reads the points, transformed by `T_target_file` if there is one. Columns that the scan
   /// lacks become empty; memory of `points` is reused.
-  virtual void read(const ScanAddress& scan, const FileTransform* T_target_file,
+  virtual void read(const ScanEntry& scan, const FileTransform* T_target_file,
                     RecordedScan& points) const = 0;
   /// The column `label`.
-  virtual std::vector<std::uint32_t> read_labels(const ScanAddress& scan) const = 0;
+  virtual std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const = 0;
   /// Null if the scans are files.
   virtual const LogScans* log() const { return nullptr; }
 };

@@ -199,17 +199,18 @@ void match_rows(RecordingContents& r, const fs::path& file) {
   }
 }
 
-void match_times(RecordingContents& r, const fs::path& file, const std::vector<double>& times) {
+void match_times(RecordingContents& r, const fs::path& file) {
   std::size_t found = 0;
-  for (const double time : times) {
-    r.matches.push_back(match_time(r.trajectory, time + r.options.time_offset, r.options.pose_gap));
+  for (const ScanEntry& scan : r.scans) {
+    r.matches.push_back(
+        match_time(r.trajectory, scan.time + r.options.time_offset, r.options.pose_gap));
     if (r.matches.back()) ++found;
   }
-  if (2 * found >= times.size()) return;
+  if (2 * found >= r.scans.size()) return;
   fail(file, "has poses from " + in_seconds(r.trajectory.times.front()) + " to " +
                  in_seconds(r.trajectory.times.back()) + " for " + std::to_string(found) + " of " +
-                 std::to_string(times.size()) + " scans, which are from " +
-                 in_seconds(times.front()) + " to " + in_seconds(times.back()) +
+                 std::to_string(r.scans.size()) + " scans, which are from " +
+                 in_seconds(r.scans.front().time) + " to " + in_seconds(r.scans.back().time) +
                  "; expected times of one clock, with gaps of at most " +
                  in_seconds(r.options.pose_gap) + gap_hint(r.trajectory, r.options.pose_gap));
 }
@@ -277,10 +278,8 @@ void shift_times(RecordingContents& r, const fs::path& file) {
   if (r.trajectory.times.empty()) {
     fail(file, "has no times, which an offset of the time needs; expected rows with times");
   }
-  std::vector<double> times;
-  for (const ScanEntry& scan : r.scans) times.push_back(scan.time);
   r.matches.clear();
-  match_times(r, file, times);
+  match_times(r, file);
 }
 
 void match_scans(RecordingContents& r, const fs::path& file) {
@@ -289,7 +288,7 @@ void match_scans(RecordingContents& r, const fs::path& file) {
       find_times(r, r.options.poses.empty() ? file : fs::path());
   take_times(r, times);
   if (!r.trajectory.times.empty() && times) {
-    match_times(r, file, *times);
+    match_times(r, file);
     r.notes.push_back("poses belong to scans by time, interpolated");
     return;
   }
@@ -340,7 +339,7 @@ void find_point_clock(RecordingContents& r, const ScanReader& reader) {
   RecordedScan scan;
   const PointClockFinding finding = find_clock(times, r.has_times, r.options.point_time_unit,
                                                [&](std::size_t i) -> const RecordedScan& {
-                                                 reader.read(address_of(r.scans[i]), nullptr, scan);
+                                                 reader.read(r.scans[i], nullptr, scan);
                                                  return scan;
                                                });
   if (!finding.clock && !finding.text.empty()) {
@@ -392,10 +391,8 @@ void pose_by_stamps(RecordingContents& r, const fs::path& origin) {
     return leave_unplaced(r);
   }
   if (has_file) r.trajectory = read_trajectory(r.options.poses);
-  std::vector<double> times;
-  for (const ScanEntry& scan : r.scans) times.push_back(scan.time);
   const fs::path& poses = has_file ? r.options.poses : origin;
-  r.trajectory.times.empty() ? match_rows(r, poses) : match_times(r, poses, times);
+  r.trajectory.times.empty() ? match_rows(r, poses) : match_times(r, poses);
   place_scans(r, poses);
 }
 
