@@ -10,12 +10,11 @@
 namespace dynains {
 namespace {
 
-/// The points of one sensor in a scan, and surfaces to compare them with. All in the frame of the
-/// cloud, m.
+/// The points of one sensor in a scan, and the surfaces of the other sensors in the scans around
+/// it. All in the frame of the cloud, m.
 struct Comparison {
   std::vector<Eigen::Vector3d> points;
-  SurfaceGrid others{true};  ///< of the other sensors, in the scans around
-  SurfaceGrid own{true};     ///< of the same sensor, in other scans
+  SurfaceGrid others{true};
 };
 
 struct Point {
@@ -36,12 +35,13 @@ std::vector<Point> points_of(const RecordedScan& scan, const std::vector<Pose>& 
   return points;
 }
 
-/// The comparisons of all sensors in scan i.
+/// The comparisons of all sensors in scan i, whose fits are added to `result`.
 std::vector<Comparison> compare(const Recording& recording, std::size_t i,
                                 std::vector<SensorAgreement>& result) {
   constexpr std::size_t kAround = 3;  // scans
   const std::vector<Pose>& sensors = recording.sensors();
   std::vector<Comparison> comparisons(sensors.size());
+  std::vector<SurfaceGrid> own(sensors.size(), SurfaceGrid(true));  // in other scans
   const std::size_t last = std::min(i + kAround, recording.size() - 1);
   RecordedScan scan;
   for (std::size_t j = i - std::min(i, kAround); j <= last; ++j) {
@@ -53,14 +53,20 @@ std::vector<Comparison> compare(const Recording& recording, std::size_t i,
       for (std::size_t k = 0; k < sensors.size(); ++k) {
         if (k != point.sensor) comparisons[k].others.insert(p);
       }
-      Comparison& own = comparisons[point.sensor];
       if (j != i) {
-        own.own.insert(p);
+        own[point.sensor].insert(p);
         continue;
       }
       result[point.sensor].points += 1.0;
-      if (adds(taken[point.sensor], voxel_at(p, kThinned))) own.points.push_back(p);
+      if (adds(taken[point.sensor], voxel_at(p, kThinned))) {
+        comparisons[point.sensor].points.push_back(p);
+      }
     }
+  }
+  for (std::size_t k = 0; k < sensors.size(); ++k) {
+    const auto& [points, others] = comparisons[k];
+    result[k].fit_of_scans += fit_of(own[k], points, Pose::Identity());
+    result[k].fit_of_others += fit_of(others, points, Pose::Identity());
   }
   return comparisons;
 }
@@ -102,12 +108,7 @@ std::vector<SensorAgreement> compare_sensors(const Recording& recording) {
   for (std::size_t n = 0; n < samples; ++n) {
     const std::size_t i = (2 * n + 1) * recording.size() / (2 * samples);
     std::vector<Comparison> all = compare(recording, i, result);
-    for (std::size_t k = 0; k < sensors.size(); ++k) {
-      result[k].fit_of_scans += fit_of(all[k].own, all[k].points, Pose::Identity());
-      result[k].fit_of_others += fit_of(all[k].others, all[k].points, Pose::Identity());
-      all[k].own = SurfaceGrid();
-      of_sensor[k].push_back(std::move(all[k]));
-    }
+    for (std::size_t k = 0; k < sensors.size(); ++k) of_sensor[k].push_back(std::move(all[k]));
   }
   for (std::size_t k = 0; k < sensors.size(); ++k) {
     SensorAgreement& agreement = result[k];
