@@ -54,18 +54,24 @@ inline std::array<double, 36> covariance_of_message(const dynains::PoseResidual&
   return result;
 }
 
+/// Sets the members of a geometry_msgs/Pose or geometry_msgs/Transform.
+template <class Vector, class Quaternion>
+void set_rigid(const dynains::Pose& T, Vector& translation, Quaternion& rotation) {
+  const Eigen::Vector3d p = T.translation();
+  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear()));
+  translation.x = p.x();
+  translation.y = p.y();
+  translation.z = p.z();
+  rotation.x = q.x();
+  rotation.y = q.y();
+  rotation.z = q.z();
+  rotation.w = q.w();
+}
+
 /// Sets a geometry_msgs/Pose.
 template <class Message>
 void set_pose(const dynains::Pose& T, Message& pose) {
-  const Eigen::Vector3d p = T.translation();
-  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear()));
-  pose.position.x = p.x();
-  pose.position.y = p.y();
-  pose.position.z = p.z();
-  pose.orientation.x = q.x();
-  pose.orientation.y = q.y();
-  pose.orientation.z = q.z();
-  pose.orientation.w = q.w();
+  set_rigid(T, pose.position, pose.orientation);
 }
 
 /// The transform of a pose of `child` in `frame`, as a geometry_msgs/TransformStamped.
@@ -75,15 +81,7 @@ Message transform_message(const dynains::Pose& T, const std::string& frame, cons
   message.header = child;
   message.header.frame_id = frame;
   message.child_frame_id = child.frame_id;
-  const Eigen::Vector3d p = T.translation();
-  const Eigen::Quaterniond q(Eigen::Matrix3d(T.linear()));
-  message.transform.translation.x = p.x();
-  message.transform.translation.y = p.y();
-  message.transform.translation.z = p.z();
-  message.transform.rotation.x = q.x();
-  message.transform.rotation.y = q.y();
-  message.transform.rotation.z = q.z();
-  message.transform.rotation.w = q.w();
+  set_rigid(T, message.transform.translation, message.transform.rotation);
   return message;
 }
 

@@ -73,6 +73,12 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
   return estimate;
 }
 
+std::string trajectory_head(const std::string& rows) {
+  Fingerprint fingerprint;
+  fingerprint.add(rows);
+  return "# dynains odometry " + fingerprint.text() + '\n';
+}
+
 }  // namespace
 
 PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool one_thread,
@@ -88,16 +94,6 @@ PoseEstimate estimate_poses(Recording& recording, const ScanWindow& window, bool
   recording.take_poses(range.first, poses);
   return estimate;
 }
-
-namespace {
-
-std::string trajectory_head(const std::string& rows) {
-  Fingerprint fingerprint;
-  fingerprint.add(rows);
-  return "# dynains odometry " + fingerprint.text() + '\n';
-}
-
-}  // namespace
 
 void write_trajectory(const std::filesystem::path& file, const Recording& recording) {
   std::ostringstream rows;

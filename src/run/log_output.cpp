@@ -36,10 +36,11 @@ class CloudEditor {
     }
     unjudged_ = parts_.size();
     for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
+      const std::size_t scan = plan.sequence.file_index(i);
+      const std::size_t points = log_.point_count(scan);
       std::size_t begin = 0;
-      for (const LogCloud& cloud : log_.clouds(plan.sequence.file_index(i))) {
-        parts_[place_of(cloud.message)] = {plan.sequence.name(i), begin,
-                                           log_.point_count(plan.sequence.file_index(i))};
+      for (const LogCloud& cloud : log_.clouds(scan)) {
+        parts_[place_of(cloud.message)] = {plan.sequence.name(i), begin, points};
         begin += cloud.points;
         --unjudged_;
       }

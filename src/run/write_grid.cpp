@@ -102,8 +102,9 @@ PlacedGrid grid_of_run(const fs::path& folder, const Recording& recording,
   grid::GridMaker maker(config, floors);
   std::vector<Pose> sensors = recording.sensors();
   if (sensors.empty()) sensors.push_back(Pose::Identity());
+  std::vector<std::vector<Eigen::Vector3d>> ends(sensors.size());
   for (const std::size_t i : scans) {
-    std::vector<std::vector<Eigen::Vector3d>> ends(sensors.size());
+    for (auto& of_sensor : ends) of_sensor.clear();
     maker.begin_scan();
     judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
       maker.add(point, label == PointLabel::kDynamic);
