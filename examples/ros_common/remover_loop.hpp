@@ -21,7 +21,7 @@
 
 namespace dynains_ros {
 
-/// What became of a cloud.
+/// The result for one cloud.
 struct Cleaned {
   dynains::Span<const dynains::PointLabel> labels;  ///< of its points; empty: it is not judged
   std::optional<dynains::Pose> T_odom_sensor;       ///< by the own odometry, if it has track

@@ -158,10 +158,9 @@ class OutputFolder {
   Existing owns(const std::filesystem::path& path) const;
   /// The results so far stay in path(), with this marker. Throws IoError.
   void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Writes `marker` with "complete" and the contents set, syncs the results, and calls
-  /// `put_others()`. The results replace the target at last, so a complete marker there means that
-  /// the other outputs are in place. The results stay in path() if `put_others()` fails. Throws
-  /// IoError.
+  /// Writes `marker` with "complete" and the contents set, syncs the results, calls `put_others()`,
+  /// and then replaces the target: a complete marker there means that the other outputs are in
+  /// place. If `put_others()` fails, the results stay in path(). Throws IoError.
   void finish(
       nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 

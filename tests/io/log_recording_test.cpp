@@ -199,7 +199,7 @@ TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") 
   REQUIRE(scan.sensor.size() == 2);
   CHECK(recording.sensors().at(scan.sensor[0]).isApprox(pose_at(1, 0), 1e-9));
   CHECK(recording.sensors().at(scan.sensor[1]).isApprox(kT_base_lidar, 1e-9));
-  CHECK(recording.read_scan(2).sensor.empty());  // not told
+  CHECK(recording.read_scan(2).sensor.empty());  // no message names its sensors
 }
 
 TEST_CASE("A log of each format is a recording with clouds and with poses from transforms") {

@@ -1,4 +1,4 @@
-// Whether the sensors of a rig agree: exact poses do, others are told.
+// Sensors of a rig agree under their exact poses; a wrong pose of one is reported.
 #include "poses/sensor_agreement.hpp"
 
 #include <Eigen/Geometry>

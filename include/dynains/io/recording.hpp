@@ -120,7 +120,7 @@ struct ScanEntry {
 /// Where the labels of a recording are.
 enum class LabelSource { kNone, kFiles, kColumn, kIntensity };
 
-/// What a recording holds except points and labels. Plain data that open_recording() fills.
+/// All of a recording but its points and labels, as plain data.
 struct RecordingContents {
   std::filesystem::path folder;       ///< path of the folder or log
   std::filesystem::path scan_folder;  ///< `folder` or a subfolder

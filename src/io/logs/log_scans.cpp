@@ -288,7 +288,7 @@ void LogScans::find_sensors() {
                       "names the frames of the sensors");
 }
 
-/// The sensors whose points a topic of Autoware tells apart.
+/// Takes the sensors of concatenated clouds from a topic of ConcatenatedPointCloudInfo.
 void LogScans::find_concatenated() {
   std::set<std::string> frames;
   for (const auto& [time, parts] : concatenations_) {

@@ -52,7 +52,7 @@ class LogScans {
   /// Whether scans have clouds of several topics: then the times of their points are in s from the
   /// stamp of the scan.
   bool is_merged() const { return sources_.size() > 1; }
-  /// Poses of the sensors in the frame of the clouds, m; empty if the log does not tell several.
+  /// Poses of the sensors in the frame of the clouds, m; empty if there is only one.
   const std::vector<Pose>& sensors() const { return sensors_; }
   /// Stamps of the scans, s, increasing.
   const std::vector<double>& times() const { return times_; }

@@ -1,4 +1,4 @@
-// What the node of ROS 2 uses of ROS 2, without a function: with it, the node compiles anywhere.
+// Declarations of the parts of ROS 2 that the node uses, so that it compiles without ROS 2.
 #pragma once
 
 #include <array>
