@@ -46,4 +46,12 @@ PoseAnswer find_pose(const Buffer& buffer, const std::string& fixed_frame, const
   return answer;
 }
 
+/// The newest pose of `other` in `frame`, which is taken for the one at all times. `latest`: see
+/// find_pose().
+template <class Buffer, class Time>
+PoseAnswer find_extrinsic(const Buffer& buffer, const std::string& frame, const std::string& other,
+                          const Time& latest) {
+  return find_pose(buffer, frame, other, latest, latest, [](const auto&) { return false; });
+}
+
 }  // namespace dynains_ros

@@ -1,5 +1,5 @@
-// The work of a node: clouds wait for their poses, are cleaned in order, and are counted. Without
-// types of ROS.
+// The work of a node: clouds are joined to frames, which wait for their poses, are cleaned in
+// order, and are counted. Without types of ROS.
 #pragma once
 
 #include <algorithm>
@@ -16,54 +16,86 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/odometry/odometry.hpp"
 #include "ros_common/cloud_queue.hpp"
+#include "ros_common/frame_joiner.hpp"
 #include "ros_common/loop_report.hpp"
-#include "ros_common/point_times.hpp"
+#include "ros_common/sensor_rig.hpp"
 
 namespace dynains_ros {
 
-/// The result for one cloud.
+/// The result for one frame.
 struct Cleaned {
-  dynains::Span<const dynains::PointLabel> labels;  ///< of its points; empty: it is not judged
-  std::optional<dynains::Pose> T_odom_sensor;       ///< by the own odometry, if it has track
+  /// Of its points, cloud by cloud; empty: it is not judged.
+  dynains::Span<const dynains::PointLabel> labels;
+  std::optional<dynains::Pose> T_odom_sensor;  ///< by the own odometry, if it has track
   const dynains::FrameResult& frame;
+  const std::string& frame_id;  ///< of the clouds of the first topic, in which all poses are
+
+  /// Calls `visit(topic, cloud, labels)` for each cloud, with the labels of its points.
+  template <class CloudPtr, class Visit>
+  void for_each_cloud(const Frame<CloudPtr>& clouds, Visit&& visit) const {
+    std::size_t begin = 0;
+    for (std::size_t i = 0; i < clouds.clouds.size(); ++i) {
+      if (!clouds.clouds[i]) continue;
+      const auto& cloud = *clouds.clouds[i];
+      const std::size_t count =
+          labels.empty() ? 0 : std::size_t{cloud.width} * std::size_t{cloud.height};
+      visit(i, cloud, dynains::Span<const dynains::PointLabel>(labels.data() + begin, count));
+      begin += count;
+    }
+  }
 };
 
-/// `CloudPtr` points to a PointCloud2 message. add() and report() may be called by any thread, the
-/// other functions by one thread. Times are in seconds.
+/// `CloudPtr` points to a PointCloud2 message; clouds of several topics are joined to frames. add()
+/// and report() may be called by any thread, the other functions by one thread. Times are in
+/// seconds.
 template <class CloudPtr>
 class RemoverLoop {
  public:
   struct Config {
-    double patience = 0.2;      ///< s, how long a cloud waits for its pose
-    std::size_t capacity = 10;  ///< clouds that wait
+    double patience = 0.2;      ///< s, how long a frame waits for its pose
+    std::size_t capacity = 10;  ///< frames that wait
     double map_period = 2.0;    ///< s, between two maps
     bool odometry = false;      ///< poses are those of dynains::Odometry, and there is no map
+    std::size_t topics = 1;     ///< of clouds, from 1 to 255
+    std::vector<std::string> sensor_frames = {};  ///< see SensorRig
   };
 
   /// Throws dynains::ConfigError.
   RemoverLoop(const dynains::DynaInsRemover::Config& remover, const Config& config)
-      : remover_config_(remover), config_(config), queue_(config.patience, config.capacity) {
+      : remover_config_(remover),
+        config_(config),
+        rig_(config.topics, config.sensor_frames),
+        joiner_(config.topics),
+        queue_(config.patience, config.capacity) {
+    if (config.topics < 1 || config.topics > 255) {
+      throw dynains::ConfigError("topics = " + std::to_string(config.topics) +
+                                 " names; expected 1 to 255");
+    }
+    if (!config.sensor_frames.empty() && config.sensor_frames.size() != config.topics) {
+      throw dynains::ConfigError(std::to_string(config.sensor_frames.size()) +
+                                 " frames of sensors for " + std::to_string(config.topics) +
+                                 " topics of clouds; expected one each, or none");
+    }
+    if (rig_.has_sensors()) remover_config_.sensors = rig_.sensors();
     start();
   }
 
-  /// Lets a cloud wait for its pose. Returns whether the time jumped backwards: the caller forgets
-  /// its transforms, and the remover starts anew with this cloud.
-  bool add(CloudPtr cloud, double now) {
+  /// Lets a cloud wait for those of the other topics, and for its pose. Returns whether the time
+  /// jumped backwards: the caller forgets its transforms, and the remover starts anew with this
+  /// cloud.
+  bool add(CloudPtr cloud, double now, std::size_t topic = 0) {
     const double stamp = dynains::message_time(*cloud);
     const std::lock_guard<std::mutex> lock(mutex_);
-    ++counts_.arrived;
-    const bool has_jumped =
-        queue_.add(std::move(cloud), stamp, now, [this](Drop reason) { count(reason); });
-    if (has_jumped) {
-      must_reset_ = true;
-      ++totals_.resets;
-    }
+    bool has_jumped = false;
+    joiner_.add(topic, std::move(cloud), stamp, now, [&](Frame<CloudPtr> frame) {
+      has_jumped = enqueue(std::move(frame), now) || has_jumped;
+    });
     return has_jumped;
   }
 
   bool is_waiting() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return !queue_.empty();
+    return !queue_.empty() || joiner_.is_waiting();
   }
 
   /// How long to wait for new clouds or poses before the next call of clean_next(), which has just
@@ -74,13 +106,15 @@ class RemoverLoop {
     return is_waiting() ? kForPose : kForCloud;
   }
 
-  /// Cleans the oldest cloud if its pose is known, and calls `publish(cloud, cleaned)`.
-  /// `find_pose`: see CloudQueue::take(); it is not called with Config::odometry. Returns whether a
-  /// cloud was taken. `now`: by the clock of the stamps.
-  template <class FindPose, class Publish>
-  bool clean_next(double now, FindPose&& find_pose, Publish&& publish) {
-    const auto next = take(now, find_pose);
+  /// Cleans the oldest frame if its pose is known, and calls `publish(frame, cleaned)`.
+  /// `find_pose`, which is not called with Config::odometry, and `find_extrinsic`: see
+  /// SensorRig::place(). Returns whether a frame was taken. `now`: by the clock of the stamps.
+  template <class FindPose, class FindExtrinsic, class Publish>
+  bool clean_next(double now, FindPose&& find_pose, FindExtrinsic&& find_extrinsic,
+                  Publish&& publish) {
+    const auto next = take(now, find_pose, find_extrinsic);
     if (!next) return false;
+    const Frame<CloudPtr>& clouds = next->cloud;
     const auto begin = std::chrono::steady_clock::now();
     const auto seconds = [begin] {
       return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -88,15 +122,21 @@ class RemoverLoop {
     dynains::FrameResult frame;
     std::optional<dynains::Pose> T_odom_sensor;
     try {
-      const dynains::PointCloud2View points(*next->cloud);
-      if (remover_) frame = remover_->push(points, next->T_fixed_sensor, next->stamp);
-      if (odometry_) T_odom_sensor = register_cloud(*next->cloud, points, next->stamp, frame);
+      take_new_sensors();
+      if (config_.topics > 1) {
+        T_odom_sensor = push(clouds, rig_.merge(clouds), next->T_fixed_sensor, frame);
+      } else {
+        const dynains::PointCloud2View points(*clouds.anchor());
+        T_odom_sensor = push(clouds, points, next->T_fixed_sensor, frame);
+      }
     } catch (const std::exception& error) {
       const std::lock_guard<std::mutex> lock(mutex_);
       count(Drop::kInvalid, error.what());
       return true;
     }
-    attempt([&] { publish(next->cloud, Cleaned{frame.newest().labels, T_odom_sensor, frame}); });
+    attempt([&] {
+      publish(clouds, Cleaned{frame.newest().labels, T_odom_sensor, frame, rig_.frame_id()});
+    });
     count(frame, seconds(), now - next->stamp);
     return true;
   }
@@ -132,16 +172,38 @@ class RemoverLoop {
   }
 
  private:
-  template <class FindPose>
-  auto take(double now, FindPose&& find_pose) {
+  bool enqueue(Frame<CloudPtr> frame, double now) {
+    ++counts_.arrived;
+    const double stamp = frame.stamp;
+    const bool has_jumped =
+        queue_.add(std::move(frame), stamp, now, [this](Drop reason) { count(reason); });
+    if (has_jumped) {
+      joiner_.clear();
+      must_reset_ = true;
+      ++totals_.resets;
+    }
+    return has_jumped;
+  }
+
+  template <class FindPose, class FindExtrinsic>
+  auto take(double now, FindPose&& find_pose, FindExtrinsic&& find_extrinsic) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    joiner_.poll(now, [&](Frame<CloudPtr> frame) { enqueue(std::move(frame), now); });
     if (std::exchange(must_reset_, false)) start();
-    const auto on_drop = [this](Drop reason, const std::string& text) { count(reason, text); };
-    if (!config_.odometry) return queue_.take(now, find_pose, on_drop);
-    const auto no_pose = [](const CloudPtr&) {
-      return PoseAnswer{dynains::Pose::Identity(), true, ""};
-    };
-    return queue_.take(now, no_pose, on_drop);
+    return queue_.take(
+        now,
+        [&](const Frame<CloudPtr>& frame) {
+          return rig_.place(frame, !config_.odometry, find_pose, find_extrinsic);
+        },
+        [this](Drop reason, const std::string& text) { count(reason, text); });
+  }
+
+  /// A remover has all sensors from its start, so it begins anew when a sensor is found.
+  void take_new_sensors() {
+    if (!rig_.take_new_sensor() || !rig_.has_sensors()) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    remover_config_.sensors = rig_.sensors();
+    start();
   }
 
   /// Begins without a past.
@@ -155,15 +217,19 @@ class RemoverLoop {
     T_odom_start_ = T_odom_last_;
   }
 
-  /// The pose of a cloud by the odometry, and what it removes; none after a loss. An odometry that
+  /// Pushes the points of a frame. With odometry: their pose, none after a loss. An odometry that
   /// stays lost, or that clouds are missing for, begins anew where it was.
-  template <class Cloud>
-  std::optional<dynains::Pose> register_cloud(const Cloud& cloud,
-                                              const dynains::PointCloud2View& points, double stamp,
-                                              dynains::FrameResult& frame) {
-    constexpr int kMaxLost = 5;  // clouds
-    const std::vector<double> offsets = point_offsets(cloud, stamp);
-    dynains::OdometryResult result = odometry_->push(points, offsets, stamp);
+  template <class Points>
+  std::optional<dynains::Pose> push(const Frame<CloudPtr>& clouds, const Points& points,
+                                    const dynains::Pose& T_fixed_sensor,
+                                    dynains::FrameResult& frame) {
+    if (remover_) {
+      frame = remover_->push(points, T_fixed_sensor, clouds.stamp);
+      return std::nullopt;
+    }
+    constexpr int kMaxLost = 5;  // frames
+    const std::vector<double> offsets = SensorRig<CloudPtr>::offsets(clouds);
+    dynains::OdometryResult result = odometry_->push(points, offsets, clouds.stamp);
     if (result.loss == dynains::OdometryLoss::kNone) {
       lost_ = 0;
       frame = std::move(result.frame);
@@ -206,16 +272,18 @@ class RemoverLoop {
 
   dynains::DynaInsRemover::Config remover_config_;
   Config config_;
+  SensorRig<CloudPtr> rig_;
   std::optional<dynains::DynaInsRemover> remover_;  // one of both
   std::optional<dynains::Odometry> odometry_;
-  int lost_ = 0;                                            // clouds in a row
+  int lost_ = 0;                                            // frames in a row
   dynains::Pose T_odom_start_ = dynains::Pose::Identity();  // of the odometry
-  dynains::Pose T_odom_last_ = dynains::Pose::Identity();   // of the newest cloud
+  dynains::Pose T_odom_last_ = dynains::Pose::Identity();   // of the newest frame
   std::size_t map_points_ = 0;                              // of the last map that was published
   double next_map_ = 0.0;                                   // s
 
   mutable std::mutex mutex_;  // guards all below
-  CloudQueue<CloudPtr> queue_;
+  FrameJoiner<CloudPtr> joiner_;
+  CloudQueue<Frame<CloudPtr>> queue_;
   bool must_reset_ = false;
   LoopCounts counts_;
   LoopTotals totals_;

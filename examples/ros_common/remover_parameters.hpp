@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <sstream>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
@@ -99,6 +101,14 @@ void set_parameters(RemoverConfig& config, Declare&& declare) {
       detail::set_number(parameter, detail::decimal_value(parameter.value), declare);
     }
   });
+}
+
+/// The names between the commas of a list.
+inline std::vector<std::string> names_in(const std::string& list) {
+  std::vector<std::string> names;
+  std::istringstream text(list);
+  for (std::string name; std::getline(text, name, ',');) names.push_back(name);
+  return names;
 }
 
 }  // namespace dynains_ros

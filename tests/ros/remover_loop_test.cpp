@@ -31,6 +31,10 @@ std::vector<dynains::test::Scan> scans(int count) {
   return dynains::test::drive(dynains::test::oncoming(), count, 5.0);
 }
 
+PoseAnswer no_extrinsic(const std::string&, const std::string&) {
+  throw std::logic_error("no extrinsic");
+}
+
 /// A loop whose transforms are all known, with what it published.
 struct Node {
   Loop loop;
@@ -45,7 +49,8 @@ struct Node {
         [&](const Cloud&) {
           return PoseAnswer{T_world_sensor, true, ""};
         },
-        [&](const Cloud&, const Cleaned& cleaned) {
+        no_extrinsic,
+        [&](const Frame<Cloud>&, const Cleaned& cleaned) {
           labels.emplace_back(cleaned.labels.begin(), cleaned.labels.end());
         });
   }
@@ -131,7 +136,7 @@ TEST_CASE("a bad cloud and a failing publisher are counted, and the loop goes on
       [](const Cloud&) {
         return PoseAnswer{dynains::Pose::Identity(), true, ""};
       },
-      [](const Cloud&, const Cleaned&) { throw std::runtime_error("full"); }));
+      no_extrinsic, [](const Frame<Cloud>&, const Cleaned&) { throw std::runtime_error("full"); }));
   const Diagnosis diagnosis = node.loop.report(1.0);
   CHECK(diagnosis.message == "messages that could not be published: 1");
 }
@@ -147,7 +152,8 @@ TEST_CASE("with odometry, clouds alone are cleaned, and pass whole after a loss"
     loop.add(message_of(scan, stamp), stamp);
     return loop.clean_next(
         stamp + 0.02, [](const Cloud&) -> PoseAnswer { throw std::logic_error("no pose"); },
-        [&](const Cloud&, const Cleaned& cleaned) {
+        no_extrinsic,
+        [&](const Frame<Cloud>&, const Cleaned& cleaned) {
           whole += cleaned.labels.empty() ? 1 : 0;
           posed += cleaned.T_odom_sensor ? 1 : 0;
           if (cleaned.T_odom_sensor) x = cleaned.T_odom_sensor->translation().x();
@@ -177,6 +183,76 @@ TEST_CASE("with odometry, clouds alone are cleaned, and pass whole after a loss"
   for (const dynains::test::Scan& scan : drive) REQUIRE(push(scan, 110.0 + scan.time));
   CHECK(posed == 23);  // the first cloud after the gap is lost, the others begin where it was
   CHECK(x == Approx(before + way).margin(0.5 + 0.2 * way));
+}
+
+TEST_CASE("clouds of two sensors are one frame, and each gets the labels of its points") {
+  const dynains::Pose T_front_rear =
+      Eigen::Translation3d(-0.5, 0.1, 0.2) * Eigen::AngleAxisd(3.0, Eigen::Vector3d::UnitZ());
+  Loop::Config config;
+  config.topics = 2;
+  Loop loop(paper(), config);
+  auto two_sensors = paper();
+  two_sensors.sensors.push_back(T_front_rear);
+  dynains::DynaInsRemover remover(two_sensors);
+  const auto cloud_of = [](const std::vector<Eigen::Vector3f>& points, double time,
+                           const char* frame) {
+    auto message =
+        std::make_shared<Message>(*message_of({dynains::Pose::Identity(), 0.0, points, {}}, time));
+    message->header.frame_id = frame;
+    return message;
+  };
+  std::size_t moving = 0;
+  for (const dynains::test::Scan& scan : scans(10)) {
+    std::vector<Eigen::Vector3f> front, rear, all;
+    std::vector<std::uint8_t> sensors;
+    for (std::size_t i = 0; i < scan.points.size(); ++i)
+      (i % 3 ? front : rear).push_back(scan.points[i]);
+    all = front;
+    all.insert(all.end(), rear.begin(), rear.end());
+    sensors.resize(front.size(), 0);
+    sensors.resize(all.size(), 1);
+    for (auto& point : rear) point = T_front_rear.inverse().cast<float>() * point;
+    const double stamp = 100.0 + scan.time;
+    loop.add(cloud_of(rear, stamp - 0.01, "rear"), stamp, 1);
+    CHECK(loop.is_waiting());
+    loop.add(cloud_of(front, stamp, "front"), stamp, 0);
+    std::vector<std::vector<dynains::PointLabel>> labels(2);
+    REQUIRE(loop.clean_next(
+        stamp,
+        [&](const Cloud& cloud) {
+          const bool is_rear = cloud->header.frame_id == "rear";
+          return PoseAnswer{is_rear ? scan.T_world_sensor * T_front_rear : scan.T_world_sensor,
+                            true, ""};
+        },
+        [&](const std::string& frame, const std::string& other) {
+          CHECK(frame == "front");
+          CHECK(other == "rear");
+          return PoseAnswer{T_front_rear, true, ""};
+        },
+        [&](const Frame<Cloud>& clouds, const Cleaned& cleaned) {
+          CHECK(cleaned.frame_id == "front");
+          CHECK(clouds.stamp == Approx(stamp));
+          cleaned.for_each_cloud(clouds, [&](std::size_t i, const Message&, const auto& of_cloud) {
+            labels[i].assign(of_cloud.begin(), of_cloud.end());
+          });
+        }));
+    const dynains::RawPoints<float> merged{all.front().data(), all.size(), 3, sensors.data()};
+    const auto expected = remover.push(merged, scan.T_world_sensor, stamp).newest().labels;
+    REQUIRE(labels[0].size() == front.size());
+    REQUIRE(labels[1].size() == rear.size());
+    std::size_t different = 0;  // rounding of the transform of the points
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto label = i < front.size() ? labels[0][i] : labels[1][i - front.size()];
+      different += label == expected[i] ? 0 : 1;
+      moving += label == dynains::PointLabel::kDynamic ? 1 : 0;
+    }
+    CHECK(different <= all.size() / 200);
+  }
+  CHECK(moving > 0);
+  config.sensor_frames = {"front"};
+  CHECK_THROWS_AS(Loop(paper(), config), dynains::ConfigError);
+  config.topics = 0;
+  CHECK_THROWS_AS(Loop(paper(), config), dynains::ConfigError);
 }
 
 TEST_CASE("a worker works when it is woken, and ends at once") {

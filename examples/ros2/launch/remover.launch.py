@@ -1,6 +1,7 @@
 """The remover as a component of a container of its own, with intra-process communication.
 
 ros2 launch dynains_ros remover.launch.py points:=/velodyne_points
+ros2 launch dynains_ros remover.launch.py points:=/front/points,/rear/points
 ros2 launch dynains_ros remover.launch.py points:=/livox/lidar odometry:=true  # before any SLAM
 """
 
@@ -13,7 +14,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 ARGUMENTS = {
-    "points": ("points", "topic of the clouds"),
+    "points": ("points", "topic of the clouds, or topics A,B,C of several LiDARs"),
     "fixed_frame": ("odom", "frame without jumps"),
     "odometry": ("false", "poses are found by the clouds alone, without transforms"),
     "publish_odom": ("false", "with odometry: publish odom and its transform"),
@@ -28,9 +29,9 @@ def generate_launch_description():
     value = LaunchConfiguration
     node = ComposableNode(
         package="dynains_ros", plugin="dynains_ros::RemoverNode", name="remover",
-        namespace=value("namespace"), remappings=[("points", value("points"))],
+        namespace=value("namespace"),
         parameters=[value("parameters"),
-                    {"fixed_frame": value("fixed_frame"),
+                    {"topics": value("points"), "fixed_frame": value("fixed_frame"),
                      "odometry": ParameterValue(value("odometry"), value_type=bool),
                      "publish_odom": ParameterValue(value("publish_odom"), value_type=bool),
                      "use_sim_time": ParameterValue(value("use_sim_time"), value_type=bool)}],

@@ -23,6 +23,7 @@
 #include <sensor_msgs/msg/point_cloud2.hpp>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "dynains/adapters/point_cloud2.hpp"
 #include "ros_common/find_pose.hpp"
@@ -40,6 +41,7 @@ using Diagnostics = diagnostic_msgs::msg::DiagnosticArray;
 using Odometry = nav_msgs::msg::Odometry;
 using Transform = geometry_msgs::msg::TransformStamped;
 using Loop = RemoverLoop<Cloud::ConstSharedPtr>;
+using JoinedClouds = Frame<Cloud::ConstSharedPtr>;
 
 /// Declares parameters that are fixed while the node runs: rclcpp refuses to change them.
 class FixedParameters {
@@ -89,7 +91,7 @@ RemoverConfig declare_remover(rclcpp::Node& node) {
   return config;
 }
 
-Loop::Config declare_loop(rclcpp::Node& node) {
+Loop::Config declare_loop(rclcpp::Node& node, std::size_t topics) {
   const FixedParameters declare(node);
   Loop::Config config;
   config.patience = declare({"tf_timeout",
@@ -106,6 +108,10 @@ Loop::Config declare_loop(rclcpp::Node& node) {
                              "poses are found by the clouds alone, without transforms; then there "
                              "is no map"},
                             config.odometry);
+  config.topics = topics;
+  config.sensor_frames = names_in(declare(
+      {"sensor_frames", "by topic, the frame of the LiDAR, A,B,C; empty: the frames of the clouds"},
+      std::string()));
   return config;
 }
 
@@ -135,14 +141,20 @@ class RemoverNode::Work {
                                   std::string("odom"))),
         has_odom_(FixedParameters(node)(
             {"publish_odom", "with odometry: publish odom and its transform"}, false)),
-        loop_(declare_remover(node), declare_loop(node)),
+        topics_(names_in(FixedParameters(node)(
+            {"topics", "topics of clouds, A,B,C; those of one time are one frame of the first one"},
+            std::string("points")))),
+        loop_(declare_remover(node), declare_loop(node, topics_.size())),
         transforms_(node.get_clock()),
         listener_(transforms_, &node, true, tf2_ros::DynamicListenerQoS(),
                   tf2_ros::StaticListenerQoS(), between_processes(), between_processes()) {
     const auto options = overridable<rclcpp::PublisherOptions>();
     const rclcpp::SensorDataQoS sensor;
-    static_ = node.create_publisher<Cloud>("static", sensor, options);
-    dynamic_ = node.create_publisher<Cloud>("dynamic", sensor, options);
+    for (std::size_t i = 0; i < topics_.size(); ++i) {
+      const std::string number = i == 0 ? "" : '_' + std::to_string(i + 1);
+      static_.push_back(node.create_publisher<Cloud>("static" + number, sensor, options));
+      dynamic_.push_back(node.create_publisher<Cloud>("dynamic" + number, sensor, options));
+    }
     residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
     auto map_options = options;
     map_options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
@@ -157,17 +169,20 @@ class RemoverNode::Work {
       loop_.attempt([&] { map_->publish(std::move(map)); });
     });
     worker_.emplace([this] { return step(); });
-    clouds_ = node.create_subscription<Cloud>(
-        "points", sensor, [this](Cloud::ConstSharedPtr cloud) { on_cloud(std::move(cloud)); },
-        overridable<rclcpp::SubscriptionOptions>());
+    for (std::size_t i = 0; i < topics_.size(); ++i) {
+      clouds_.push_back(node.create_subscription<Cloud>(
+          topics_[i], sensor,
+          [this, i](Cloud::ConstSharedPtr cloud) { on_cloud(std::move(cloud), i); },
+          overridable<rclcpp::SubscriptionOptions>()));
+    }
     timer_ = node.create_wall_timer(kReportPeriod, [this] { report(); });
   }
 
  private:
   static constexpr std::chrono::seconds kReportPeriod{1};
 
-  void on_cloud(Cloud::ConstSharedPtr cloud) {
-    if (loop_.add(std::move(cloud), node_.now().seconds())) transforms_.clear();
+  void on_cloud(Cloud::ConstSharedPtr cloud, std::size_t topic) {
+    if (loop_.add(std::move(cloud), node_.now().seconds(), topic)) transforms_.clear();
     worker_->wake();
   }
 
@@ -175,9 +190,10 @@ class RemoverNode::Work {
     const bool has_cleaned = loop_.clean_next(
         node_.now().seconds(),
         [this](const Cloud::ConstSharedPtr& cloud) { return pose_of(*cloud); },
-        [this](const Cloud::ConstSharedPtr& cloud, const Cleaned& cleaned) {
-          publish(*cloud, cleaned);
-        });
+        [this](const std::string& frame, const std::string& other) {
+          return find_extrinsic(tf(), frame, other, tf2::TimePointZero);
+        },
+        [this](const JoinedClouds& clouds, const Cleaned& cleaned) { publish(clouds, cleaned); });
     const std::chrono::duration<double> uptime =
         std::chrono::steady_clock::now().time_since_epoch();
     loop_.publish_map(uptime.count(), has_readers(*map_), [this](const auto& map) {
@@ -188,37 +204,42 @@ class RemoverNode::Work {
     return loop_.pause_after(has_cleaned);
   }
 
+  const tf2::BufferCore& tf() const { return transforms_; }
+
   PoseAnswer pose_of(const Cloud& cloud) const {
     const tf2::TimePoint stamp = tf2_ros::fromMsg(cloud.header.stamp);
-    return find_pose(static_cast<const tf2::BufferCore&>(transforms_), fixed_frame_,
-                     cloud.header.frame_id, stamp, tf2::TimePointZero,
+    return find_pose(tf(), fixed_frame_, cloud.header.frame_id, stamp, tf2::TimePointZero,
                      [&](const auto& newest) { return tf2_ros::fromMsg(newest) < stamp; });
   }
 
   /// Messages are moved to readers of this process. A cloud that is not judged passes whole.
-  void publish(const Cloud& cloud, const Cleaned& cleaned) {
-    newest_ = cloud.header.stamp;
+  void publish(const JoinedClouds& clouds, const Cleaned& cleaned) {
+    auto header = clouds.anchor()->header;
+    header.frame_id = cleaned.frame_id;
+    newest_ = header.stamp;
     const bool is_judged = !cleaned.labels.empty();
-    if (has_readers(*static_)) {
-      static_->publish(std::make_unique<Cloud>(
-          is_judged ? dynains::static_points(cloud, cleaned.labels) : cloud));
-    }
-    if (is_judged && has_readers(*dynamic_)) {
-      dynamic_->publish(std::make_unique<Cloud>(dynains::dynamic_points(cloud, cleaned.labels)));
-    }
+    cleaned.for_each_cloud(clouds, [&](std::size_t i, const Cloud& cloud, const auto& labels) {
+      if (has_readers(*static_[i])) {
+        static_[i]->publish(
+            std::make_unique<Cloud>(is_judged ? dynains::static_points(cloud, labels) : cloud));
+      }
+      if (is_judged && has_readers(*dynamic_[i])) {
+        dynamic_[i]->publish(std::make_unique<Cloud>(dynains::dynamic_points(cloud, labels)));
+      }
+    });
     if (cleaned.frame.pose_residual) {
       residual_->publish(std::make_unique<Residual>(
-          residual_message<Residual>(*cleaned.frame.pose_residual, cloud.header)));
+          residual_message<Residual>(*cleaned.frame.pose_residual, header)));
     }
     if (!has_odom_ || !cleaned.T_odom_sensor) return;
     auto odom = std::make_unique<Odometry>();
-    odom->header = cloud.header;
+    odom->header = header;
     odom->header.frame_id = fixed_frame_;
-    odom->child_frame_id = cloud.header.frame_id;
+    odom->child_frame_id = header.frame_id;
     set_pose(*cleaned.T_odom_sensor, odom->pose.pose);
     odom_->publish(std::move(odom));
     broadcaster_->sendTransform(
-        transform_message<Transform>(*cleaned.T_odom_sensor, fixed_frame_, cloud.header));
+        transform_message<Transform>(*cleaned.T_odom_sensor, fixed_frame_, header));
   }
 
   static bool has_readers(const rclcpp::PublisherBase& publisher) {
@@ -254,10 +275,12 @@ class RemoverNode::Work {
   RemoverNode& node_;
   std::string fixed_frame_;
   bool has_odom_;
+  std::vector<std::string> topics_;
   Loop loop_;
   tf2_ros::Buffer transforms_;
-  tf2_ros::TransformListener listener_;  // has a thread of its own
-  rclcpp::Publisher<Cloud>::SharedPtr static_, dynamic_, map_;
+  tf2_ros::TransformListener listener_;                                // has a thread of its own
+  std::vector<rclcpp::Publisher<Cloud>::SharedPtr> static_, dynamic_;  // by topic
+  rclcpp::Publisher<Cloud>::SharedPtr map_;
   rclcpp::Publisher<Residual>::SharedPtr residual_;
   rclcpp::Publisher<Odometry>::SharedPtr odom_;
   std::optional<tf2_ros::TransformBroadcaster> broadcaster_;
@@ -267,7 +290,7 @@ class RemoverNode::Work {
   // A reader of the map that hangs holds up further maps, and no clouds.
   std::optional<Outbox<std::unique_ptr<Cloud>>> maps_;
   std::optional<Worker> worker_;
-  rclcpp::Subscription<Cloud>::SharedPtr clouds_;
+  std::vector<rclcpp::Subscription<Cloud>::SharedPtr> clouds_;
   rclcpp::TimerBase::SharedPtr timer_;
 };
 
