@@ -191,7 +191,6 @@ struct RemoverConfig {
  private:
   void validate_sensors() const {
     constexpr std::size_t kMaxSensors = 255;
-    constexpr double kMaxSensor = 1000.0;  // m
     if (sensors.empty() || sensors.size() > kMaxSensors) {
       throw ConfigError("DynaInsRemover.sensors has " + std::to_string(sensors.size()) +
                         " poses; expected 1 to " + std::to_string(kMaxSensors));
@@ -203,7 +202,7 @@ struct RemoverConfig {
       } catch (const PoseError& error) {
         throw ConfigError(error.what());
       }
-      if (sensors[i].translation().cwiseAbs().maxCoeff() > kMaxSensor) {
+      if (sensors[i].translation().cwiseAbs().maxCoeff() > 1000.0) {
         throw ConfigError(name + " is farther than 1000 m from the origin of the clouds");
       }
     }

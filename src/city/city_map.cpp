@@ -45,11 +45,6 @@ class Candidates {
   }
 
   bool is_object(const std::vector<std::uint32_t>& members) const {
-    constexpr float kMinHeight = 0.4F;  // m
-    constexpr std::size_t kMinBlocks = 8;
-    constexpr float kMinHits = 3.0F;     // references of the own session, mean of the points
-    constexpr float kMaxPassed = 0.05F;  // ratio of the points
-    constexpr float kMaxContact = 0.7F;  // ratio of the blocks beside what stands in both states
     Eigen::AlignedBox3f box;
     float points = 0.0F, hits = 0.0F, passed = 0.0F, contacts = 0.0F;
     for (const std::uint32_t block : members) {
@@ -66,9 +61,10 @@ class Candidates {
         passed += history_.own_beams_passed(session, i) ? 1.0F : 0.0F;
       }
     }
-    return members.size() >= kMinBlocks && box.sizes().z() > kMinHeight &&
-           hits >= kMinHits * points && passed <= kMaxPassed * points &&
-           contacts <= kMaxContact * static_cast<float>(members.size());
+    // 40 cm high, hit by three references of its session in the mean, hardly passed, and with few
+    // blocks beside what stands in both states.
+    return members.size() >= 8 && box.sizes().z() > 0.4F && hits >= 3.0F * points &&
+           passed <= 0.05F * points && contacts <= 0.7F * static_cast<float>(members.size());
   }
 
   const SessionGrid& grid_;

@@ -184,11 +184,10 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
 
   // Points near the seed come first: they determine the rotation. A wrong rotation displaces
   // distant scans by more than the registration can correct.
-  constexpr double kFirstRadius = 60.0;               // m
   constexpr std::size_t kMaxCount[] = {3000, 60000};  // points, near and all
   Fit fit;
   for (const bool is_first : {true, false}) {
-    const double radius = is_first ? kFirstRadius : std::numeric_limits<double>::infinity();
+    const double radius = is_first ? 60.0 : std::numeric_limits<double>::infinity();
     std::vector<Eigen::Vector3f> near;
     for (const Eigen::Vector3d& point : points_) {
       const Eigen::Vector3d p = T_city_start * point - centre;

@@ -11,11 +11,7 @@
 #include "text.hpp"
 
 namespace dynains {
-namespace {
-
-constexpr std::size_t kMaxLine = std::size_t{1} << 16;
-
-}  // namespace
+namespace {}  // namespace
 
 ByteReader::ByteReader(const std::filesystem::path& path) : path_(path), file_(open_input(path)) {
   std::error_code error;
@@ -32,7 +28,7 @@ bool ByteReader::read_line(std::string& text) {
     if (c == std::ifstream::traits_type::eof()) fail_to_read(file_, path_, position_, size_);
     ++position_;
     if (c == '\n') break;
-    if (text.size() == kMaxLine) fail_on_line("expected a line of text, found no end of line");
+    if (text.size() == 1U << 16U) fail_on_line("expected a line of text, found no end of line");
     text.push_back(static_cast<char>(c));
   }
   if (!text.empty() && text.back() == '\r') text.pop_back();
@@ -65,8 +61,8 @@ void ByteReader::skip(std::uint64_t count, const char* purpose) {
     position_ = size_;
     fail_here(std::string("file ends, expected ") + purpose);
   }
-  constexpr std::uint64_t kFewBytes = 4096;  // that are in the buffer of the stream, mostly
-  if (count > kFewBytes) {
+  // Fewer bytes are in the buffer of the stream, mostly.
+  if (count > 4096) {
     file_.seekg(static_cast<std::streamoff>(count), std::ios::cur);
     if (!file_) fail_to_read(file_, path_, position_, size_);
   } else {

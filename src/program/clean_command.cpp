@@ -202,8 +202,7 @@ fs::path target_of(const CleanOptions& options) {
 
 /// The edge of voxels that hold about one point of the map, m; at least `least`.
 double voxel_of(const std::vector<Eigen::Vector3d>& map, double least) {
-  constexpr double kMaxEdge = 2.0;  // m
-  return edge_by_spacing(map.size(), least, kMaxEdge,
+  return edge_by_spacing(map.size(), least, 2.0,
                          [&](double edge) { return MapVotes(map, edge).voxel_count(); });
 }
 

@@ -52,9 +52,9 @@ void Progress::update(std::size_t done) {
   const std::string state = std::to_string(done) + " of " + std::to_string(total_) + ' ' + unit_ +
                             describe_rate(done, total_, elapsed.count(), unit_);
   if (is_terminal_) {
-    constexpr const char* kClearLine = "\x1b[K";  // the text may be shorter than the one before
+    // Clears the line: the text may be shorter than the one before.
     // The filter of std::cerr escapes carriage returns.
-    std::clog << '\r' << state << kClearLine << std::flush;
+    std::clog << '\r' << state << "\x1b[K" << std::flush;
   } else {
     std::cerr << state << std::endl;
   }

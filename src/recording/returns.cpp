@@ -27,10 +27,7 @@ bool ReturnToPlace::fits() const { return is_known() && movement <= kMaxMovement
 
 bool ReturnToPlace::is_wrong() const { return inliers < kMinInliers || movement > kMaxMovement; }
 
-bool ReturnToPlace::is_known() const {
-  constexpr double kMaxDeviation = 0.1;  // m
-  return inliers >= kMinInliers && deviation <= kMaxDeviation;
-}
+bool ReturnToPlace::is_known() const { return inliers >= kMinInliers && deviation <= 0.1; }
 
 // Puts the points that stand into kept_, and into the store.
 void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {

@@ -15,9 +15,8 @@ constexpr float kBelief = 0.95F;  // of points that the second pass removes
 
 Visit::Visit(ByteStore& store, const SecondPassConfig& config)
     : config_(config), store_(store), places_(store, config.memory) {
-  constexpr std::uint32_t kMaxStep = 5;  // from one reference to the next
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-    references_.emplace_back(kMaxStep, config.evidence.lateral_margin);
+    references_.emplace_back(5, config.evidence.lateral_margin);
   }
 }
 
@@ -128,8 +127,8 @@ RevisedPoints Visit::revise(PointsView points, std::uint32_t number, VerdictArra
 // Whether a point that was kept, in a place that has changed, is of the object there. Ground is, if
 // it rises above the mean.
 bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
-  constexpr double kRise = 0.10;  // m, more than 0.1 deg moves ground 50 m away
-  return label != PointLabel::kGround || places_.rise(point).value_or(0.0) >= kRise;
+  // 10 cm are more than 0.1 deg moves ground 50 m away.
+  return label != PointLabel::kGround || places_.rise(point).value_or(0.0) >= 0.10;
 }
 
 // Restores a removed point if it stands, or if it does not rise above the ground of all scans and
@@ -137,12 +136,11 @@ bool Visit::belongs_to_object(PointLabel label, const Eigen::Vector3d& point) {
 // it holds wheels and undersides.
 bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
                     VerdictArrays& verdict) {
-  constexpr double kMaxRise = 0.02;  // m
   const Cause cause = verdict.causes[i];
   if (cause == Cause::kUnderInstance) return false;
   const auto is_ground = [&] {
     const std::optional<double> rise = places_.rise(point);
-    return rise && *rise <= kMaxRise && places_.is_level(point);
+    return rise && *rise <= 0.02 && places_.is_level(point);
   };
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;

@@ -9,9 +9,9 @@ namespace dynains::program {
 /// about `most` at the most. `count(edge)`: number of voxels of this edge that hold points.
 template <class Count>
 double edge_by_spacing(std::size_t points, double least, double most, Count&& count) {
-  constexpr double kDouble = 1.42;  // edge of voxels that hold twice as many points of a surface
   double edge = least;
-  while (edge < most && points < 2 * count(kDouble * edge)) edge *= 1.2;
+  // Voxels 1.42 times as wide hold twice as many points of a surface.
+  while (edge < most && points < 2 * count(1.42 * edge)) edge *= 1.2;
   return edge;
 }
 

@@ -81,13 +81,12 @@ std::string text_of(const std::vector<std::size_t>& scans, std::size_t first,
 
 std::vector<std::string> odd_scans(const std::vector<ScanCounts>& counts, std::size_t first,
                                    const Recording& recording) {
-  constexpr double kPeak = 0.1, kTimesUsual = 4.0;  // of the points, of the changes between scans
   std::vector<std::size_t> thin, misplaced;
   std::vector<double> changes;
   for (std::size_t i = 1; i < counts.size(); ++i) {
     changes.push_back(std::abs(counts[i].moving_share() - counts[i - 1].moving_share()));
   }
-  const double peak = std::max(kPeak, kTimesUsual * median(changes));
+  const double peak = std::max(0.1, 4.0 * median(changes));
   std::uint64_t usual = counts.size() < 2 ? 0 : std::max(counts[0].points, counts[1].points);
   for (std::size_t i = 0; i < counts.size(); ++i) {
     const bool is_thin = 2 * counts[i].points < usual;

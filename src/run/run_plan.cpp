@@ -46,9 +46,7 @@ PointBuffer points_of_sensor(const Recording& recording, const RecordedScan& sca
 /// that reaches farther is judged like other things; otherwise the road around it would be lost.
 /// Throws IoError.
 double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
-  constexpr std::size_t kScans = 24;
-  constexpr double kMinMotion = 5.0;  // m
-  const std::size_t count = std::min(kScans, range.size());
+  const std::size_t count = std::min<std::size_t>(24, range.size());
   std::vector<std::size_t> chosen;
   double motion = 0.0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -57,7 +55,7 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
                                recording.T_world_sensor(range.first).translation())
                                   .norm());
   }
-  if (motion < kMinMotion) return otherwise;
+  if (motion < 5.0) return otherwise;
   std::vector<std::vector<PointBuffer>> scans(std::max<std::size_t>(1, recording.sensors().size()));
   RecordedScan scan;
   for (const std::size_t i : chosen) {
@@ -99,8 +97,8 @@ void complete_map(const DynaInsRemover::Config& config, RunOutputs& outputs) {
         outputs.map.empty() ? out / "static_map.ply" : map_path(outputs.map.string(), out);
   }
   if (outputs.has_las_map()) outputs.map_attributes = true;
-  constexpr double kFinest = 0.01;  // m, for a map of all points
-  outputs.map_voxel = std::max(config.map.map_voxel, kFinest);
+  // A map of all points has attributes by voxels of 1 cm.
+  outputs.map_voxel = std::max(config.map.map_voxel, 0.01);
   if (outputs.crs.empty()) return;
   if (!outputs.has_las_map()) throw ConfigError("--crs needs --map FILE.las");
   if (outputs.crs.find('[') == std::string::npos) {

@@ -52,8 +52,7 @@ nlohmann::ordered_json pose_residual_to_json(const RunTiming& timing) {
 std::uint64_t peak_memory_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  constexpr std::uint64_t kUnit = 1024;  // Linux counts kilobytes
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * kUnit;
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts kilobytes
 }
 
 }  // namespace

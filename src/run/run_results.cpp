@@ -17,10 +17,10 @@ namespace {
 
 /// Points lie around the poses; near the limit doubles cost little and lose nothing.
 bool is_far(const Recording& recording, const ScanRange& range) {
-  constexpr double kReach = 500.0;  // m, of any sensor
+  // No sensor reaches farther than 500 m.
   for (std::size_t i = range.first; i <= range.last; ++i) {
     const Eigen::Vector3d position = recording.T_world_sensor(i).translation();
-    if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - kReach) return true;
+    if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - 500.0) return true;
   }
   return false;
 }

@@ -39,8 +39,7 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   using Clock = std::chrono::steady_clock;
   RunTiming timing;
   ReadAhead reader(recording, range.first, range.last, results.thread());
-  constexpr std::size_t kFewScans = 8;
-  const bool are_kept = remover.latency() <= kFewScans || recording.format() != ScanFormat::kBin;
+  const bool are_kept = remover.latency() <= 8 || recording.format() != ScanFormat::kBin;
   std::deque<RecordedScan> kept;  // oldest first; the last one is the pushed scan
   RecordedScan spare;
   const auto take_oldest = [&] {

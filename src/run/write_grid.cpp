@@ -52,8 +52,7 @@ class JudgedScans {
 
 /// Distance between the points of surfaces, m: the edge of voxels that hold about one.
 double spacing_of(const std::vector<Eigen::Vector3d>& points) {
-  constexpr double kFinest = 0.02, kCoarsest = 0.5;  // m
-  return edge_by_spacing(points.size(), kFinest, kCoarsest, [&](double edge) {
+  return edge_by_spacing(points.size(), 0.02, 0.5, [&](double edge) {
     VoxelHashTable<> voxels;
     for (const Eigen::Vector3d& point : points) voxels.insert(voxel_at(point, edge));
     return voxels.size();

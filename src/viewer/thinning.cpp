@@ -7,9 +7,6 @@
 namespace dynains::viewer {
 namespace {
 
-constexpr double kGrowth = 1.25;
-constexpr double kWidestCell = 0.6;  // m, before scans share cells
-
 /// A bijective mixing of 64 bits: multiplications by odd numbers and shifts.
 std::uint64_t mixed(std::uint64_t value) {
   value ^= value >> 31U;
@@ -47,8 +44,9 @@ bool ThinnedPoints::is_first(const ViewPoint& point) {
 }
 
 void ThinnedPoints::thin() {
-  if (cell_ < kWidestCell || scans_per_cell_ > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
-    cell_ *= kGrowth;
+  // Scans share cells from a width of 0.6 m on.
+  if (cell_ < 0.6 || scans_per_cell_ > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
+    cell_ *= 1.25;
   } else {
     scans_per_cell_ *= 2;
   }

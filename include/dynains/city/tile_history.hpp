@@ -150,9 +150,6 @@ class TileHistory {
   }
 
  private:
-  static constexpr double kCompactLength = 18.0, kCompactHeight = 4.5;  // m
-  static constexpr int kCubeBits = 3;                                   // cubes of 8 blocks
-
   /// Least numbers of free parts from which a component has left.
   struct Limits {
     float per_hit;  ///< ratio to the parts that are hit
@@ -214,7 +211,7 @@ class TileHistory {
           VoxelHashTable<> cubes;
           for (const std::uint32_t member : members) {
             const auto cube = [&](int axis) {
-              return voxel_index(parts.keys[member], axis) >> kCubeBits;
+              return voxel_index(parts.keys[member], axis) >> 3;  // of 8 blocks
             };
             const VoxelKey key = is_whole ? 0 : voxel_key(cube(0), cube(1), cube(2));
             parts_[parts.values[member]].component = component_count_ + cubes.insert(key);
@@ -228,7 +225,7 @@ class TileHistory {
     Eigen::AlignedBox3d box;
     for (const std::uint32_t member : members) box.extend(corner_of(keys[member], edge()));
     const Eigen::Vector3d sizes = box.sizes() + Eigen::Vector3d::Constant(edge());
-    return sizes.head<2>().maxCoeff() <= kCompactLength && sizes.z() <= kCompactHeight;
+    return sizes.head<2>().maxCoeff() <= 18.0 && sizes.z() <= 4.5;  // m
   }
 
   // Removes the parts of sessions up to `by` that are free after it. In the session that measured

@@ -230,7 +230,6 @@ class OccupancyDescriptor {
 
   // Height over z_min_ (m) above which points of the cluster have a height.
   float find_lowest_counted() const {
-    constexpr float kTall = 1.0F;  // m
     float highest = z_min_;
     for_bounding_ranges([&](const PointRange& part) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
@@ -238,7 +237,7 @@ class OccupancyDescriptor {
       }
     });
     const float height = highest - z_min_;
-    return height > kTall ? static_cast<float>(config_.ignored_low) * height : 0.0F;
+    return height > 1.0F ? static_cast<float>(config_.ignored_low) * height : 0.0F;
   }
 
   // Calls `work` with the ranges of points that the grid spans.

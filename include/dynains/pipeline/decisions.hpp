@@ -259,8 +259,6 @@ class WindowDecision final : public ScanDecision {
 
   // The rules of the public implementation for clusters that are not judged.
   static bool is_big(const ClusterView& cluster) {
-    constexpr float kLength = 25.0F, kHeight = 3.5F, kTop = 3.5F;  // m
-    constexpr std::uint32_t kFewPoints = 3;
     Eigen::AlignedBox3f box;
     for (const PointRange& part : cluster.ranges) {
       for (std::size_t i = part.begin; i < part.end; ++i) {
@@ -274,9 +272,9 @@ class WindowDecision final : public ScanDecision {
       for (const PointRange& part : cluster.scan(k)) count += part.end - part.begin;
       return count;
     };
-    return box.diagonal().head<2>().norm() > kLength || box.diagonal().z() > kHeight ||
-           box.max().z() > kTop ||
-           std::max(points(cluster.oldest()), points(cluster.scan_count() - 1)) <= kFewPoints;
+    return box.diagonal().head<2>().norm() > 25.0F || box.diagonal().z() > 3.5F ||  // m
+           box.max().z() > 3.5F ||
+           std::max(points(cluster.oldest()), points(cluster.scan_count() - 1)) <= 3;
   }
 
   // Eq. 13-19 for the cluster of the last call of describe().

@@ -17,10 +17,9 @@ class ScanRate {
  public:
   /// `interval`: s since the previous scan. `max_gap`: RemoverConfig::max_gap, s.
   TimeDoubt add(double interval, double max_gap) {
-    constexpr std::size_t kEnough = 3;     // intervals; a pause is one
-    constexpr double kMinInterval = 1e-3;  // s
+    constexpr std::size_t kEnough = 3;  // intervals; a pause is one
     slow_ = interval > max_gap ? slow_ + 1 : 0;
-    fast_ = interval < kMinInterval ? fast_ + 1 : 0;
+    fast_ = interval < 1e-3 ? fast_ + 1 : 0;
     if (slow_ >= kEnough) return TimeDoubt::kTooSlow;
     return fast_ >= kEnough ? TimeDoubt::kTooFast : TimeDoubt::kNone;
   }

@@ -298,8 +298,6 @@ class RecordingPlaces {
   /// Ends the last observation and decides on all places and objects: components of touching
   /// changed places that are large enough and not part of a static object. No test may follow.
   void decide() {
-    constexpr std::size_t kMin = 6;      // places
-    constexpr double kMaxContact = 1.5;  // unchanged places that touch it, ratio to its own places
     end_observation();
     VoxelTile<Place> found;
     tiles_.for_each_index([&](const TileIndex& index) {
@@ -319,9 +317,8 @@ class RecordingPlaces {
               if (place != nullptr && place->was_hit) contacts.insert(key);
             });
           }
-          const auto size = static_cast<double>(members.size());
-          if (members.size() < kMin || static_cast<double>(contacts.size()) > kMaxContact * size)
-            return;
+          // What more unchanged places touch than it has itself is a part of them.
+          if (members.size() < 6 || 2 * contacts.size() > 3 * members.size()) return;
           for (const std::uint32_t member : members) {
             const Place& place = found.values[member];
             changed_.values[changed_.add(found.keys[member])] = {place.first.removed_last,

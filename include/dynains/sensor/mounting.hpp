@@ -35,11 +35,10 @@ struct Mounting {
   /// upward normal. For a normal along -z, a rotation by 180 deg about x.
   Eigen::Matrix3d R_level_sensor() const {
     // Closed form: Quaterniond::FromTwoVectors takes seconds to compile.
-    constexpr double kTiny = 1e-200;
     const double x = up_sensor.x(), y = up_sensor.y(), z = up_sensor.z();
     const double across = x * x + y * y;
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    if (z < 0.0 && across < kTiny) {
+    if (z < 0.0 && across < 1e-200) {
       R(1, 1) = R(2, 2) = -1.0;
       return R;
     }
@@ -116,7 +115,6 @@ class MountingEstimator {
   static constexpr double kOnGround = 0.12;     // m, largest distance of a ground cell
   static constexpr double kBelow = 0.4;         // m; cells farther below contradict a plane
   static constexpr std::size_t kMinCells = 60;
-  static constexpr int kTrials = 3000;
   static constexpr std::size_t kScored = 2000;  // cells that score a plane
 
   static bool is_near(PointsView points, std::size_t i) {
@@ -163,7 +161,7 @@ class MountingEstimator {
     std::optional<GroundHypothesis> best;
     float best_score = 0.0F;
     std::mt19937_64 random(2);
-    for (int trial = 0; trial < kTrials; ++trial) {
+    for (int trial = 0; trial < 3000; ++trial) {
       const Eigen::Vector3d& a = cells_[random() % cells_.size()];
       const Eigen::Vector3d& b = cells_[random() % cells_.size()];
       const Eigen::Vector3d& c = cells_[random() % cells_.size()];
@@ -428,13 +426,13 @@ class LevelFrame {
 
   // `mounting`: estimate in the headed frame.
   Eigen::Matrix3d R_level_headed(Mounting mounting, const Eigen::Matrix3d& R_headed_sensor) const {
-    constexpr double kLevel = 4.0;  // deg; estimates for level sensors are up to 2.6
     if (is_tilt_given_) {
       mounting.up_sensor = multiplied(R_headed_sensor, up_given_);
       return mounting.R_level_sensor();
     }
-    return mounting.known && mounting.tilt() > kLevel ? mounting.R_level_sensor()
-                                                      : Eigen::Matrix3d::Identity();
+    // Estimates for level sensors are up to 2.6 deg.
+    return mounting.known && mounting.tilt() > 4.0 ? mounting.R_level_sensor()
+                                                   : Eigen::Matrix3d::Identity();
   }
 
   bool is_enabled_;

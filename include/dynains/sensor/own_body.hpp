@@ -62,7 +62,7 @@ class NearestReturns {
       const std::size_t column = cell(angles.azimuth[i] + 180.5F, kColumn, kColumns);
       Return& nearest = nearest_[column * kRows + cell(angles.elevation[i] + 90.5F, kRow, kRows)];
       if (range < nearest.range) nearest = {range, p};
-      if (height_of(p) < kGroundHeight) {
+      if (height_of(p) < 0.25) {
         nearest_ground_[column] = std::min(nearest_ground_[column], p.head<2>().norm());
       }
     }
@@ -92,7 +92,6 @@ class NearestReturns {
   static constexpr float kRow = 1.0F;     // deg of elevation
   static constexpr std::size_t kColumns = 181;
   static constexpr std::size_t kRows = 182;
-  static constexpr double kGroundHeight = 0.25;  // m
 
   static std::size_t cell(float angle, float size, std::size_t count) {
     return std::min(static_cast<std::size_t>(angle / size), count - 1);
@@ -119,12 +118,11 @@ struct SteadyReturn {
 template <class Height>
 SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::size_t scans,
                            Height&& height, double ground) {
-  constexpr double kOverGround = 0.4;  // m; the height of the sensor is known to 0.3 m
-  constexpr double kBehind = 0.3;      // m, behind visible ground
   constexpr float kTolerance = 0.03F;  // m, and as a ratio of the range
   const NearestReturns::Return usual = median(returns);
   const auto distance = static_cast<double>(usual.point.head<2>().norm());
-  if (distance > ground + kBehind || height(usual.point) < kOverGround) return {};
+  // Behind visible ground, or ground: the height of the sensor is known to 0.3 m.
+  if (distance > ground + 0.3 || height(usual.point) < 0.4) return {};
   std::size_t alike = 0;
   SteadyReturn result;
   result.point = usual.point;
@@ -139,11 +137,10 @@ SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::si
 
 /// Middle of the mountings by a few of `scans`.
 inline Mounting usual_mounting(const std::vector<PointBuffer>& scans) {
-  constexpr std::size_t kUsed = 5;
   std::vector<double> heights;
   Mounting result;
   result.up_sensor.setZero();
-  for (std::size_t i = 0; i < scans.size(); i += std::max<std::size_t>(1, scans.size() / kUsed)) {
+  for (std::size_t i = 0; i < scans.size(); i += std::max<std::size_t>(1, scans.size() / 5)) {
     const Mounting one = estimate_mounting(scans[i]);
     if (!one.known) continue;
     heights.push_back(one.height);
@@ -156,14 +153,11 @@ inline Mounting usual_mounting(const std::vector<PointBuffer>& scans) {
 /// Largest horizontal distance (m) of the returns of the body: steady ones, and less steady ones
 /// next to them, as on dark or slanted metal, or in scans whose motion was compensated.
 inline double reach_of_body(std::vector<SteadyReturn> candidates) {
-  constexpr double kSteady = 0.85;
-  constexpr double kHalfSteady = 0.45;
-  constexpr float kNextTo = 0.7F;  // m
-  const auto is_body = [&](const SteadyReturn& candidate) { return candidate.steady >= kSteady; };
+  const auto is_body = [&](const SteadyReturn& candidate) { return candidate.steady >= 0.85; };
   auto rest = std::partition(candidates.begin(), candidates.end(), is_body);
   for (auto body = candidates.begin(); body != rest; ++body) {
     rest = std::partition(rest, candidates.end(), [&](const SteadyReturn& candidate) {
-      return candidate.steady >= kHalfSteady && (candidate.point - body->point).norm() < kNextTo;
+      return candidate.steady >= 0.45 && (candidate.point - body->point).norm() < 0.7F;
     });
   }
   double reach = 0.0;
@@ -183,8 +177,7 @@ inline double reach_of_body(std::vector<SteadyReturn> candidates) {
 /// memory and takes some tens of milliseconds, so call it once, before the first push: a stream
 /// cannot know it at its first scan.
 inline OwnBody estimate_own_body(const std::vector<PointBuffer>& scans) {
-  constexpr std::size_t kMinScans = 8;
-  if (scans.size() < kMinScans) return {};
+  if (scans.size() < 8) return {};
   const Mounting mounting = detail::usual_mounting(scans);
   detail::NearestReturns nearest(mounting);
   for (const PointBuffer& scan : scans) nearest.add(scan);

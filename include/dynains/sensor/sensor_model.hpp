@@ -107,7 +107,6 @@ inline double percentile(std::vector<float> values, double ratio) {
 inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
                                         const std::vector<float>& along, double width,
                                         double smallest) {
-  constexpr std::size_t kPointsPerSorted = 4;
   const auto band_of = [&](float angle) {
     return static_cast<std::size_t>((static_cast<double>(angle) + 181.0) / width);
   };
@@ -116,7 +115,7 @@ inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
   std::vector<std::vector<float>> bands(counts.size());
   std::size_t sorted = 0, lower = 0;
   for (std::size_t band = 0; band < bands.size(); ++band) {
-    if (kPointsPerSorted * sorted <= lower) {
+    if (4 * sorted <= lower) {
       bands[band].reserve(counts[band]);
       sorted += counts[band];
     }
@@ -148,16 +147,14 @@ inline constexpr std::size_t kMinOfSensor = 500;
 /// Allocates memory, so call it for one scan of a sensor, not for each.
 inline SensorModel estimate_sensor_model(PointsView points) {
   if (points.size() < kMinOfSensor) return {};
-  constexpr double kBeamBand = 0.1;  // deg, range of the elevations of one beam
-  constexpr double kMinStep = 0.01;  // deg
-  constexpr double kMinGap = 0.08;   // deg, between beams
   const detail::BeamAngles angles = detail::beam_angles(points);
   SensorModel model;
   model.height = SensorModel::typical().height;
   model.elevation_min = detail::percentile(angles.elevation, 0.0005);
   model.elevation_max = detail::percentile(angles.elevation, 0.9995);
+  // The elevations of one beam differ by up to 0.1 deg, those of two beams by 0.08 deg or more.
   const std::vector<float> steps =
-      detail::gaps_in_bands(angles.elevation, angles.azimuth, kBeamBand, kMinStep);
+      detail::gaps_in_bands(angles.elevation, angles.azimuth, 0.1, 0.01);
   if (steps.empty()) return {};
   model.azimuth_step = std::clamp(detail::percentile(steps, 0.5), 0.05, 2.0);
   // Returns of one ring are closer together than those that are spread evenly.
@@ -168,7 +165,7 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     return model;
   }
   const std::vector<float> gaps =
-      detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, kMinGap);
+      detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, 0.08);
   const auto gap_at = [&](double ratio) {
     return gaps.empty() ? 1.0 : std::clamp(detail::percentile(gaps, ratio), 0.1, 5.0);
   };

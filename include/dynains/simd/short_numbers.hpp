@@ -20,9 +20,8 @@ class ShortNumbers {
 
   /// Ensures capacity for `count` numbers with few runs.
   void reserve(std::size_t count) {
-    constexpr std::size_t kNumbersPerRun = 16;
     ensure_capacity(lower_, count);
-    ensure_capacity(runs_, count / kNumbersPerRun);
+    ensure_capacity(runs_, count / 16);
   }
 
   void assign(Span<const std::uint32_t> numbers) {

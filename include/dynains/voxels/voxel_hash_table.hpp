@@ -47,8 +47,8 @@ VoxelKey voxel_at(const Point& point, double edge) {
 
 /// Hash of a key. The upper bits are mixed best.
 constexpr std::uint32_t voxel_hash(VoxelKey key) {
-  constexpr std::uint64_t kMix = 0x9E3779B97F4A7C15ULL;  // 2^64 over the golden ratio
-  return static_cast<std::uint32_t>(((key ^ key >> 32U) * kMix) >> 32U);
+  // 2^64 over the golden ratio.
+  return static_cast<std::uint32_t>(((key ^ key >> 32U) * 0x9E3779B97F4A7C15ULL) >> 32U);
 }
 
 namespace detail {
@@ -135,8 +135,7 @@ class VoxelHashTable {
   }
 
   void grow() {
-    constexpr std::size_t kMin = 64;
-    std::vector<Slot> old(slots_.empty() ? kMin : 2 * slots_.size());
+    std::vector<Slot> old(slots_.empty() ? 64 : 2 * slots_.size());
     old.swap(slots_);
     --shift_;
     for (const Slot& slot : old) {

@@ -51,18 +51,17 @@ double plausible_share(const std::vector<std::uint8_t>& bytes, const BinLayout& 
 /// least for the true number of columns, since others mix columns (energy distance, Szekely and
 /// Rizzo 2013), and does not depend on the order of points. 0 for fewer than two points.
 double spread_of_columns(const std::vector<std::uint8_t>& bytes, const BinLayout& layout) {
-  constexpr double kUnit = 0.1;                           // values below it hardly differ
-  constexpr std::uint64_t kFactor = 0x9E3779B97F4A7C15U;  // of a hash: any other point of the file
   const auto columns = static_cast<std::size_t>(layout.columns);
   const std::size_t count = bytes.size() / point_size(layout);
   const auto size_of = [&](std::size_t i, std::size_t column) {
     const double value = value_at(bytes, layout, i, column);
-    return std::log1p(std::abs(value) / kUnit);
+    return std::log1p(std::abs(value) / 0.1);  // values below it hardly differ
   };
   double sum = 0.0;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t other = ((i + 1) * kFactor >> 32) % count;
+    // By a hash: any other point of the file.
+    const std::size_t other = ((i + 1) * std::uint64_t{0x9E3779B97F4A7C15U} >> 32) % count;
     if (other == i) continue;
     for (std::size_t column = 0; column < columns; ++column) {
       const double difference = std::abs(size_of(i, column) - size_of(other, column));
@@ -132,13 +131,12 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
 }
 
 void check_bin_content(const std::filesystem::path& file) {
-  constexpr std::uint64_t kMaxBytes = 240 * 1024;  // a multiple of the size of every point
-  constexpr std::size_t kMinPoints = 100;
   const BinLayout usual;
   const BinLayout doubles{4, true};
   RawFile raw(file);
-  const auto bytes = raw.read(0, std::min(raw.size(), kMaxBytes), "points");
-  if (bytes.size() < kMinPoints * point_size(usual)) return;
+  // A multiple of the size of every point.
+  const auto bytes = raw.read(0, std::min<std::uint64_t>(raw.size(), 240 * 1024), "points");
+  if (bytes.size() < 100 * point_size(usual)) return;
   if (plausible_share(bytes, usual) < 0.9 && plausible_share(bytes, {3, true}) > 0.9) {
     fail(file, "does not hold float32 x y z intensity, but float64: the first number is " +
                    std::to_string(value_at(bytes, doubles, 0, 0)) +

@@ -106,8 +106,7 @@ std::size_t add_npy_field(const NpyLiteral& literal, const std::string& name,
     if (known.name == text) field.type = known.scalar;
   }
   array.fields.push_back(std::move(field));
-  constexpr std::uint32_t kBytesOfLetter = 4;  // in texts of type U
-  return text.front() == 'U' ? kBytesOfLetter * size : size;
+  return text.front() == 'U' ? 4 * size : size;  // letters have four bytes
 }
 
 void read_npy_type(NpyLiteral& literal, NpyArray& array) {

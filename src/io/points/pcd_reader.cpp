@@ -44,8 +44,6 @@ struct PcdHeader {
   }
 };
 
-constexpr std::size_t kMaxFieldCount = 1 << 16;
-
 /// Calls `parse(field, token)` for each field; the line must have a token for each.
 template <class Parse>
 void for_each_field(const ByteReader& reader, PcdHeader& header, std::string_view line,
@@ -128,7 +126,7 @@ void parse_type(const ByteReader& reader, Field& field, std::string_view token) 
 void parse_count(const ByteReader& reader, Field& field, std::string_view token) {
   const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
   const std::uint64_t count = reader.whole_number(token, what);
-  if (count > kMaxFieldCount) reader.fail_on_line("expected " + what);
+  if (count > 1U << 16U) reader.fail_on_line("expected " + what);
   field.count = static_cast<std::size_t>(count);
 }
 

@@ -11,9 +11,7 @@ namespace dynains {
 namespace {
 
 constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
-constexpr double kAbsolute = 10.0;  // s; larger times count from the origin of stamps
-constexpr double kMinShare = 0.05;  // of the interval between scans
-constexpr double kNoGap = 0.125;    // s; scans that are farther apart may be some of all scans
+constexpr double kNoGap = 0.125;  // s; scans that are farther apart may be some of all scans
 
 bool has_return(const float* xyz) {
   const float sum = std::abs(xyz[0]) + std::abs(xyz[1]) + std::abs(xyz[2]);
@@ -69,8 +67,7 @@ std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
 bool are_random(const std::vector<double>& times, const std::vector<DirectedTime>& by_direction,
                 double span) {
   constexpr double kMaxLeaps = 0.5;
-  constexpr std::size_t kMin = 100;
-  if (by_direction.size() < kMin || !(share_of_leaps(times, span) > kMaxLeaps)) return false;
+  if (by_direction.size() < 100 || !(share_of_leaps(times, span) > kMaxLeaps)) return false;
   std::vector<double> directed;
   directed.reserve(by_direction.size());
   for (const DirectedTime& one : by_direction) directed.push_back(one.time);
@@ -138,7 +135,7 @@ double PointClockSearch::longest_scan() const {
 
 double PointClockSearch::shortest_scan() const {
   const double period = period_ > 0.0 ? std::min(period_, kKittiPeriod) : kKittiPeriod;
-  return kMinShare * period;
+  return 0.05 * period;
 }
 
 /// Points whose time is farther from the median of their scan than a scan takes.
@@ -220,13 +217,11 @@ std::string PointClockSearch::random_text() const {
 
 /// A remark on scans that take another time than the sensor has from scan to scan.
 std::string PointClockSearch::duration_text(double unit) const {
-  constexpr double kMiddle = 0.9;      // of the points, as in duration()
-  constexpr double kMaxLength = 1.15;  // of the interval between scans
-  constexpr double kMinLength = 0.45;  // likewise, if every second scan of a sensor was recorded
-  const double whole = duration(unit) / kMiddle;
-  const bool is_long = whole > kMaxLength * period_;
+  const double whole = duration(unit) / 0.9;  // duration() is that of the middle 90 %
+  const bool is_long = whole > 1.15 * period_;
+  // Every second scan of a sensor may have been recorded.
   const bool is_short =
-      do_most(&Sample::is_all_around) && period_ <= kNoGap && whole < kMinLength * period_;
+      do_most(&Sample::is_all_around) && period_ <= kNoGap && whole < 0.45 * period_;
   if (!(period_ > 0.0) || !(is_long || is_short)) return {};
   return "times of points in units of " + text::to_text(unit) + " s give a scan " +
          (is_short ? "all around " : "") + "that takes " + rounded(whole) + " s, but scans are " +
@@ -253,7 +248,8 @@ PointClockFinding PointClockSearch::result() const {
   clock.unit = *unit;
   clock.longest_scan = longest_scan();
   const Sample& sample = samples_[samples_.size() / 2];
-  clock.is_absolute = std::abs(clock.unit * sample.median()) > kAbsolute;
+  // Times of more than 10 s count from the origin of stamps.
+  clock.is_absolute = std::abs(clock.unit * sample.median()) > 10.0;
   std::string text;
   const auto add = [&](const std::string& remark) {
     if (!remark.empty()) text += (text.empty() ? "" : "; ") + remark;

@@ -117,10 +117,9 @@ std::string PointFileWriter::header() const {
 }
 
 void PointFileWriter::add(const FilePoint& point) {
-  constexpr std::size_t kMaxBytes = std::size_t{1} << 16U;
   buffer_.add(point);
   ++size_;
-  if (buffer_.bytes().size() >= kMaxBytes) write_buffer();
+  if (buffer_.bytes().size() >= 1U << 16U) write_buffer();
 }
 
 void PointFileWriter::write_buffer() {
