@@ -125,45 +125,44 @@ struct RemoverConfig {
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
     visitor(Parameter{"decision", self.decision, Bounds(), "",
-                      "evidence that points move: occupancy of clusters within a sliding window of "
-                      "scans (the paper), or free space that beams of other scans passed through"});
+                      "evidence of motion: occupancy of clusters in a sliding window of scans (the "
+                      "paper), or free space that beams of other scans passed through"});
     visitor(Parameter{"window", self.window, closed(2, 64), "scans",
                       "sliding window K (Eq. 3) of decision = window"});
     visitor(Parameter{"use_belief", self.use_belief, Bounds(), "",
                       "revert proposals of the window by belief (Eq. 13-19); false: IOC only"});
     visitor(Parameter{"belief_observations", self.belief_observations, Bounds(), "",
-                      "observations that update the belief (Eq. 15, 16): the newest, against the "
-                      "whole cluster; or all, each against all others"});
+                      "observations that update the belief (Eq. 15, 16): the newest against the "
+                      "whole cluster, or each against all others"});
     visitor(Parameter{"compared_clusters", self.compared_clusters, Bounds(), "",
-                      "clusters of a window that can be dynamic: with points in both its ends, or "
-                      "in the newest scan and any before it"});
+                      "clusters of a window that can be dynamic: seen in both its ends, or in the "
+                      "newest scan and any before it"});
     visitor(Parameter{"big_is_static", self.big_is_static, Bounds(), "",
-                      "clusters of the window that are longer than 25 m, higher than 3.5 m, reach "
+                      "clusters of a window that are longer than 25 m, higher than 3.5 m, reach "
                       "3.5 m over the sensor or have at most three points in each end are static"});
     visitor(Parameter{"votes", self.votes, closed(0, 64), "windows",
-                      "windows that must call a point dynamic for the final verdict; 0: the newest "
-                      "window alone decides, without latency"});
+                      "windows that must call a point dynamic; 0: only the newest window decides, "
+                      "without latency"});
     visitor(Parameter{
         "min_range", self.min_range, closed(0, 100), "m",
-        "nearer points (in the sensor's own x-y plane) are the robot's own and not judged"});
+        "nearer points (x-y plane of their sensor) belong to the robot and are not judged"});
     visitor(Parameter{"max_range", self.max_range, half_open_below(0, 10000), "m",
-                      "points that are farther in the sensor's own x-y plane or along its z axis "
-                      "are not judged"});
+                      "farther points (x-y plane or z axis of their sensor) are not judged"});
     visitor(
         Parameter{"max_gap", self.max_gap, half_open_below(0, 1e9), "s",
-                  "a longer pause starts a new epoch: scans before and after it are not compared"});
+                  "a longer pause begins an epoch: scans before and after it are not compared"});
     visitor(Parameter{"max_speed", self.max_speed, half_open_below(0, 1e9), "m/s",
-                      "a pose that is farther from the one before starts a new epoch"});
+                      "a pose that needs a higher speed begins an epoch"});
     visitor(Parameter{"level", self.level, Bounds(), "",
                       "turn scans level, and along the scene, before they are judged"});
     visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-180, 180), "deg",
-                      "tilt of the sensor about its y axis, nose down (x forward), before the "
-                      "roll; if both are 0, the tilt is found in the first scan"});
+                      "tilt of the sensor about y, nose down (x forward), before the roll; both 0: "
+                      "found in the first scan"});
     visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-180, 180), "deg",
-                      "tilt of the sensor about its x axis, left side up"});
+                      "tilt of the sensor about x, left side up"});
     visitor(Parameter{"threads", self.threads, closed(1, 2), "threads",
-                      "2: two stages work at a time, with the same verdicts; a final verdict comes "
-                      "one scan later, unless it has no latency"});
+                      "2: two stages run in parallel, with the same verdicts; a final verdict "
+                      "comes one scan later, unless it has no latency"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
   }
 

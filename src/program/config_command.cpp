@@ -92,18 +92,20 @@ void print_markdown() {
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
     const std::string member = member_of(config, &section);
-    folded << "\n<details>\n<summary><code>" << member << "</code>: " << name
-           << "</summary>\n\n| name |" << columns << "|---|---|---|---|---|\n";
+    std::ostringstream others;
     using Section = std::remove_const_t<std::remove_reference_t<decltype(section)>>;
     Section::visit(section, [&](const auto& parameter) {
       const std::string cells = table_cells(parameter, values[parameter.name]);
       if (std::find(first.begin(), first.end(), std::string(parameter.name)) == first.end()) {
-        folded << "| `" << parameter.name << "` | " << cells;
+        others << "| `" << parameter.name << "` | " << cells;
       } else {
         rows[parameter.name] = "| `" + (member + '.') + parameter.name + "` | " + cells;
       }
     });
-    folded << "\n</details>\n";
+    if (others.str().empty()) return;
+    folded << "\n<details>\n<summary><code>" << member << "</code>: " << name
+           << "</summary>\n\n| name |" << columns << "|---|---|---|---|---|\n"
+           << others.str() << "\n</details>\n";
   });
   std::cout
       << "# Parameters\n\n"

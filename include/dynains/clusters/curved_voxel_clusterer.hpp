@@ -69,11 +69,11 @@ class CurvedVoxelClusterer {
       visitor(Parameter{"voxel_range", self.voxel_range, closed(0.05, 20), "m",
                         "depth of a curved voxel"});
       visitor(Parameter{"voxel_azimuth", self.voxel_azimuth, closed(0, 30), "deg",
-                        "width of a curved voxel; 0: from the sensor"});
+                        "width of a curved voxel; 0: by the sensor"});
       visitor(Parameter{"voxel_elevation", self.voxel_elevation, closed(0, 45), "deg",
-                        "height of a curved voxel; 0: from the sensor"});
+                        "height of a curved voxel; 0: by the sensor"});
       visitor(Parameter{"cluster_range", self.cluster_range, half_open_below(0, 1000), "m",
-                        "farther points belong to no cluster and stay static"});
+                        "farther points belong to no cluster and are static"});
     }
 
     /// Number of cells of the grid. The length of a row is padded to a power of two.

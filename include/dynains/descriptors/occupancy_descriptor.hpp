@@ -63,11 +63,12 @@ class OccupancyDescriptor {
       visitor(Parameter{"tau_s", self.tau_s, closed(0, 1), "",
                         "similarity below which a cluster is proposed as dynamic (Eq. 12)"});
       visitor(Parameter{"belief_cells", self.belief_cells, closed(1, 10), "",
-                        "size of the cells of the belief relative to the cells of the descriptor"});
-      visitor(Parameter{"ignored_low", self.ignored_low, closed(0, 0.9), "",
-                        "lowest share of an object of more than 1 m that no descriptor counts"});
+                        "cells of the belief relative to those of the descriptor"});
+      visitor(
+          Parameter{"ignored_low", self.ignored_low, closed(0, 0.9), "",
+                    "lowest ratio of the height of an object over 1 m that no descriptor counts"});
       visitor(Parameter{"bounds_of_ends", self.bounds_of_ends, Bounds(), "",
-                        "the descriptor spans the oldest and the newest observation alone"});
+                        "the descriptor spans only the oldest and the newest observation"});
     }
 
     /// Throws ConfigError.

@@ -64,17 +64,16 @@ struct FreeSpaceConfig {
                       "later scans that are used before a verdict is final"});
     visitor(Parameter{"lookback_scans", self.lookback_scans, closed(0, 200), "scans",
                       "earlier scans that are used as evidence"});
-    visitor(Parameter{
-        "reference_step", self.reference_step, closed(1, 10), "scans",
-        "distance between two reference scans; about 10 for those more than 30 scans back"});
+    visitor(Parameter{"reference_step", self.reference_step, closed(1, 10), "scans",
+                      "distance between references; about 10 for those more than 30 scans back"});
     visitor(Parameter{"evidence_range", self.evidence_range, closed(5, 300), "m",
                       "points at a larger horizontal range are not tested"});
     visitor(Parameter{"supervoxel", self.supervoxel, closed(0.1, 5), "m",
-                      "edge of the supervoxels, whose samples share a belief"});
+                      "edge of a supervoxel, whose samples share a belief"});
     visitor(Parameter{"supervoxel_samples", self.supervoxel_samples, closed(1, 56), "",
                       "maximum number of samples of a supervoxel"});
     visitor(Parameter{"ground_sample", self.ground_sample, closed(0.05, 2), "m",
-                      "edge of the voxels that have one ground sample each"});
+                      "edge of the voxels with one ground sample each"});
     visitor(Parameter{"margin", self.margin, closed(0.02, 2), "m",
                       "a beam passes a sample if its range is larger by at least this much"});
     visitor(Parameter{"margin_slope", self.margin_slope, closed(0, 0.1), "m/m",
@@ -83,8 +82,8 @@ struct FreeSpaceConfig {
         "lateral_margin", self.lateral_margin, closed(0, 1), "m",
         "no sample at a smaller lateral distance from a return, or in its 3x3 cells, is free"});
     visitor(Parameter{"pose_tolerance", self.pose_tolerance, closed(0, 1), "m",
-                      "poses that place static surfaces farther than this (rms) from earlier "
-                      "scans are corrected for comparisons; 0: never"});
+                      "poses that place static surfaces farther than this (rms) from earlier scans "
+                      "are corrected for comparisons; 0: never"});
     visitor(Parameter{"p_free", self.p_free, open(0.5, 1), "",
                       "update probability of a reference whose beams pass (as Eq. 18)"});
     visitor(Parameter{"p_hit", self.p_hit, open(0, 0.5), "",
@@ -97,11 +96,11 @@ struct FreeSpaceConfig {
                       "belief from which a supervoxel without hits was free (as Eq. 19)"});
     visitor(Parameter{"tau_contested", self.tau_contested, open(0.5, 1), "",
                       "belief from which a supervoxel with hits was free (as Eq. 19)"});
-    visitor(Parameter{"removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
-                      "ratio of free to decided samples along its track from which the whole "
-                      "instance is removed"});
+    visitor(Parameter{
+        "removal_ratio", self.removal_ratio, half_open_below(0, 1), "",
+        "ratio of free to decided samples of its track from which the whole instance is removed"});
     visitor(Parameter{"footprint", self.footprint, closed(0, 2), "m",
-                      "ground at a smaller distance from removed points is removed"});
+                      "ground nearer than this to removed points is removed"});
     visitor(Parameter{
         "footprint_rise", self.footprint_rise, closed(0, 1), "m",
         "ground in the footprint is removed only if it lies this much above the ground around"});
@@ -113,16 +112,15 @@ struct FreeSpaceConfig {
                       "longer instances are not tracked"});
     visitor(Parameter{"track_height", self.track_height, closed(0, 100), "m",
                       "higher instances are not tracked"});
-    visitor(
-        Parameter{"dynamic_grid_cell", self.dynamic_grid_cell, closed(0.1, 5), "m",
-                  "cells of the dynamic occupancy grid, which count dynamic and static samples"});
-    visitor(Parameter{"dynamic_grid_ratio", self.dynamic_grid_ratio, half_open_below(0, 1), "",
-                      "ratio of dynamic to all samples of a cell above which the others are "
-                      "removed, too; 1: never"});
+    visitor(Parameter{"dynamic_grid_cell", self.dynamic_grid_cell, closed(0.1, 5), "m",
+                      "cells that count dynamic and static samples"});
     visitor(Parameter{
-        "presume_dynamic", self.presume_dynamic, Bounds(), "",
-        "the zero-latency verdict removes compact instances at places without "
-        "earlier evidence, from the third scan of an epoch on; no effect with lookahead_scans 0"});
+        "dynamic_grid_ratio", self.dynamic_grid_ratio, half_open_below(0, 1), "",
+        "ratio of dynamic to all samples of a cell above which the others are removed; 1: never"});
+    visitor(
+        Parameter{"presume_dynamic", self.presume_dynamic, Bounds(), "",
+                  "without latency, compact instances in places without earlier evidence are "
+                  "removed, from the third scan of an epoch on; no effect with lookahead_scans 0"});
   }
 };
 

@@ -65,7 +65,7 @@ struct GroundConfig {
     visitor(Parameter{"ground_min_points", self.ground_min_points, closed(3, 1000), "",
                       "patches with fewer points are not ground"});
     visitor(Parameter{"ground_fit_points", self.ground_fit_points, closed(64, 1000000), "",
-                      "maximum number of points of a patch that its plane is fitted to"});
+                      "maximum number of points that the plane of a patch is fitted to"});
     visitor(Parameter{"ground_seed_margin", self.ground_seed_margin, half_open_below(0, 10), "m",
                       "height over the seeds up to which points enter the first fit"});
     visitor(Parameter{"ground_distance", self.ground_distance, half_open_below(0, 2), "m",
@@ -73,30 +73,30 @@ struct GroundConfig {
     visitor(Parameter{"ground_uprightness", self.ground_uprightness, closed(0, 1), "",
                       "smallest vertical component of a ground plane's normal"});
     visitor(Parameter{"ground_below", self.ground_below, closed(0, 10), "",
-                      "depth under the ground, as a ratio of sensor_height, from which points of "
-                      "the inner zone seed no plane"});
+                      "depth under the ground, in sensor heights, from which points of the inner "
+                      "zone seed no plane"});
     visitor(Parameter{"noise_depth", self.noise_depth, closed(0, 100), "",
-                      "points deeper under the sensor, as a ratio of sensor_height, are "
-                      "reflections and not judged (Patchwork); 0: all are judged"});
+                      "points deeper below the sensor, in sensor heights, are reflections and not "
+                      "judged (Patchwork); 0: all are judged"});
     visitor(Parameter{"ground_step", self.ground_step, closed(0, 100), "m",
-                      "a patch more than this above most of its neighbours is not ground, except "
-                      "in the outermost zone; 0: no such check"});
+                      "a patch higher than this above most of its neighbours is not ground, except "
+                      "in the outermost zone; 0: no check"});
     visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
                       "height over ground from which a patch of ring 1 must be flat"});
     visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 2 must be flat"});
+                      "the same for ring 2"});
     visitor(Parameter{"ground_elevation_3", self.ground_elevation[2], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 3 must be flat"});
+                      "the same for ring 3"});
     visitor(Parameter{"ground_elevation_4", self.ground_elevation[3], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 4 must be flat"});
+                      "the same for ring 4"});
     visitor(Parameter{"ground_flatness_1", self.ground_flatness[0], closed(0, 1), "",
                       "flatness below which a high patch of ring 1 is ground"});
     visitor(Parameter{"ground_flatness_2", self.ground_flatness[1], closed(0, 1), "",
-                      "flatness below which a high patch of ring 2 is ground"});
+                      "the same for ring 2"});
     visitor(Parameter{"ground_flatness_3", self.ground_flatness[2], closed(0, 1), "",
-                      "flatness below which a high patch of ring 3 is ground"});
+                      "the same for ring 3"});
     visitor(Parameter{"ground_flatness_4", self.ground_flatness[3], closed(0, 1), "",
-                      "flatness below which a high patch of ring 4 is ground"});
+                      "the same for ring 4"});
   }
 
   /// Throws ConfigError.
