@@ -5,8 +5,8 @@
 
 namespace dynains {
 
-/// Parameters of the free-space evidence, an extension of the paper. The help texts in `visit`
-/// describe the fields; docs/accuracy.md lists the tested ranges.
+/// Parameters of the free-space evidence, an extension of the paper (docs/algorithm.md). `visit`
+/// describes the fields.
 struct FreeSpaceConfig {
   int lookahead_scans = 30;
   int lookback_scans = 100;
