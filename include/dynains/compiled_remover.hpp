@@ -53,7 +53,9 @@ class BasicDynaInsRemover {
   /// Throws ConfigError.
   explicit BasicDynaInsRemover(const Config& config);
 
+  /// The parameters as given to the constructor.
   const Config& config() const { return pipeline().config(); }
+  /// The static map of all final verdicts, m, world frame (Eq. 1).
   const Map& map() const { return pipeline().map(); }
 
   /// Number of scans between a push and the final verdict on its scan.

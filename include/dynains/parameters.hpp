@@ -41,7 +41,7 @@ struct Bounds {
   }
 };
 
-/// [min, max], (min, max) and (min, max].
+/// The bounds [min, max], (min, max) and (min, max], in the unit of the parameter.
 constexpr Bounds closed(double min, double max) { return {min, max, false, false}; }
 constexpr Bounds open(double min, double max) { return {min, max, true, true}; }
 constexpr Bounds half_open_below(double min, double max) { return {min, max, true, false}; }

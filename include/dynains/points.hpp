@@ -80,8 +80,8 @@ struct PointsView {
 
 namespace detail {
 
-/// Largest integer that is not above `value`, which must be within the range of Int. std::floor()
-/// is a call without SSE4.1; of this, compilers make vectors.
+/// Largest integer that is not above `value`, which must be within the range of Int. Without
+/// SSE4.1, std::floor() is a function call, whereas compilers vectorize this code.
 template <class Int, class Real>
 Int floor_to(Real value) {
   const auto truncated = static_cast<Int>(value);
@@ -148,10 +148,13 @@ struct GroundSplit {
   std::size_t ground_count = 0;  ///< number of ground points
   std::size_t count = 0;         ///< number of all points; those behind them are not judged
 
+  /// Views of the ground points and of all other points, m, sensor frame; valid until the split
+  /// changes.
   PointsView ground() const { return PointsView(points).subview(0, ground_count); }
   PointsView non_ground() const {
     return PointsView(points).subview(ground_count, count - ground_count);
   }
+  /// Makes room for `size` points, with the padding. New points are not initialized.
   void resize(std::size_t size) {
     count = size;
     const std::size_t padded = size + detail::kPackWidth;

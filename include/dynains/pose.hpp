@@ -84,6 +84,7 @@ inline Pose rotated(const Pose& T_a_c, const Eigen::Matrix3d& R_b_c) {
   return T_a_b;
 }
 
+/// R_b_a, the inverse of the rotation R_a_b.
 inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) { return R.transpose(); }
 
 /// Covariance (row-major, 6 x 6) of an error e of a pose T_c_a, if `covariance` is that of an error
@@ -182,8 +183,8 @@ inline void validate_pose(const std::string& name, const Pose& T) {
   }
 }
 
-/// The pose of any transform or 4x4 matrix of Eigen, of float or double. Whoever takes the pose
-/// validates it.
+/// The pose of any transform or 4x4 matrix of Eigen, of float or double, m. Does not validate it:
+/// see validate_pose().
 inline Pose to_pose(const Pose& T_target_source) { return T_target_source; }
 template <class Derived>
 Pose to_pose(const Eigen::MatrixBase<Derived>& T_target_source) {

@@ -38,6 +38,7 @@ enum class Cause : std::uint8_t {
   kStands = 18,            ///< static: removed by the first pass, but it came to stay
 };
 
+/// Number of causes: they are 0 to kCauseCount - 1.
 inline constexpr std::size_t kCauseCount = 19;
 
 /// Whether a point with this cause is removed.
@@ -83,6 +84,7 @@ struct StageTimes {
     visitor("map", self.map);
   }
 
+  /// Sum of all stages, ms.
   double total() const {
     double result = 0.0;
     visit(*this, [&result](const char*, double milliseconds) { result += milliseconds; });
@@ -120,8 +122,8 @@ class NewestVerdictMaker {
 };
 }  // namespace detail
 
-/// The verdict on a pushed scan by it and earlier scans. It is made when it is first asked for, so
-/// that it costs nothing where nobody does.
+/// Verdict on a pushed scan from this scan and earlier ones. It is computed at the first call of
+/// operator(), so it costs nothing if it is not used.
 class NewestVerdict {
  public:
   NewestVerdict() = default;
@@ -130,8 +132,9 @@ class NewestVerdict {
     verdict_.scan = scan;
   }
 
-  /// The first call is one of the remover: it throws UsageError during another one and after the
-  /// next one, or std::bad_alloc. The spans are valid until the next call of the remover.
+  /// The first call counts as a call of the remover: it throws UsageError during another one, and
+  /// after the next push. It may throw std::bad_alloc. The spans are valid until the next call of
+  /// the remover.
   const ScanVerdict& operator()() const {
     if (maker_ != nullptr) verdict_ = maker_->newest_verdict(verdict_.scan);
     maker_ = nullptr;
@@ -159,7 +162,7 @@ struct PoseResidual {
   /// Exp(e). The pose of the previous scan is taken as exact.
   std::array<double, 36> covariance = {};
 
-  /// The previous scan: the last one that was taken. A push that threw is not.
+  /// The previous scan: the last push that did not throw.
   std::uint64_t previous_scan = 0;  ///< number of its push, as ScanVerdict::scan
   double previous_time = 0.0;       ///< s, as pushed
 
@@ -175,7 +178,7 @@ struct PoseResidual {
 enum class TimeDoubt : std::uint8_t {
   kNone,
   kTooSlow,  ///< all more than max_gap apart: no scan is compared. Milliseconds for seconds?
-  kTooFast   ///< all less than 1 ms apart: no LiDAR is as fast
+  kTooFast   ///< all less than 1 ms apart: faster than any LiDAR
 };
 
 /// Why a scan begins an epoch: it is not compared with earlier scans.

@@ -28,7 +28,7 @@ struct CityChanges {
 
 /// Changes of a tile from the map after session `a` to the map after session `b`, whose history has
 /// sessions 0 to `b`, or more: clusters of points in touching blocks that are objects, see
-/// docs/scale.md. Places that only one of both maps has seen are no changes.
+/// docs/scale.md. Space that only one of the two maps has seen is unchanged.
 CityChanges find_changes(const SessionGrid& grid, const TileHistory& history, std::uint32_t a,
                          std::uint32_t b);
 
@@ -48,7 +48,9 @@ class City {
   /// if `grid` is invalid, or if the city has another grid.
   static City open_or_make(const std::filesystem::path& folder, const SessionGrid& grid);
 
+  /// The folder CITY, as given.
   const std::filesystem::path& folder() const { return folder_; }
+  /// Voxels and tiles, equal for all sessions.
   const SessionGrid& grid() const { return grid_; }
   /// Path of the file of a session, whether or not it exists.
   std::filesystem::path session_file(const std::string& name) const {
@@ -75,7 +77,7 @@ class City {
   /// find_changes(). Throws ConfigError unless `a` is before `b`.
   CityChanges changes(const TileIndex& tile, std::uint32_t a, std::uint32_t b) const;
 
-  /// Removes one session. The map then has the bytes of a map without it.
+  /// Removes one session. The map is then the same, byte by byte, as without it.
   void drop(const std::string& name);
 
   /// Reads everything. Returns one message, with path and position, for each defect, and for each

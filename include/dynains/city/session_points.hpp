@@ -15,7 +15,7 @@
 namespace dynains {
 
 /// Collects the static points of the scans of one session. The first point of each voxel is kept.
-/// Tiles far from the sensor wait in a store, whose exceptions come out of all functions.
+/// Tiles far from the sensor are moved to a store. All functions throw IoError if it fails.
 class SessionPoints {
  public:
   /// `range`: m; farther points are not contributed. `store` outlives this. Throws ConfigError.

@@ -18,17 +18,18 @@ namespace dynains {
 class Folder;
 
 /// Takes the final verdicts of a session scan by scan, and adds the session to a city at once by
-/// commit(). Until prepare(), all data waits in a file without a name in the folder of the city.
+/// commit(). Until prepare(), an unnamed file in the folder of the city holds all data.
 /// Errors of files throw IoError.
 class SessionWriter {
  public:
   enum class Mode {
     kNew,     ///< the city has no session of this name
-    kReplace  ///< the city has one; commit() puts this one in its place in one step
+    kReplace  ///< the city has one; commit() replaces it atomically
   };
 
-  /// `session`: all but what is found here. Throws ConfigError for an invalid name, UsageError if
-  /// the city has a session of this name or of this fingerprint, IoError.
+  /// `session`: the fields before SessionInfo::grid; the writer sets the others. Throws ConfigError
+  /// for an invalid name, UsageError if the city has a session of this name or of this fingerprint,
+  /// IoError.
   SessionWriter(const City& city, SessionInfo session, Mode mode = Mode::kNew);
 
   /// Adds one scan. `points`: m, sensor frame. `verdicts`: final verdict by point. `labels`: label

@@ -130,7 +130,7 @@ class TileHistory {
   }
 
   /// Calls `visit(session, point)` for the points of the map after session number `last`: of each
-  /// voxel the point of the newest session that stands there. Points come in the order of sessions.
+  /// voxel that of the newest session that is still there. Points come in the order of sessions.
   template <class Visitor>
   void for_each_standing(std::uint32_t last, Visitor&& visit) const {
     const std::size_t count = std::min<std::size_t>(sessions_.size(), std::size_t{last} + 1);

@@ -31,8 +31,8 @@ class CurvedVoxelClusterer {
  public:
   struct Config {
     double voxel_range = 0.6;      ///< m
-    double voxel_azimuth = 0.0;    ///< deg, rounded to a divisor of 360; 0: from the sensor
-    double voxel_elevation = 0.0;  ///< deg; 0: from the sensor
+    double voxel_azimuth = 0.0;    ///< deg, rounded to a divisor of 360; 0: by the sensor
+    double voxel_elevation = 0.0;  ///< deg; 0: by the sensor
     double cluster_range = 90.0;   ///< m; points farther away have no cluster
 
     /// Voxels of the paper's public implementation.

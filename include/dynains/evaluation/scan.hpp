@@ -34,6 +34,7 @@ struct LabelledScan {
   Span<const std::uint8_t> causes;
 
   std::size_t size() const { return truth.size(); }
+  /// Point i < size(), m, sensor frame.
   Eigen::Vector3d point(std::size_t i) const {
     const float* p = xyz + i * stride;
     return {p[0], p[1], p[2]};

@@ -61,6 +61,7 @@ struct ClassScore {
   std::uint64_t points = 0;
   std::uint64_t points_kept = 0;
 
+  /// Number of points that are not in the map.
   std::uint64_t removed() const { return points - points_kept; }
 };
 

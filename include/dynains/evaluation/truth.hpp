@@ -26,6 +26,7 @@ constexpr std::array<const char*, 2> value_names(Unlabeled) { return {"ignore", 
 constexpr std::uint16_t semantic_class(std::uint32_t label) {
   return static_cast<std::uint16_t>(label & 0xffffU);
 }
+/// Instance id, 0 for none.
 constexpr std::uint16_t semantic_instance(std::uint32_t label) {
   return static_cast<std::uint16_t>(label >> 16U);
 }
@@ -36,12 +37,14 @@ class TruthClasses {
   /// Dynamic: SemanticKITTI's moving classes, 252 to 259, and 251 of its benchmark of
   /// moving object segmentation.
   TruthClasses() : TruthClasses(Unlabeled::kIgnore) {}
+  /// The same classes; `unlabeled` decides on points of the classes 0 and 1.
   explicit TruthClasses(Unlabeled unlabeled);
 
   /// `dynamic_classes`: ids and closed ranges separated by commas, for example "252-257,259".
   /// Throws ConfigError if the list is malformed, empty, or an id exceeds 65535.
   TruthClasses(std::string_view dynamic_classes, Unlabeled unlabeled);
 
+  /// Truth of a SemanticKITTI label word.
   Truth operator()(std::uint32_t label) const {
     const std::uint16_t id = semantic_class(label);
     if (dynamic_[id]) return Truth::kDynamic;

@@ -36,7 +36,7 @@ inline bool is_compared(int age, int spacing, int most, int above = 0) {
   return age > above && age <= most && lag != kReferenceLags.end() && *lag <= last;
 }
 
-/// Number of consecutive scans whose beams see a thing of 25 cm at 20 m, at least 1: one of a
+/// Number of consecutive scans whose beams see an object of 25 cm at 20 m, at least 1: one of a
 /// sensor with dense rows, several of one that is sparse or does not repeat its pattern. `most`:
 /// limit.
 inline int scans_to_see_things(const SensorModel& sensor, int most) {

@@ -34,8 +34,11 @@ void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
 
 /// Writers of this layout. Each file is replaced atomically; folders must exist. Scans and labels
-/// are not synchronized with the disk: see `sync_files()`. They throw IoError.
+/// are not synchronized with the disk: see `sync_files()`. All throw IoError.
+///
+/// `xyzi`: x y z intensity of each point, interleaved, m.
 void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
+/// `labels`: class in the lower, instance in the upper 16 bits.
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);
 /// `poses`: the poses P of poses.txt, equal to T_world_sensor without calib.txt.
 void write_poses(const std::filesystem::path& file, Span<const Pose> poses);

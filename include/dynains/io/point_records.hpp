@@ -39,6 +39,7 @@ class PointRecords {
  public:
   explicit PointRecords(const PointColumns& columns, bool is_pcd = false);
 
+  /// Appends one point.
   void add(const FilePoint& point);
   void clear() { bytes_.clear(); }
   Span<const char> bytes() const { return {bytes_.data(), bytes_.size()}; }

@@ -217,11 +217,14 @@ class Recording {
   /// All files of the recording: scans with and without a pose, poses, times, calibration, labels,
   /// and RecordingOptions::sources.
   std::vector<std::filesystem::path> files() const;
+  /// Number of scans with a pose; with RecordingOptions::without_poses, of all scans.
   std::size_t size() const { return contents_.scans.size(); }
   ScanFormat format() const { return contents_.format; }
+  /// Frame of the points in the files: kSensor or kWorld. read_scan() returns the sensor frame.
   PointFrame frame() const { return contents_.frame; }
   /// Columns of the first scan in addition to x y z.
   const PointColumns& columns() const { return contents_.columns; }
+  /// Whether the recording has labels.
   bool has_labels() const { return contents_.labels != LabelSource::kNone; }
   /// Whether scan i has labels: files of some scans may be missing.
   bool has_labels(std::size_t i) const;
@@ -240,11 +243,13 @@ class Recording {
 
   /// File name of scan i without extension.
   const std::string& name(std::size_t i) const { return contents_.scans.at(i).name; }
+  /// File with the points of scan i; for a log, the log.
   const std::filesystem::path& file(std::size_t i) const { return contents_.scans.at(i).file; }
   /// Name of scan i as a number if all names are numbers, else the index of its file.
   std::uint64_t number(std::size_t i) const { return contents_.scans.at(i).number; }
   /// Time of scan i, s, strictly increasing.
   double time(std::size_t i) const { return contents_.scans.at(i).time; }
+  /// Pose of the sensor at scan i, m.
   const Pose& T_world_sensor(std::size_t i) const { return contents_.scans.at(i).T_world_sensor; }
 
   /// Number of points of scan i, from the size of its file or from its header. Throws unless both
@@ -253,8 +258,9 @@ class Recording {
   /// Reads scan i, m, sensor frame, and reuses the memory of `scan`. May contain NaN and infinity.
   /// With RecordingOptions::deskew, the poses of the recording between the scans are interpolated
   /// at the time of each point; times of points keep their values. Points whose time cannot be that
-  /// of their scan keep their place. Points in RecordingOptions::self_boxes are at the origin.
+  /// of their scan are not moved. Points in RecordingOptions::self_boxes are at the origin.
   void read_scan(std::size_t i, RecordedScan& scan) const;
+  /// As above, as a new scan.
   RecordedScan read_scan(std::size_t i) const;
   /// For each point of scan i the seconds from the time of the scan until it was measured; NaN for
   /// points whose time cannot be that of their scan. Empty if scans are not to be de-skewed.
@@ -264,10 +270,10 @@ class Recording {
   /// for each scan. Other scans are left out.
   void take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor);
 
-  /// One label per point of scan i.
+  /// SemanticKITTI label of each point of scan i, class in the lower, instance in the upper half.
   std::vector<std::uint32_t> read_labels(std::size_t i) const;
 
-  /// The log of ROS, for those who copy it; null for other formats.
+  /// The log of ROS, to copy its messages; null for other formats.
   const LogScans* log() const;
   /// Index of scan i among the clouds of the log, or the files of scans, with and without a pose.
   std::size_t file_index(std::size_t i) const { return contents_.scans.at(i).index; }
@@ -281,11 +287,13 @@ class Recording {
   /// Pose of the sensor at `offset` (s) after the pose of scan i, by the times of the poses; empty
   /// without times and outside of the trajectory.
   std::optional<Pose> pose_after(std::size_t i, double offset) const;
+  /// Whether the rows of the pose file are quaternions; their order; whether there is a calib.txt.
   bool has_quaternions() const { return contents_.trajectory.order != QuaternionOrder::kNone; }
   QuaternionOrder quaternion_order() const { return contents_.trajectory.order; }
   bool has_calibration() const { return contents_.has_calibration; }
   /// Number of rows of the pose file.
   std::size_t pose_count() const { return contents_.trajectory.poses.size(); }
+  /// Number of clouds of the log or files of scans, with and without a pose.
   std::size_t scan_file_count() const { return contents_.matches.size(); }
   /// Number of scans that were excluded for lack of a pose.
   std::size_t missing_pose_count() const { return scan_file_count() - size(); }

@@ -39,7 +39,7 @@ enum class OdometryLoss : unsigned char {
   kNone,
   kFewPoints,  ///< too few points for a registration
   kNoOverlap,  ///< the scan does not fit to the map anywhere near the predicted pose
-  kGap         ///< scans are missing for longer than a motion can be predicted: the map begins anew
+  kGap         ///< scans are missing for longer than a motion can be predicted: a new map begins
 };
 
 constexpr std::array<const char*, 4> value_names(OdometryLoss) {
@@ -49,8 +49,8 @@ constexpr std::array<const char*, 4> value_names(OdometryLoss) {
 
 /// Result of one push.
 struct OdometryResult {
-  /// At the stamp, in the frame of the first scan at its stamp, or of the poses of another
-  /// odometry, whose first pose stays. After a loss: the predicted pose.
+  /// Pose at the stamp, m, in the frame of the first scan at its stamp, or of the other odometry,
+  /// whose first pose is kept. After a loss: the predicted pose.
   Pose T_world_sensor = Pose::Identity();
   OdometryLoss loss = OdometryLoss::kNone;
   double fit = 1.0;  ///< mean weight of the points at planes and poles of the map, [0, 1]
@@ -83,20 +83,21 @@ class Odometry {
   /// Takes the next scan: any cloud with PointCloudTraits, in m, sensor frame; NaN, infinity and
   /// the origin are no returns. Points of several sensors are in one frame, each as measured at its
   /// time. `offsets`: for each point the seconds from `time` (s) until it was
-  /// measured, or none if the points are all of one time; a point without a finite offset keeps its
-  /// place. Throws CloudError if the numbers of offsets and points differ, and PoseError if the
+  /// measured, or none if the points are all of one time; a point without a finite offset is not
+  /// moved. Throws CloudError if the numbers of offsets and points differ, and PoseError if the
   /// mean time of the points is not after that of the scan before; the state is then unchanged. A
-  /// lost scan does not enter the map, which the next ones are registered to, until a gap: then the
-  /// predicted motion stays, and the map begins anew.
+  /// lost scan does not enter the map, and the next scans are registered to the same map. After a
+  /// gap (OdometryLoss::kGap), the predicted motion is kept, and a new map begins.
   template <class Cloud>
   OdometryResult push(const Cloud& cloud, Span<const double> offsets, double time) {
     return register_scan(detail::CloudView(cloud), offsets, time, std::nullopt);
   }
 
   /// As above, behind another odometry: its motions replace the prediction at constant velocity, so
-  /// they stay along directions that the surfaces do not determine. `T_odometry_sensor`: its pose
-  /// of the sensor, without corrections, always at the same time within a scan. If the scan is
-  /// lost, its motion stays, and the map begins anew unless the points are too few.
+  /// they are kept along directions that the surfaces do not determine. `T_odometry_sensor`: its
+  /// pose of the sensor, m, without corrections, always at the same time within a scan. If the scan
+  /// is lost, its motion is kept, and a new map begins unless the points are too few. Also throws
+  /// PoseError for a pose that is not rigid.
   template <class Cloud, class PoseLike>
   OdometryResult push(const Cloud& cloud, Span<const double> offsets, double time,
                       const PoseLike& T_odometry_sensor) {

@@ -1,4 +1,4 @@
-// Tiles of a recording. Those that are far from the sensor wait in a store.
+// Tiles of a recording. Those far from the sensor are moved to a store.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Places of a recording, and what all of its scans saw of them.
+// Places of a recording, and the evidence of all its scans on them.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -317,7 +317,7 @@ class RecordingPlaces {
               if (place != nullptr && place->was_hit) contacts.insert(key);
             });
           }
-          // What more unchanged places touch than it has itself is a part of them.
+          // An object that touches more unchanged places than it has itself is a part of them.
           if (members.size() < 6 || 2 * contacts.size() > 3 * members.size()) return;
           for (const std::uint32_t member : members) {
             const Place& place = found.values[member];

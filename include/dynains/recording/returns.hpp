@@ -48,7 +48,7 @@ struct ReturnToPlace {
 /// the surfaces do not determine whether it fits.
 class Returns {
  public:
-  /// Points of the scans wait in `store`, which outlives this. `evidence`: of the first pass.
+  /// `store` holds points of the scans and must outlive this object. `evidence`: of the first pass.
   Returns(ByteStore& store, const FreeSpaceConfig& evidence)
       : store_(store),
         compared_(1 +
@@ -90,7 +90,7 @@ class Returns {
   std::vector<KeyScan> keys_;
   std::vector<const KeyScan*> near_;  // of one visit, the nearest one first
   std::vector<ReturnToPlace> found_;
-  GroundSplit kept_;  // points of the newest key scan that stand
+  GroundSplit kept_;  // static points of the newest key scan
   std::vector<std::uint8_t> bytes_;
   detail::AlignmentPoints selected_{0.0, 0.0};  // of these
 };

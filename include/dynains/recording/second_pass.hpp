@@ -18,16 +18,16 @@ namespace dynains {
 
 /// The first pass (DynaInsRemover) judges a scan by the scans around it, the second pass by all
 /// scans of its visit (see Returns), under the poses by which the first pass compared them
-/// (ScanVerdict::compared). Verdicts of the first pass stay in a visit that is short enough for it
-/// to have compared all scans, and in a visit with suspicious scans (see Plausibility).
+/// (ScanVerdict::compared). Verdicts of the first pass are kept in a visit so short that the first
+/// pass has compared all of its scans, and in a visit with suspicious scans (see Plausibility).
 ///
 /// Give all scans with their first verdicts to add(), call test(), and give all scans again to
-/// revise(), in the same order. One thread at a time. All functions throw the exceptions of the
-/// store.
+/// revise(), in the same order. One thread at a time. All functions throw IoError if the
+/// store fails.
 class SecondPass {
  public:
-  /// References, and places and ground far from the sensor, wait in `store`, which outlives this.
-  /// Throws ConfigError.
+  /// `store` holds references, and places and ground far from the sensor; it must outlive this
+  /// object. Throws ConfigError.
   explicit SecondPass(ByteStore& store, const SecondPassConfig& config = {});
 
   /// Takes the first verdict on a scan, in the order of the scans: FrameResult::finished. `points`:
@@ -47,8 +47,9 @@ class SecondPass {
   const std::vector<ReturnToPlace>& returns() const { return returns_.found(); }
   /// Whether test() was completed.
   bool is_decided() const { return is_decided_; }
+  /// Number of tested places (cubes of 0.4 m); 0 before test().
   std::size_t place_count() const { return places_; }
-  /// By revise().
+  /// Numbers of points that revise() has removed and restored so far.
   const RevisedPoints& revised() const { return revised_; }
 
  private:

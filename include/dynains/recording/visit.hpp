@@ -38,11 +38,11 @@ struct RevisedPoints {
 
 /// Scans whose poses fit to each other. All of them test the places of their points above the
 /// ground. Points of objects that came or left are removed (see RecordingPlaces), removed ground is
-/// restored. Scans of the visit are numbered from 0. Functions throw the exceptions of the store.
+/// restored. Scans of the visit are numbered from 0. Functions throw IoError if the store fails.
 class Visit {
  public:
-  /// Packed references, and places and ground far from the sensor, wait in `store`, which outlives
-  /// this.
+  /// `store` holds packed references, and places and ground far from the sensor; it must outlive
+  /// this object.
   Visit(ByteStore& store, const SecondPassConfig& config);
 
   /// Takes the next scan with its first verdict. `points`: m, sensor frame, all of the scan.

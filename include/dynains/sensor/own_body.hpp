@@ -169,7 +169,7 @@ inline double reach_of_body(std::vector<SteadyReturn> candidates) {
 
 }  // namespace detail
 
-/// Finds the returns of the own body: near ones that keep their place in the sensor frame while the
+/// Finds the returns of the own body: near ones that are constant in the sensor frame while the
 /// sensor moves. `scans`: m, sensor frame, finite points; at least 8 scans of a drive of several
 /// metres, with turns if possible. While the sensor stands still, everything near it is taken for
 /// the body. The body is assumed to end 4.5 m from the sensor, to be 0.4 m above the
