@@ -78,7 +78,7 @@ std::string table_cells(const Parameter& parameter, const std::string& values) {
   for (std::size_t at = 0; (at = range.find('|', at)) != std::string::npos;) {
     range.replace(at, 1, ", ");
   }
-  return values + " | " + range + " | " + unit + " | " + parameter.help + " |\n";
+  return values + " | " + range + " | " + unit + " | " + parameter.help + '\n';
 }
 
 // The parameters in the documentation: the ones that users change first, then the rest, folded.
@@ -88,7 +88,8 @@ void print_markdown() {
       "mounting_roll", "max_gap",   "lookahead_scans", "pose_tolerance", "threads"};
   std::map<std::string, std::string> values = describe_values(), rows;
   std::ostringstream folded;
-  const std::string columns = " default (by preset) | range | unit | meaning |\n";
+  const std::string header =
+      "\n\nname | default (by preset) | range | unit | meaning\n---|---|---|---|---\n";
   const DynaInsRemover::Config config;
   DynaInsRemover::Config::visit_sections(config, [&](const char* name, const auto& section) {
     const std::string member = member_of(config, &section);
@@ -97,15 +98,14 @@ void print_markdown() {
     Section::visit(section, [&](const auto& parameter) {
       const std::string cells = table_cells(parameter, values[parameter.name]);
       if (std::find(first.begin(), first.end(), std::string(parameter.name)) == first.end()) {
-        others << "| `" << parameter.name << "` | " << cells;
+        others << '`' << parameter.name << "` | " << cells;
       } else {
-        rows[parameter.name] = "| `" + (member + '.') + parameter.name + "` | " + cells;
+        rows[parameter.name] = '`' + (member + '.') + parameter.name + "` | " + cells;
       }
     });
     if (others.str().empty()) return;
-    folded << "\n<details>\n<summary><code>" << member << "</code>: " << name
-           << "</summary>\n\n| name |" << columns << "|---|---|---|---|---|\n"
-           << others.str() << "\n</details>\n";
+    folded << "\n<details>\n<summary><code>" << member << "</code>: " << name << "</summary>"
+           << header << others.str() << "\n</details>\n";
   });
   std::cout
       << "# Parameters\n\n"
@@ -113,8 +113,8 @@ void print_markdown() {
          "file with hyphens\n(`--map-voxel 0.1`), in C++ a field of the member shown "
          "(`config.map.map_voxel`), in Python a field of the configuration\n(`config.map_voxel`). "
          "`dynains config > my.cfg` prints a file for `--config my.cfg`.\n\n"
-         "## Parameters that users change first\n\n| name |"
-      << columns << "|---|---|---|---|---|\n";
+         "## Parameters that users change first"
+      << header;
   for (const char* name : first) std::cout << rows.at(name);
   std::cout << "\n## All others, by member of the configuration\n" << folded.str();
 }
