@@ -82,21 +82,21 @@ struct GroundConfig {
                       "a patch higher than this above most of its neighbours is not ground, except "
                       "in the outermost zone; 0: no check"});
     visitor(Parameter{"ground_elevation_1", self.ground_elevation[0], closed(-100, 100), "m",
-                      "height over ground from which a patch of ring 1 must be flat"});
+                      "height over ground from which ring 1 must be flat"});
     visitor(Parameter{"ground_elevation_2", self.ground_elevation[1], closed(-100, 100), "m",
-                      "the same for ring 2"});
+                      "height over ground from which ring 2 must be flat"});
     visitor(Parameter{"ground_elevation_3", self.ground_elevation[2], closed(-100, 100), "m",
-                      "the same for ring 3"});
+                      "height over ground from which ring 3 must be flat"});
     visitor(Parameter{"ground_elevation_4", self.ground_elevation[3], closed(-100, 100), "m",
-                      "the same for ring 4"});
+                      "height over ground from which ring 4 must be flat"});
     visitor(Parameter{"ground_flatness_1", self.ground_flatness[0], closed(0, 1), "",
-                      "flatness below which a high patch of ring 1 is ground"});
+                      "flatness below which high patches of ring 1 are ground"});
     visitor(Parameter{"ground_flatness_2", self.ground_flatness[1], closed(0, 1), "",
-                      "the same for ring 2"});
+                      "flatness below which high patches of ring 2 are ground"});
     visitor(Parameter{"ground_flatness_3", self.ground_flatness[2], closed(0, 1), "",
-                      "the same for ring 3"});
+                      "flatness below which high patches of ring 3 are ground"});
     visitor(Parameter{"ground_flatness_4", self.ground_flatness[3], closed(0, 1), "",
-                      "the same for ring 4"});
+                      "flatness below which high patches of ring 4 are ground"});
   }
 
   /// Throws ConfigError.
