@@ -1,5 +1,6 @@
 # Runs the commands of docs/tutorial.md in a folder of their own. Each line of output that the page
-# shows is printed; numbers may differ. Each message of the table is one of the program.
+# shows is printed; numbers may differ. Each message of the table is one of the program. docs/results.md
+# shows the fields of the report, and all of them.
 cmake_minimum_required(VERSION 3.16)
 get_filename_component(programs ${PROGRAM} DIRECTORY)
 set(ENV{PATH} "${programs}:$ENV{PATH}")
@@ -53,6 +54,29 @@ while(language)
 endwhile()
 if(commands LESS 4 OR lines LESS 20)
   message(FATAL_ERROR "the tutorial has ${commands} commands and ${lines} lines of output")
+endif()
+
+# `sensors` and `written` are in the reports of other runs.
+file(READ ${WORK_DIR}/cleaned/report.json report)
+file(READ ${SOURCE_DIR}/docs/results.md results)
+string(REGEX MATCH "```jsonc\n[^`]*```" shown "${results}")
+string(REGEX MATCHALL "\"[a-z_0-9]+\":" fields "${shown}")
+list(REMOVE_ITEM fields "\"sensors\":" "\"written\":")
+string(REGEX MATCHALL "\n  \"[a-z_]+\":" sections "${report}")
+foreach(field IN LISTS fields)
+  string(FIND "${report}" "${field}" at)
+  if(at EQUAL -1)
+    message(SEND_ERROR "docs/results.md shows ${field}, which is not in report.json")
+  endif()
+endforeach()
+foreach(section IN LISTS sections)
+  string(STRIP "${section}" section)
+  if(NOT section IN_LIST fields)
+    message(SEND_ERROR "docs/results.md does not show ${section} of report.json")
+  endif()
+endforeach()
+if(fields STREQUAL "" OR sections STREQUAL "")
+  message(FATAL_ERROR "no fields of report.json were found")
 endif()
 
 file(GLOB_RECURSE sources ${SOURCE_DIR}/src/*.cpp ${SOURCE_DIR}/src/*.hpp)
