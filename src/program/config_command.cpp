@@ -72,8 +72,8 @@ std::map<std::string, std::string> describe_values() {
 template <class Parameter>
 std::string table_cells(const Parameter& parameter, const std::string& values) {
   std::string range = describe_range(parameter);
-  const std::string unit = parameter.unit, number = "FLOAT in ";
-  if (range.rfind(number, 0) == 0) range.erase(0, number.size());
+  const std::string unit = parameter.unit, type = " in ";  // FLOAT in, INT in
+  if (const auto at = range.find(type); at != std::string::npos) range.erase(0, at + type.size());
   if (!unit.empty()) range.erase(range.size() - unit.size() - 1);
   for (std::size_t at = 0; (at = range.find('|', at)) != std::string::npos;) {
     range.replace(at, 1, ", ");
