@@ -16,6 +16,7 @@
 #include "landmarks.hpp"
 #include "openings.hpp"
 #include "pose_fit.hpp"
+#include "ray_origin.hpp"
 #include "readings.hpp"
 #include "scan_registration.hpp"
 
@@ -519,15 +520,18 @@ bool halves_error(const Recording& recording, const Diagnosis& d) {
 
 Diagnosis diagnose(const Recording& recording, std::size_t pairs) {
   Diagnosis d = diagnose_as_opened(recording, pairs);
-  const bool agrees = (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) &&
-                      !has_wrong_origin(recording);
+  const auto ray_origin = other_ray_origin(recording);
+  const bool agrees =
+      (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) && !ray_origin;
   if (agrees && (!recording.columns().time || recording.is_deskewed())) return d;
-  for (const RecordingOptions& options : other_options(recording)) {
+  for (const RecordingOptions& options : other_options(recording, ray_origin)) {
     if (agrees && !options.deskew) continue;
     try {
       const Recording other(recording.folder(), options);
       if (agrees && !halves_error(other, d)) continue;
-      if (diagnose_as_opened(other, pairs).verdict != PoseVerdict::kAgree) continue;
+      const PoseVerdict verdict = diagnose_as_opened(other, pairs).verdict;
+      const bool is_seen = ray_origin && verdict == PoseVerdict::kNoMotion;  // whatever poses mean
+      if (verdict != PoseVerdict::kAgree && !is_seen) continue;
     } catch (const IoError&) {
       continue;  // it cannot be opened in this way
     }

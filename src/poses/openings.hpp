@@ -1,6 +1,7 @@
 // Other options under which the points of a recording may be read.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 
@@ -12,12 +13,10 @@ namespace dynains {
 /// if the sensor stays within `min_way` (m) of its first place. Throws IoError.
 std::optional<bool> follow_sensor(const Recording& recording, double min_way);
 
-/// Whether beams meet clearly better in the origin of the clouds than in the given position of the
-/// sensor. Throws IoError.
-bool has_wrong_origin(const Recording& recording);
-
 /// Other ways to read the points of a recording that does not agree: de-skewed or not, in the frame
-/// of the sensor or of the world, or with rays from the origin. Throws IoError.
-std::vector<RecordingOptions> other_options(const Recording& recording);
+/// of the sensor or of the world, or with rays from `ray_origin` (m, frame of the clouds in the
+/// files). Throws IoError.
+std::vector<RecordingOptions> other_options(const Recording& recording,
+                                            const std::optional<Eigen::Vector3d>& ray_origin);
 
 }  // namespace dynains

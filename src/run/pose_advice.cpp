@@ -38,7 +38,11 @@ std::string text_of(const TextParameter<T, Read>& setting) {
   } else if constexpr (std::is_same_v<Value, Pose>) {
     return '"' + extrinsic_text(setting.value) + '"';
   } else if constexpr (std::is_same_v<Value, Eigen::Vector3d>) {
-    return setting.value.isZero(0.0) ? "false" : "true";
+    if (setting.value.isZero(0.0)) return "false";
+    std::string text;
+    for (const double place : setting.value)
+      text += (text.empty() ? "\"" : " ") + format_value(place);
+    return text + '"';
   } else {
     return {};
   }
@@ -73,7 +77,10 @@ Changes changes_of(const Recording& recording, const RecordingOptions& proposal)
 
 std::string text_on_proposal(const Recording& recording, const Diagnosis& d) {
   const Changes changes = changes_of(recording, d.proposal);
-  std::string text = "Scans agree under other options (" + changes.meaning + ')';
+  const bool has_origin = d.proposal.sensor_origin != recording.options().sensor_origin;
+  std::string text = has_origin ? "Beams do not begin at the origin of the scans"
+                                : "Scans agree under other options";
+  text += " (" + changes.meaning + ')';
   if (!changes.left_out.empty()) text += ": leave out " + changes.left_out;
   if (!changes.flags.empty())
     text += (changes.left_out.empty() ? ": pass " : ", pass ") + changes.flags;

@@ -187,12 +187,26 @@ TEST_CASE("Right poses in a smooth corridor are sound, and those that leave it a
   CHECK_FALSE(diagnose(Recording(folder.path())).sound());
 }
 
-TEST_CASE("The right origin of clouds in a frame on a level floor is kept") {
+TEST_CASE("The origin of clouds in another frame is measured from their beams, a right one kept") {
   const TemporaryFolder folder;
-  write_box(folder.path(), {14.0, 11.0, 3.2}, 0.1, true);
+  const bool is_on_floor = GENERATE(true, false);
+  const double step = GENERATE(0.1, 0.0);  // m
+  write_box(folder.path(), {14.0, 11.0, 3.2}, step, is_on_floor);
   RecordingOptions options;
-  options.sensor_origin = Eigen::Vector3d(0.0, 0.0, 0.8);
-  CHECK(diagnose(Recording(folder.path(), options)).verdict == PoseVerdict::kAgree);
+  const Eigen::Vector3d right(0.0, 0.0, is_on_floor ? 0.8 : 0.0);
+  for (const double height : {0.0, 0.8, 1.6}) {
+    options.sensor_origin = Eigen::Vector3d(0.0, 0.0, height);
+    const Diagnosis d = diagnose(Recording(folder.path(), options));
+    const bool is_right = height == right.z();
+    CHECK(d.sound() == is_right);
+    CHECK((d.proposal.sensor_origin - right).norm() < 0.02);
+  }
+}
+
+TEST_CASE("Clouds without rings, of one time or not, say nothing of the origin of their beams") {
+  const auto sensor = GENERATE(simulation::Sensor::kMid360, simulation::Sensor::kLivox);
+  const Drive drive(drive_of(simulation::Scene::kUrban, sensor, 12, 5));
+  CHECK(diagnose(Recording(drive.path())).proposal.sensor_origin.isZero(0.0));
 }
 
 TEST_CASE("A plane that contains the beam through it is no surface") {
