@@ -16,6 +16,7 @@
 #include "pose_advice.hpp"
 #include "poses/landmarks.hpp"
 #include "poses/pose_fit.hpp"
+#include "poses/ray_origin.hpp"
 
 namespace dynains::program {
 namespace {
@@ -24,7 +25,7 @@ namespace {
 void check_poses(const Recording& recording, StartCheck& result) {
   const bool is_usual =
       recording.frame() == PointFrame::kSensor && recording.sensor_origin().isZero(0.0);
-  if (is_usual && are_poses_exact(recording)) return;
+  if (is_usual && are_poses_exact(recording) && !other_ray_origin(recording)) return;
   Diagnosis d = diagnose(recording, /*pairs=*/3);
   if (d.verdict == PoseVerdict::kUnknown) d = diagnose(recording);  // the places may be empty
   if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;

@@ -281,11 +281,22 @@ TEST_CASE("check and run propose the mounting of a sensor that lies on its side"
   CHECK_THAT(told, !ContainsSubstring("no option is needed"));
   CHECK_THAT(drive.run().err, ContainsSubstring("tilted by 60 deg: pass --mounting-pitch "));
   CHECK(drive.run({"--mounting-pitch", "60"}).err.empty());
+}
+
+TEST_CASE("run refuses clouds in the frame of a body, and names where their beams begin") {
   const Drive body;  // on the ground
   body.move_points([](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
     return Eigen::Vector3d(p + Eigen::Vector3d(1.0, 0.0, 1.8));
   });
-  CHECK_THAT(body.run().err, ContainsSubstring("frame of a body: --sensor-origin"));
+  const Outcome refused = body.run();
+  CHECK(refused.code == 2);
+  const std::string flag = "pass --sensor-origin \"";
+  const std::size_t at = refused.err.find(flag);
+  REQUIRE(at != std::string::npos);
+  std::istringstream origin(refused.err.substr(at + flag.size()));
+  double x = 0.0, y = 0.0, z = 0.0;
+  REQUIRE(origin >> x >> y >> z);
+  CHECK((Eigen::Vector3d(x, y, z) - Eigen::Vector3d(1.0, 0.0, 1.8)).norm() < 0.05);
 }
 
 TEST_CASE("check names ways of the poses that are too long, and the factor") {
