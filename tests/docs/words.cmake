@@ -1,0 +1,17 @@
+# README.md and the pages in docs/ have at most 16,000 words outside of blocks of code.
+cmake_minimum_required(VERSION 3.16)
+set(max_words 16000)
+file(GLOB pages ${SOURCE_DIR}/README.md ${SOURCE_DIR}/docs/*.md)
+set(count 0)
+foreach(page IN LISTS pages)
+  file(READ ${page} text)
+  # Brackets and semicolons have a meaning in lists; bars divide the cells of tables.
+  string(REGEX REPLACE "[][;]" "" text "${text}")
+  string(REGEX REPLACE "```[^`]*```" "" text "${text}")
+  string(REGEX MATCHALL "[^ \n|]+" words "${text}")
+  list(LENGTH words of_page)
+  math(EXPR count "${count} + ${of_page}")
+endforeach()
+if(count EQUAL 0 OR count GREATER max_words)
+  message(FATAL_ERROR "the pages have ${count} words, at most ${max_words} are wanted")
+endif()
