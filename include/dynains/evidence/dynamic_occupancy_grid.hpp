@@ -19,7 +19,7 @@ namespace dynains::detail {
 /// Counts dynamic and static samples per cell of the world. In cells where nearly all samples are
 /// dynamic, the remaining samples become dynamic, too. Reason: in a crowd, pedestrians occlude each
 /// other, so few reference scans have free samples, and later hits in a cell often come from
-/// another pedestrian.
+/// another pedestrian. Compare Dynablox (Schmid et al., RA-L 8(10), 2023).
 ///
 /// The number of cells is bounded: a new cell replaces the cell with the oldest sample.
 class DynamicOccupancyGrid {

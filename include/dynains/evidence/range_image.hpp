@@ -1,4 +1,5 @@
-// Range image of a scan: ranges of its returns by direction.
+// Range image of a scan: ranges of its returns by direction (Pomerleau et al., ICRA 2014; nearest
+// return of a neighbourhood as in Kim and Kim, Remove, then Revert, IROS 2020).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Alignment of a scan with planes: Gauss-Newton steps on point-to-plane distances.
+// Alignment of a scan with planes: Gauss-Newton steps on point-to-plane distances (Chen and
+// Medioni, Image Vision Comput. 10(3), 1992).
 #pragma once
 
 #include <Eigen/Geometry>

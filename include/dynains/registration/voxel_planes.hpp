@@ -1,4 +1,5 @@
-// Planes of the static world in voxels around the sensor.
+// Planes of the static world in voxels around the sensor, from the moments of their points
+// (Magnusson, The three-dimensional normal-distributions transform, Orebro 2009).
 #pragma once
 
 #include <Eigen/Geometry>
