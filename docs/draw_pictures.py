@@ -357,10 +357,10 @@ def draw_page(workshop):
 
 
 def draw_grid(workshop):
-    """The occupancy grid of a street, of all points and without what moved."""
+    """The occupancy grid of a street, of all points and without moving ones."""
     results = workshop.street().results
     figure, axes = plt.subplots(1, 2, figsize=(10.2, 3.2))
-    for panel, name, flags in ((axes[0], "with what moved", ["--keep-moving"]), (axes[1], "static", [])):
+    for panel, name, flags in ((axes[0], "all points", ["--keep-moving"]), (axes[1], "static points", [])):
         file = workshop.work / f"grid_{len(flags)}.yaml"
         workshop.dynains("grid", results, "--out", file, "--resolution", "0.1", "--force", "-q", *flags)
         image = np.array(Image.open(file.with_suffix(".pgm")))
