@@ -405,7 +405,7 @@ TEST_CASE("a scan is not tested against its own beams in a reference of several 
   points.push_back(5.0F, 0.0F, 0.0F);
   points.push_back(10.0F, 0.0F, 0.0F);
   points.grow(2 + detail::kPackWidth);
-  ReferenceTest memory;
+  Visibility memory;
   for (const std::uint64_t scan : {0U, 1U, 2U}) {
     const Visibility& visibility =
         views.test(points, 2, scan, Eigen::Isometry3d::Identity(), views.newest(), memory);
@@ -473,7 +473,7 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     points.push_back(newest, 0.0F, 0.0F);
     points.push_back(newest + 2.0F, 0.0F, 0.0F);
     points.grow(3 + detail::kPackWidth);
-    detail::ReferenceTest memory;
+    detail::Visibility memory;
     const detail::Visibility& visibility =
         views.test(points, 3, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);
     CHECK(visibility.bits(0, 3).free == 1);

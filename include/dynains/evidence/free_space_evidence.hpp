@@ -242,7 +242,7 @@ class FreeSpaceEvidence {
 
   // Tests all samples of scan number `scan` against one reference. `memory`: of the thread.
   void test(std::uint64_t scan, Record& record, const detail::ReferenceScan& reference,
-            detail::ReferenceTest& memory) const {
+            detail::Visibility& memory) const {
     record.ground.add(references_.test(record.ground.points, record.ground.size(), scan,
                                        record.T_world_sensor, reference, memory));
     detail::InstanceEvidence& evidence = record.evidence;
@@ -346,7 +346,7 @@ class FreeSpaceEvidence {
   detail::GroundSampler ground_sampler_;
   detail::ReferenceScans references_;
   detail::InstanceBeliefUpdater updater_;
-  detail::ReferenceTest newest_test_, older_test_;
+  detail::Visibility newest_test_, older_test_;  // of each thread
   Background* other_ = nullptr;
   detail::InstanceLinker linker_;
   detail::InstanceJudge judge_;

@@ -106,12 +106,6 @@ struct ReferenceScan {
   std::size_t count = 0;             ///< of the views that have images
 };
 
-/// Visibility of samples from a reference, with working memory.
-struct ReferenceTest {
-  Visibility all;      ///< of all views: each sample is judged once
-  Visibility of_view;  ///< of one of several
-};
-
 /// The reference scans that are still needed, see ReferenceSpan. The first scan of each epoch, and
 /// every scan that is a multiple of ReferenceSpan::step scans after it, is a reference.
 class ReferenceScans {
@@ -198,26 +192,24 @@ class ReferenceScans {
     return nullptr;
   }
 
-  /// Visibility of the first `count` points (m; padded for packs) of scan number `scan` from a
-  /// reference, held by `out`. If it has several scans, this scan and the adjacent ones are not
-  /// used.
+  /// Replaces `out` by the visibility of the first `count` points (m; padded for packs) of scan
+  /// number `scan` from a reference. If it has several scans, this scan and the adjacent ones are
+  /// not used.
   const Visibility& test(const PointBuffer& points, std::size_t count, std::uint64_t scan,
                          const Pose& T_world_points, const ReferenceScan& reference,
-                         ReferenceTest& out) const {
+                         Visibility& out) const {
+    out.clear(count);
     std::size_t tested = 0;
     for (std::size_t i = 0; i < reference.count; ++i) {
       const ReferenceView& view = reference.views[i];
       if (scans_ > 1 && view.scan <= scan + 1 && scan <= view.scan + 1) continue;
-      Visibility& visibility = tested == 0 ? out.all : out.of_view;
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
-      test_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
-                      static_cast<float>(config_.margin_slope), visibility);
-      if (tested > 0) out.all.add(out.of_view, count);
+      add_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
+                     static_cast<float>(config_.margin_slope), out);
       ++tested;
     }
-    if (tested == 0) out.all.clear(count);
-    if (tested > 1) out.all.settle(count);
-    return out.all;
+    if (tested > 1) out.settle(count);
+    return out;
   }
 
  private:

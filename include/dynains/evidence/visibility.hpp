@@ -34,8 +34,9 @@ class Visibility {
   /// Sets the bits of `count` samples to "unknown".
   void clear(std::size_t count) {
     resize(count);
-    std::fill(free_.begin(), free_.end(), std::uint8_t{0});
-    std::fill(hit_.begin(), hit_.end(), std::uint8_t{0});
+    const auto bytes = static_cast<std::ptrdiff_t>((count + 7) / 8);
+    std::fill(free_.begin(), free_.begin() + bytes, std::uint8_t{0});
+    std::fill(hit_.begin(), hit_.begin() + bytes, std::uint8_t{0});
   }
   /// Storage of the bits: one byte per eight samples.
   struct Bytes {
@@ -44,14 +45,6 @@ class Visibility {
   };
   Bytes bytes() { return {free_.data(), hit_.data()}; }
 
-  /// Adds what another view of the same reference sees of the first `count` samples. A sample may
-  /// become both "free" and "hit": call settle() after the last view.
-  void add(const Visibility& view, std::size_t count) {
-    for (std::size_t i = 0; i < (count + 7) / 8; ++i) {
-      free_[i] = static_cast<std::uint8_t>(free_[i] | view.free_[i]);
-      hit_[i] = static_cast<std::uint8_t>(hit_[i] | view.hit_[i]);
-    }
-  }
   /// A sample that one view hits is no longer free: beams of the others pass beside it.
   void settle(std::size_t count) {
     for (std::size_t i = 0; i < (count + 7) / 8; ++i) {
@@ -109,118 +102,169 @@ class Visibility {
   std::vector<std::uint8_t> free_, hit_;
 };
 
-/// Largest lateral distance (m) from a sample to a beam that passes it: the error of poses and
-/// points, and the width of a beam at its range.
-struct BeamReach {
-  static constexpr float kMin = 0.05F;     ///< m
-  static constexpr float kSlope = 0.004F;  ///< m per m of range
-};
-
-/// Computes the bits of a pack of samples. `cells`: their cells of the range image, one
-/// RangeImage::Cell per number. `is_inside`: whether they lie in the image. `is_near`: whether a
-/// beam passes near enough. `range`, `tolerance`: range of the samples and margin, cm.
+/// Tests of samples against one range image. A return lies behind a sample if its range is larger
+/// by more than `margin` (m) + `slope` (m/m) * range of the sample.
 template <class Packs>
-void compare_ranges(const typename Packs::Int& cells, const typename Packs::Mask& is_inside,
-                    const typename Packs::Mask& is_near, const typename Packs::Float& range,
-                    const typename Packs::Float& tolerance, std::uint8_t& free_bits,
-                    std::uint8_t& hit_bits) {
+class ImageTest {
+ public:
   using Float = typename Packs::Float;
   using Int = typename Packs::Int;
-  // Cell::nearest is the lower half of a cell, Cell::around the upper half.
-  const Float nearest = to_float((cells << 16) >> 16);
-  const Float around = to_float(cells >> 16);
-  const auto is_at = [&](const Float& value) { return abs(value - range) <= tolerance; };
-  const auto is_odd = [](const Int& value) { return (value << 31) < Int(0); };
-  static_assert(RangeImage::kMoving == 1);
-  const auto is_nearest = is_at(nearest);
-  const auto is_moving_beside = is_odd(cells);
-  const auto is_moving = is_odd(cells >> 16);
-  const auto free =
-      is_inside & is_near & (around - range > tolerance) & ~(is_nearest & is_moving_beside);
-  const auto hit =
-      is_inside & ~free & ((is_nearest & ~is_moving_beside) | (is_at(around) & ~is_moving));
-  free_bits = static_cast<std::uint8_t>(free.bits());
-  hit_bits = static_cast<std::uint8_t>(hit.bits());
-}
 
-/// Tests the first `count` samples (m; padded for packs) against a range image. A return lies
-/// behind a sample if its range is larger by more than `margin` (m) + `slope` (m/m) * range of the
-/// sample. A sample at a return of a moving point is neither "free" nor "hit".
-/// `T_reference_sample`: rigid, from the frame of the samples to the frame of the image.
-inline void test_visibility(const RangeImage& image, const Pose& T_reference_sample,
-                            const PointBuffer& samples, std::size_t count, float margin,
-                            float slope, Visibility& visibility) {
-  const PackTransform to_reference(T_reference_sample);
-  const PackConstant to_centimetres(RangeImage::kCentimetres);
-  const PackConstant base(margin * RangeImage::kCentimetres),
-      growth(slope * RangeImage::kCentimetres);
-  // Angles of a cell, rad.
-  const PackConstant width(1.0F / image.grid().columns_per_radian),
-      height(1.0F / image.grid().rows_per_level);
-  const ImageLocator locator(image.grid());
-  visibility.resize(count);
+  /// `to_image`: from the frame of the samples to the frame of the image.
+  ImageTest(const RangeImage& image, const PackTransform& to_image, float margin, float slope)
+      : to_image_(to_image),
+        locator_(image.grid()),
+        margin_(margin * RangeImage::kCentimetres),
+        slope_(slope * RangeImage::kCentimetres),
+        cell_width_(1.0F / image.grid().columns_per_radian),
+        cell_height_(1.0F / image.grid().rows_per_level),
+        cells_(image.data()),
+        beams_(image.beams()) {}
+
+  /// Finds the cells of a pack of samples (m) and their ranges, and prefetches the cells: an image
+  /// is larger than the inner caches.
+  void locate(const Float& x, const Float& y, const Float& z, std::int32_t* cell,
+              float* range) const {
+    project(x, y, z, [&](const auto&, const Float& distance, const auto& at) {
+      at.cell.store(cell);
+      distance.store(range);
+    });
+    for (std::size_t k = 0; k < kPackWidth; ++k) {
+      __builtin_prefetch(&cells_[static_cast<std::uint32_t>(cell[k])]);
+    }
+  }
+
+  /// Bits of a pack of samples.
+  struct Compared {
+    unsigned before;  ///< all returns in the cells around the sample lie behind it
+    unsigned at;      ///< a static return lies at the sample
+  };
+  /// Compares the ranges of a pack of samples with their cells. A sample at a return of a moving
+  /// point is neither before it nor at it.
+  Compared compare(const std::int32_t* cell, const float* range) const {
+    static_assert(RangeImage::kMoving == 1);
+    static constexpr PackConstant kScale(RangeImage::kCentimetres);
+    std::int32_t packed[kPackWidth];
+    for (std::size_t k = 0; k < kPackWidth; ++k) {
+      std::memcpy(&packed[k], &cells_[cell[k]], sizeof(std::int32_t));
+    }
+    const Int cells = Int::load(packed);
+    const Float metres = Float::load(range);
+    const Float tolerance = metres * Float(slope_) + Float(margin_);
+    const Float centimetres = metres * Float(kScale);
+    // Cell::nearest is the lower half of a cell, Cell::around the upper half.
+    const Float nearest = to_float((cells << 16) >> 16) - centimetres;
+    const Float around = to_float(cells >> 16) - centimetres;
+    const auto is_odd = [](const Int& value) { return (value << 31) < Int(0); };
+    const auto is_nearest = abs(nearest) <= tolerance;
+    const auto is_moving_beside = is_odd(cells);
+    const auto is_inside = Int(0) < Int::load(cell);
+    const auto before = is_inside & (around > tolerance) & ~(is_nearest & is_moving_beside);
+    const auto at = is_inside & ((is_nearest & ~is_moving_beside) |
+                                 ((abs(around) <= tolerance) & ~is_odd(cells >> 16)));
+    return {before.bits(), at.bits()};
+  }
+
+  /// Bits of the samples (m) that a beam passes near enough, of those in `cell`. The largest
+  /// lateral distance is the error of poses and points, and the width of a beam at its range.
+  unsigned is_near(const Float& x, const Float& y, const Float& z, const std::int32_t* cell) const {
+    static constexpr PackConstant kReach(0.05F), kReachSlope(0.004F);  // m, m/m
+    static constexpr PackConstant kStep(1.0F / RangeImage::kPlaces),
+        kHalf(0.5F / RangeImage::kPlaces);
+    std::int32_t packed[kPackWidth];
+    for (std::size_t k = 0; k < kPackWidth; ++k) packed[k] = beams_[cell[k]];
+    const Int beam = Int::load(packed);
+    const auto within = [](const Int& step) {
+      return to_float(step) * Float(kStep) + Float(kHalf);
+    };
+    unsigned near = 0;
+    project(x, y, z, [&](const Float& level, const Float& distance, const auto& at) {
+      const Float aside = (within(beam >> 8) - at.column) * (sqrt(level) * Float(cell_width_));
+      const Float above =
+          (within(beam & Int(RangeImage::kPlaces - 1)) - at.row) * (distance * Float(cell_height_));
+      const Float reach = distance * Float(kReachSlope) + Float(kReach);
+      near = (aside * aside + above * above <= reach * reach).bits();
+    });
+    return near;
+  }
+
+ private:
+  // Calls `use(squared horizontal distance, distance, place in the image)`, m^2 and m. Packs that
+  // are returned in a structure would go through memory.
+  template <class Use>
+  void project(const Float& px, const Float& py, const Float& pz, const Use& use) const {
+    const Float x = to_image_(0, px, py, pz);
+    const Float y = to_image_(1, px, py, pz);
+    const Float z = to_image_(2, px, py, pz);
+    const Float level = x * x + y * y;
+    const Float distance = sqrt(level + z * z);
+    use(level, distance, locator_.template locate<Packs>(x, y, z, distance));
+  }
+
+  PackTransform to_image_;
+  ImageLocator locator_;
+  PackConstant margin_, slope_;            // cm, cm/m
+  PackConstant cell_width_, cell_height_;  // rad
+  const RangeImage::Cell* cells_;
+  const RangeImage::Beam* beams_;
+};
+
+/// Adds what a range image shows of the first `count` samples (m; padded for packs) to bits that
+/// were cleared. A sample may become both "free" in one image and "hit" in another: call
+/// Visibility::settle() after the last one. `T_image_sample`: rigid. `margin`, `slope`: see
+/// ImageTest.
+inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
+                           const PointBuffer& samples, std::size_t count, float margin, float slope,
+                           Visibility& visibility) {
+  const PackTransform to_image(T_image_sample);
   with_packs([&](auto packs) {
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
-    using Int = typename Packs::Int;
-    // Local copies, since stores of bytes may alias the members.
+    const ImageTest<Packs> test(image, to_image, margin, slope);
+    const float* const x = samples.x.data();
+    const float* const y = samples.y.data();
+    const float* const z = samples.z.data();
     const Visibility::Bytes bits = visibility.bytes();
-    const RangeImage::Cell* const cells = image.data();
-    const RangeImage::Beam* const beams = image.beams();
-    const Float scale(to_centimetres), least(base), slope_per_metre(growth);
-    const Float cell_width(width), cell_height(height);
-    static constexpr PackConstant kMin(BeamReach::kMin), kSlope(BeamReach::kSlope),
-        kStep(1.0F / RangeImage::kPlaces), kHalf(0.5F / RangeImage::kPlaces);
-    // All cells of a block are prefetched before the first is used, since an image is larger than
-    // the inner caches.
     std::int32_t cell[kBeamBlock];
-    float ranges[kBeamBlock], across[kBeamBlock], rows[kBeamBlock], columns[kBeamBlock];
-    std::int32_t packed[kPackWidth], beam[kPackWidth];
-    for (std::size_t begin = 0; begin < count; begin += kBeamBlock) {
-      const std::size_t size = std::min(kBeamBlock, count - begin);
-      for (std::size_t i = 0; i < size; i += kPackWidth) {
-        const Float px = Float::load(&samples.x[begin + i]);
-        const Float py = Float::load(&samples.y[begin + i]);
-        const Float pz = Float::load(&samples.z[begin + i]);
-        const Float x = to_reference(0, px, py, pz);
-        const Float y = to_reference(1, px, py, pz);
-        const Float z = to_reference(2, px, py, pz);
-        const Float level = x * x + y * y;
-        const Float range = sqrt(level + z * z);
-        const auto located = locator.template locate<Packs>(x, y, z, range);
-        located.cell.store(&cell[i]);
-        range.store(&ranges[i]);
-        (sqrt(level) * cell_width).store(&across[i]);
-        located.row.store(&rows[i]);
-        located.column.store(&columns[i]);
-        for (std::size_t k = i; k < i + kPackWidth; ++k) {
-          __builtin_prefetch(&cells[cell[k]]);
-          __builtin_prefetch(&beams[cell[k]]);
+    float range[kBeamBlock];
+    struct Passed {  // a pack of samples that beams may pass
+      std::uint32_t begin;
+      typename ImageTest<Packs>::Compared compared;
+    } passed[kBeamBlock / kPackWidth];
+    for (std::size_t block = 0; block < count; block += kBeamBlock) {
+      const std::size_t end = std::min(block + kBeamBlock, count);
+      for (std::size_t i = block; i < end; i += kPackWidth) {
+        if (bits.hit[i / 8] == Packs::kAll) continue;  // another image settled it
+        test.locate(Float::load(x + i), Float::load(y + i), Float::load(z + i), &cell[i - block],
+                    &range[i - block]);
+      }
+      std::size_t passed_count = 0;
+      for (std::size_t i = block; i < end; i += kPackWidth) {
+        if (bits.hit[i / 8] == Packs::kAll) continue;
+        const auto compared = test.compare(&cell[i - block], &range[i - block]);
+        if (compared.before == 0) {
+          bits.hit[i / 8] = static_cast<std::uint8_t>(bits.hit[i / 8] | compared.at);
+        } else {
+          passed[passed_count++] = {static_cast<std::uint32_t>(i), compared};
         }
       }
-      for (std::size_t i = 0; i < size; i += kPackWidth) {
-        for (std::size_t k = 0; k < kPackWidth; ++k) {
-          std::memcpy(&packed[k], &cells[cell[i + k]], sizeof(std::int32_t));
-          beam[k] = beams[cell[i + k]];
-        }
-        const Int both = Int::load(packed);
-        const Int place = Int::load(beam);
-        const Float metres = Float::load(&ranges[i]);
-        const auto within = [&](const Int& step) {
-          return to_float(step) * Float(kStep) + Float(kHalf);
-        };
-        const Float aside =
-            (within(place >> 8) - Float::load(&columns[i])) * Float::load(&across[i]);
-        const Float above = (within(place & Int(RangeImage::kPlaces - 1)) - Float::load(&rows[i])) *
-                            (metres * cell_height);
-        const Float reach = metres * Float(kSlope) + Float(kMin);
-        compare_ranges<Packs>(both, Int(0) < Int::load(&cell[i]),
-                              aside * aside + above * above <= reach * reach, metres * scale,
-                              metres * slope_per_metre + least, bits.free[(begin + i) / 8],
-                              bits.hit[(begin + i) / 8]);
+      for (std::size_t k = 0; k < passed_count; ++k) {
+        const auto& [i, compared] = passed[k];
+        const unsigned free = compared.before & test.is_near(Float::load(x + i), Float::load(y + i),
+                                                             Float::load(z + i), &cell[i - block]);
+        bits.free[i / 8] = static_cast<std::uint8_t>(bits.free[i / 8] | free);
+        bits.hit[i / 8] = static_cast<std::uint8_t>(bits.hit[i / 8] | (compared.at & ~free));
       }
     }
   });
+}
+
+/// The visibility of samples from one image, see add_visibility().
+inline void test_visibility(const RangeImage& image, const Pose& T_reference_sample,
+                            const PointBuffer& samples, std::size_t count, float margin,
+                            float slope, Visibility& visibility) {
+  visibility.clear(count);
+  add_visibility(image, T_reference_sample, samples, count, margin, slope, visibility);
 }
 
 }  // namespace dynains::detail
