@@ -98,7 +98,9 @@ struct InstanceBeliefs {
     /// it back to 1.
     std::uint8_t hits = 0;
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
-    std::uint8_t counted = 0;  ///< what Counts holds of it: 0 nothing, 1 decided, 2 also moved
+    /// As which Counts holds it. kStood is decided: hits alone change nothing but `hits`.
+    enum class State : std::uint8_t { kUnknown, kDecided, kStood, kMoved };
+    State counted = State::kUnknown;
 
     float highest() const { return std::max(peak, level); }
     /// Whether it stays when its instance moves, since many references hit its place and none saw
@@ -199,13 +201,30 @@ class InstanceBeliefUpdater {
   // of its instance.
   void update_supervoxel(const Visibility::Bits& visible, std::uint32_t samples, float weight,
                          Belief& belief, Counts& counts) const {
-    if (visible.free == 0 && (visible.hit == 0 || belief.stays())) return;
+    using State = Belief::State;
+    if (visible.free == 0) {
+      if (visible.hit == 0) return;
+      if (belief.counted == State::kStood) return count_hits(belief, visible.count(), samples);
+    }
     update(belief, visible.count(), samples, weight);
-    const std::uint8_t now = is_free(belief) ? 2 : belief.hits != 0 ? 1 : 0;
-    if (now == belief.counted) return;
-    if ((now == 2) != (belief.counted == 2)) counts.moved += now == 2 ? samples : 0 - samples;
-    if ((now == 0) != (belief.counted == 0)) counts.decided += now != 0 ? samples : 0 - samples;
-    belief.counted = now;
+    const State before = belief.counted;
+    belief.counted = state_of(belief);
+    if (belief.counted == before) return;
+    if (before == State::kMoved) counts.moved -= samples;
+    if (belief.counted == State::kMoved) counts.moved += samples;
+    if (before == State::kUnknown) counts.decided += samples;
+    if (belief.counted == State::kUnknown) counts.decided -= samples;
+  }
+
+  Belief::State state_of(const Belief& belief) const {
+    if (is_free(belief)) return Belief::State::kMoved;
+    if (belief.hits == 0) return Belief::State::kUnknown;
+    const bool may_turn = belief.turns % 2 != 0 && belief.turns < kTurnsByChance;
+    return may_turn || belief.highest() > 0.0F ? Belief::State::kDecided : Belief::State::kStood;
+  }
+
+  static void count_hits(Belief& belief, Visibility::Count visible, std::uint32_t samples) {
+    if (visible.hit >= std::min(2U, samples) && belief.hits < kFirmHits) ++belief.hits;
   }
 
   // Updates what is known of an instance as a whole. `all`: its visible samples, at least one.
@@ -247,9 +266,7 @@ class InstanceBeliefUpdater {
     belief.contested = 1;
     sum_.lower(belief.level);
     if (belief.turns % 2 != 0 && belief.turns < kTurnsByChance) ++belief.turns;
-    if (visible.hit >= std::min(2U, samples) && belief.hits < kFirmHits) {
-      ++belief.hits;
-    }
+    count_hits(belief, visible, samples);
   }
 
   FreeSpaceSum sum_;
