@@ -169,8 +169,8 @@ class InstanceSampler {
   }
 
   // Adds the points of a block to the rows of their supervoxels, which are numbered in the order of
-  // the points. `begin`: index of the first point. For most points, the first slot of the hash
-  // holds the number. A row keeps the keys of the smallest ranks, then numbers, in ascending order.
+  // the points. `begin`: index of the first point. A row keeps the keys of the smallest ranks, then
+  // numbers, in ascending order.
   void add_points(std::size_t begin, std::size_t count, std::uint32_t* number_of_point) {
     const std::size_t capacity = table_.size() + kWordBits;
     grow(supervoxels_, capacity);
@@ -178,23 +178,33 @@ class InstanceSampler {
     if (keys_.size() < capacity * most_) keys_.resize(capacity * most_ * 9 / 8, kNoKey);
     std::uint64_t* const keys = keys_.data();
     const std::size_t most = most_;
-    for (std::size_t i = 0; i < count; ++i) {
-      const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
-      const auto hash = static_cast<std::uint32_t>(hash_[i]);
-      const SupervoxelTable::Slot& slot = table_.first_slot(hash);
-      const std::uint32_t number = slot.key == supervoxel ? slot.number : meet(i);
-      number_of_point[i] = number;
-      std::uint64_t* const row = keys + number * most;
-      const auto rank = static_cast<std::uint64_t>(rank_[i]);
-      if (rank >= row[most - 1] >> 32) continue;  // of equal ranks, the first point stays
-      const std::uint64_t key = rank << 32 | (begin + i);
-      std::size_t k = most - 1;
-      for (; k > 0 && key < row[k - 1]; --k) row[k] = row[k - 1];
-      row[k] = key;
-    }
+    with_packs([&](auto packs) {
+      const auto add_run = [&](std::size_t first, std::size_t last) {
+        const std::uint32_t number = number_of(first);
+        std::uint64_t* const row = keys + number * most;
+        for (std::size_t i = first; i < last; ++i) {
+          number_of_point[i] = number;
+          const auto rank = static_cast<std::uint64_t>(rank_[i]);
+          if (rank >= row[most - 1] >> 32) continue;  // of equal ranks, the first point stays
+          const std::uint64_t key = rank << 32 | (begin + i);
+          std::size_t k = most - 1;
+          for (; k > 0 && key < row[k - 1]; --k) row[k] = row[k - 1];
+          row[k] = key;
+        }
+      };
+      for_each_run<decltype(packs)>(count, add_run, xy_.data(), z_.data(), instance_.data());
+    });
   }
 
-  // Number of the supervoxel of a point of the block, which may be new.
+  // Number of the supervoxel of a point of the block, which may be new. For most points, the first
+  // slot of the hash holds it.
+  std::uint32_t number_of(std::size_t i) {
+    const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
+    const auto hash = static_cast<std::uint32_t>(hash_[i]);
+    const SupervoxelTable::Slot& slot = table_.first_slot(hash);
+    return slot.key == supervoxel ? slot.number : meet(i);
+  }
+
   [[gnu::noinline]] std::uint32_t meet(std::size_t i) {
     const Supervoxel supervoxel = {xy_[i], z_[i], instance_[i]};
     const std::uint32_t number = table_.insert(supervoxel, static_cast<std::uint32_t>(hash_[i]));
