@@ -66,19 +66,20 @@ class GroundFootprint {
   /// point of the 3x3 cells around them.
   std::uint64_t find_under(PointsView block, const Clearance& clearance) const {
     const Located located = locate(block);
-    float top[kWordBits];
+    float lowest[kWordBits];
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      lowest[i] = lowest_[static_cast<std::size_t>(located.cell[i])];
+    }
     const PackConstant least(clearance.least), slope(clearance.slope);
-    for_packs(block.size(), [&](auto at) {
-      using Float = typename decltype(at)::Float;
+    std::uint64_t under = 0;
+    for_packs(block.size(), [&](const auto& at) {
+      using Float = typename std::decay_t<decltype(at)>::Float;
       const Float x = at.load(block.x.data());
       const Float y = at.load(block.y.data());
       const Float gap = sqrt(x * x + y * y) * slope;
-      (at.load(block.z.data()) + max(gap, Float(least))).store(&top[at.begin]);
+      const Float top = at.load(block.z.data()) + max(gap, Float(least));
+      under |= std::uint64_t{(at.load(lowest) < top).bits()} << at.begin;
     });
-    std::uint64_t under = 0;
-    for (std::size_t i = 0; i < block.size(); ++i) {
-      under |= std::uint64_t{lowest_[static_cast<std::size_t>(located.cell[i])] < top[i]} << i;
-    }
     return under & located.inside;
   }
 
@@ -115,7 +116,7 @@ class GroundFootprint {
       const Int row = line(at.load(block.y.data()));
       (multiply(row, width_) + column).store(&located.cell[at.begin]);
       const auto inside = (zero < column) & (column < last) & (zero < row) & (row < last);
-      located.inside |= std::uint64_t{inside.bits()} << at.begin;
+      located.inside |= std::uint64_t{inside.bits() & ((1U << at.size()) - 1U)} << at.begin;
     });
     return located;
   }
