@@ -322,20 +322,24 @@ class PlaneAligner {
       const std::size_t end = std::min(points.size(), begin + Block::kMaxCount * step);
       Block block;
       for (std::size_t i = begin; i < end; i += step) {
-        block.push_back(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
-                        static_cast<double>(points.z[i]));
+        block.push_position(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                            static_cast<double>(points.z[i]));
       }
       planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
         const double(&p)[3] = block.points[i];
+        const std::size_t point = begin + i * step;
+        const SensorErrors errors = sensor_errors(T, static_cast<double>(points.x[point]),
+                                                  static_cast<double>(points.y[point]),
+                                                  static_cast<double>(points.z[point]));
         Match match = {&plane,
                        {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
                        {},
                        plane.distance(p),
-                       static_cast<std::uint32_t>(begin + i * step)};
+                       static_cast<std::uint32_t>(point)};
         for (std::size_t k = 0; k < kSensorErrors; ++k) {
           match.errors[k] = -plane.moved[k];
           for (std::size_t axis = 0; axis < 3; ++axis) {
-            match.errors[k] += plane.normal[axis] * static_cast<double>(block.errors[i][k][axis]);
+            match.errors[k] += plane.normal[axis] * static_cast<double>(errors[k][axis]);
           }
           match.distance += match.errors[k] * ((k == 0 ? elevation_ : 0.0) + found[6 + k]);
         }

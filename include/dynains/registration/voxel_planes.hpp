@@ -62,15 +62,19 @@ class VoxelPlanes {
   struct Block {
     static constexpr std::size_t kMaxCount = 32;
     double points[kMaxCount][3];
-    SensorErrors errors[kMaxCount];
+    SensorErrors errors[kMaxCount];  // of points to insert
     std::size_t count = 0;
 
     bool is_full() const { return count == kMaxCount; }
-    /// Adds the point (x, y, z) (m), transformed by `T`. The block must not be full.
-    void push_back(const Pose& T, double x, double y, double z) {
-      double(&point)[3] = points[count];
+    /// Adds the point (x, y, z) (m), transformed by `T`, to look it up. The block must not be full.
+    void push_position(const Pose& T, double x, double y, double z) {
+      double(&point)[3] = points[count++];
       for (int k = 0; k < 3; ++k) point[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
-      errors[count++] = sensor_errors(T, x, y, z);
+    }
+    /// Adds this point to insert it.
+    void push_back(const Pose& T, double x, double y, double z) {
+      errors[count] = sensor_errors(T, x, y, z);
+      push_position(T, x, y, z);
     }
   };
 
