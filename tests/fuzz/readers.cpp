@@ -1,8 +1,10 @@
 // Every reader of files: any bytes give a valid value or an IoError.
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 #include <string>
 
+#include "city/session_file.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
@@ -121,8 +123,30 @@ void run_config(Bytes bytes) {
   });
 }
 
+void run_session(Bytes bytes) {
+  expect_value_or<IoError>(file_of("day.session", bytes), [&](const fs::path& path) {
+    const SessionInfo session = read_session(path);
+    for (const auto& [tile, block] : session.tiles) {
+      require(read_block(path, block).size() == block.size, "a block has its size");
+    }
+  });
+}
+
 std::vector<std::string> scan_seeds() {
-  return {"", floats({1.0F, 2.0F, 3.0F, 0.5F}), floats({1.0F, 2.0F, 3.0F})};
+  return {"", floats({1.0F, 2.0F, 3.0F, 0.5F}), floats({1.0F, 2.0F, 3.0F}),
+          floats({1e30F, -40.0F, 0.0F, 0.0F, NAN, INFINITY, 0.0F, 1.0F}) + "cut"};
+}
+
+std::vector<std::string> session_seeds() {
+  std::ostringstream stream;
+  SessionFileWriter writer(stream);
+  SessionInfo session;
+  session.name = "day";
+  session.scans = 1;
+  session.tiles[{0, -1}] = writer.add({"twenty-four bytes, so..", 24});
+  writer.finish(session);
+  const std::string whole = stream.str();
+  return {whole, whole.substr(0, whole.size() - 9), "DYNSESS5", ""};
 }
 
 std::vector<std::string> label_seeds() { return {"", std::string("\xFB\0\1\0", 4), "abc"}; }

@@ -16,6 +16,7 @@ const std::vector<Target>& targets() {
       {"npy", run_npy, npy_seeds},
       {"xyz", run_xyz, xyz_seeds},
       {"config", run_config, config_seeds},
+      {"session", run_session, session_seeds},
       {"trajectory", run_trajectory, trajectory_seeds},
       {"recording", run_recording, recording_seeds},
       {"log", run_log, log_seeds},
