@@ -12,9 +12,9 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "odd_scans.hpp"
 #include "pose_advice.hpp"
 #include "poses/sensor_agreement.hpp"
-#include "run_doubts.hpp"
 #include "start_check.hpp"
 
 namespace dynains::program {
@@ -89,7 +89,9 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
 void add_findings_in_scans(const Recording& recording, const Diagnosis& d,
                            const std::vector<ScanCounts>& counts, std::ostream& text) {
   if (recording.size() == 0) return;
-  for (const std::string& odd : odd_scans(counts, 0, recording)) text << "note: " << odd << '\n';
+  for (const std::string& odd : remarks_on_odd_scans(recording, 0, counts, d.sound())) {
+    text << "note: " << odd << '\n';
+  }
   for (const std::string& remark : remarks_on_clouds(recording, whole_of(recording))) {
     text << "note: " << remark << '\n';
   }

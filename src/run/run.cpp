@@ -92,8 +92,10 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 " invalid (NaN, infinite or at the origin)");
 }
 
-/// Warns if most points, or most of those above the ground, were not judged, and of odd scans.
-void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunListener& listener) {
+/// Warns if most points, or most of those above the ground, were not judged, if most of the removed
+/// ones are ground, and of odd scans.
+void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTiming& timing,
+                   const RunListener& listener) {
   const LabelCounts& labels = results.labels();
   const auto warn_if_most = [&](std::uint64_t part, std::uint64_t whole, const char* text) {
     if (2 * part > whole)
@@ -107,9 +109,15 @@ void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunList
                "are not judged: nearer than --min-range, farther than --max-range, deeper than "
                "--noise-depth, or in --self-box");
   warn_if_most(results.unclustered(), labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
-               "above the ground are in no cluster and not judged; see --cluster-range and "
-               "--sensor-origin-z");
-  for (const std::string& text : odd_scans(results.counts(), plan.range.first, plan.sequence)) {
+               "above the ground are in no cluster and not judged; see --cluster-range");
+  warn_if_most(results.below_movers(), labels[PointLabel::kDynamic],
+               "that are removed are ground below what moves; see --footprint");
+  std::vector<ScanCounts> counts = results.counts();
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    counts[i].fits = timing.rows[i].pose_residual.has_value();
+  }
+  for (const std::string& text :
+       remarks_on_odd_scans(plan.sequence, plan.range.first, counts, false)) {
     listener.warn(text);
   }
 }
@@ -260,7 +268,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   outcome.complete = results.is_complete();
   outcome.alignment = alignment;
   check_not_empty(plan, results);
-  warn_of_scans(plan, results, listener);
+  warn_of_scans(plan, results, timing, listener);
   RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
   doubts.returns = return_errors(plan.sequence, plan.range.first,
                                  second_pass ? second_pass->returns() : returns.found());

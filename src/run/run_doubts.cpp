@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "dynains/evaluation/text_table.hpp"
-#include "dynains/median.hpp"
 #include "dynains/parameters.hpp"
 #include "poses/given_motion.hpp"
 
@@ -68,46 +67,7 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
          "many points be noise; see: dynains check";
 }
 
-/// "3 scans from 000010 to 000014".
-std::string text_of(const std::vector<std::size_t>& scans, std::size_t first,
-                    const Recording& recording) {
-  const std::string& name = recording.name(first + scans.front());
-  if (scans.size() == 1) return "scan " + name;
-  return std::to_string(scans.size()) + " scans from " + name + " to " +
-         recording.name(first + scans.back());
-}
-
 }  // namespace
-
-std::vector<std::string> odd_scans(const std::vector<ScanCounts>& counts, std::size_t first,
-                                   const Recording& recording) {
-  std::vector<std::size_t> thin, misplaced;
-  std::vector<double> changes;
-  for (std::size_t i = 1; i < counts.size(); ++i) {
-    changes.push_back(std::abs(counts[i].moving_share() - counts[i - 1].moving_share()));
-  }
-  const double peak = std::max(0.1, 4.0 * median(changes));
-  std::uint64_t usual = counts.size() < 2 ? 0 : std::max(counts[0].points, counts[1].points);
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    const bool is_thin = 2 * counts[i].points < usual;
-    if (is_thin) thin.push_back(i);
-    if (!is_thin) usual = counts[i].points;
-    if (i == 0 || i + 1 == counts.size()) continue;
-    const double beside = std::max(counts[i - 1].moving_share(), counts[i + 1].moving_share());
-    if (counts[i].moving_share() > beside + peak) misplaced.push_back(i);
-  }
-  std::vector<std::string> result;
-  if (!thin.empty()) {
-    result.push_back(text_of(thin, first, recording) +
-                     ": less than half of the points of the scan before, as if cut off");
-  }
-  if (!misplaced.empty()) {
-    result.push_back(text_of(misplaced, first, recording) +
-                     ": much more seems to move than in both scans beside; is the file, or the "
-                     "pose, that of another scan?");
-  }
-  return result;
-}
 
 RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing) {
   RunDoubts doubts;

@@ -43,20 +43,6 @@ RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const 
 /// One sentence for each doubt.
 std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording);
 
-struct ScanCounts {
-  std::uint64_t points = 0;
-  std::uint64_t moving = 0;  ///< of the points
-
-  double moving_share() const {
-    return points == 0 ? 0.0 : static_cast<double>(moving) / static_cast<double>(points);
-  }
-};
-
-/// Sentences about scans that have far fewer points than the one before, or a far larger share of
-/// moving points than both neighbours. `counts`: of the scans from `first` on.
-std::vector<std::string> odd_scans(const std::vector<ScanCounts>& counts, std::size_t first,
-                                   const Recording& recording);
-
 /// "jumps", "suspicious" and "returns" of a report.
 nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording);
 

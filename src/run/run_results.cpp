@@ -215,6 +215,8 @@ void RunResults::complete_scan(const RecordedScan& scan, const ScanVerdict& verd
       std::plus<>(), [](PointLabel label, Cause cause) {
         return label == PointLabel::kStatic && cause == Cause::kNotJudged ? 1U : 0U;
       });
+  below_movers_ += static_cast<std::uint64_t>(
+      std::count(verdict.causes.begin(), verdict.causes.end(), Cause::kUnderInstance));
   add_scan(scan, verdict);
   overview_.add(scan, verdict);
   for_each_moving(verdict.labels, [&](std::size_t i) {

@@ -23,10 +23,10 @@
 #include "grid/grid_maker.hpp"
 #include "label_writer.hpp"
 #include "map_file.hpp"
+#include "odd_scans.hpp"
 #include "output_listing.hpp"
 #include "overview.hpp"
 #include "point_labels.hpp"
-#include "run_doubts.hpp"
 #include "scan_range.hpp"
 
 namespace dynains {
@@ -131,6 +131,8 @@ class RunResults {
   const std::vector<ScanCounts>& counts() const { return counts_; }
   /// Static points that are neither ground nor in a cluster.
   std::uint64_t unclustered() const { return unclustered_; }
+  /// Removed points of the ground.
+  std::uint64_t below_movers() const { return below_movers_; }
   std::optional<std::size_t> map_points() const;
 
  private:
@@ -153,6 +155,7 @@ class RunResults {
   LabelCounts labels_;
   std::vector<ScanCounts> counts_;
   std::uint64_t unclustered_ = 0;
+  std::uint64_t below_movers_ = 0;
   // These belong to the writing thread until writing_.wait().
   JudgedScan judged_;
   std::vector<std::uint8_t> keep_;
