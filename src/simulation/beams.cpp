@@ -41,8 +41,8 @@ const KnownSensor& known_sensor(Sensor sensor) {
 
 /// A sensor with rings as it may be built: number of beams, field of view, spacing, range.
 void draw_rings(SensorModel& model, Random random) {
-  constexpr int kBeams[] = {16, 32, 32, 40, 64, 64, 80, 128};
-  const int beams = kBeams[random.index(std::size(kBeams))];
+  const int numbers[] = {16, 32, 32, 40, 64, 64, 80, 128}, columns[] = {900, 1024, 1800, 2048};
+  const int beams = numbers[random.index(std::size(numbers))];
   const double shape = random.unit();
   const bool wide = shape < 0.25, even = shape < 0.6;  // sensors for indoors, symmetric, for cars
   const double top = wide   ? random.uniform(22, 45)
@@ -59,8 +59,7 @@ void draw_rings(SensorModel& model, Random random) {
     const double at = u < horizon ? horizon - away : horizon + away;
     model.elevations.push_back((top + (bottom - top) * at) * kDegree);
   }
-  constexpr int kColumns[] = {900, 1024, 1800, 2048};
-  model.columns = beams > 64 ? 1024 : kColumns[random.index(std::size(kColumns))];
+  model.columns = beams > 64 ? 1024 : columns[random.index(std::size(columns))];
   model.height = random.uniform(1.2, 2.2);
   model.max_range = wide ? random.uniform(30, 60) : random.uniform(60, 150);
   model.min_range = random.uniform(0.3, 1.0);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "simulation/config.hpp"
-#include "simulation/grid_index.hpp"
 #include "simulation/vector.hpp"
 
 namespace dynains::simulation {

@@ -16,7 +16,7 @@ enum class Scene {
   kVegetation,  ///< dense trees and porous bushes, few movers
   kCrowd,       ///< pedestrian zone: groups, walkers along walls, standing people that start
   kStopAndGo,   ///< queues ahead, beside and behind the ego vehicle, which stops as well
-  kCanopy,      ///< movers below bridges, roofs and tree canopies
+  kCanopy,      ///< movers below bridges and tree canopies
   kHill,        ///< slopes of up to 10 %, curved ground
   kCarPark,     ///< rows of parked cars, cars leaving and arriving, pedestrians between them
   kStatic,      ///< urban street with parked cars and without moving objects
@@ -91,115 +91,81 @@ enum class Foliage {
 };
 constexpr std::array<const char*, 2> value_names(Foliage) { return {"solid", "open"}; }
 
-/// Parameters of one sequence. visit() gives their bounds.
+/// Parameters of one sequence. visit() describes them and gives their units and bounds.
 struct Config {
   Scene scene = Scene::kUrban;
   Sensor sensor = Sensor::kHdl64;
   Labelling labelling = Labelling::kEver;
   Rig rig = Rig::kNone;
-
-  int scans = 150;
-  std::uint64_t seed = 1;
-  /// 0: a place without days. From 1 on: the same static place with the movers and parked vehicles
-  /// of this day, and a few changes from day to day. Scenes kUrban and kStatic only.
-  int day = 0;
-  double rate = 10.0;                   ///< scans per second
-  double ego_speed = -1.0;              ///< m/s; negative: default of the scene
-  double traffic = 1.0;                 ///< ratio to the default number of moving objects
-  double sensor_height = 0.0;           ///< m above ground; 0: default of the sensor
-  double max_range = 0.0;               ///< m; 0: default of the sensor
-  double mounting_pitch = 0.0;          ///< deg, positive is nose down
-  double mounting_roll = 0.0;           ///< deg
-  double range_noise = 0.02;            ///< m, standard deviation
-  double dropout = 1.0;                 ///< factor on the loss of returns; 0: no loss
-  double pose_noise_translation = 0.0;  ///< m, standard deviation per axis and scan
-  double pose_noise_rotation = 0.0;     ///< deg, standard deviation per axis and scan
   Gait gait = Gait::kVehicle;
   Foliage foliage = Foliage::kSolid;
-  double halt = 0.0;             ///< s of braking and standing, in the middle
-  double direction_noise = 0.0;  ///< deg, standard deviation of the direction of a beam
-  bool ego_points = false;       ///< whether scans contain the roof below the sensor
-  bool rolling_shutter = false;  ///< whether the beams of a scan are spread over 1 / rate seconds
-  double deskewed = 0.0;         ///< share of the motion within a scan that is corrected
-  double beam_bias = 0.0;        ///< m, standard deviation of the constant error of each beam
-  double divergence = 0.0;       ///< deg, full width of a beam
-  double glass_passes = 0.0;     ///< share of the beams that pass through panes of vehicles
-  double packet_loss = 0.0;      ///< share of lost packets, each of some columns
-  double pose_drift = 0.0;  ///< m after 100 m, standard deviation per axis of the written poses
-  double clutter = 0.0;     ///< ratio of thin things and furniture to the usual number
-  bool static_instances = false;  ///< whether static things have instance ids, too
+  int scans = 150;
+  std::uint64_t seed = 1;
+  int day = 0;
+  double rate = 10, ego_speed = -1, halt = 0, traffic = 1, clutter = 0;
+  double sensor_height = 0, max_range = 0, mounting_pitch = 0, mounting_roll = 0;
+  double range_noise = 0.02, direction_noise = 0, beam_bias = 0, divergence = 0;
+  double dropout = 1, glass_passes = 0, packet_loss = 0;
+  double pose_noise_translation = 0, pose_noise_rotation = 0, pose_drift = 0;
+  bool ego_points = false, static_instances = false;
+  bool rolling_shutter = false;
+  double deskewed = 0;
 
   template <class Self, class Visitor>
   static void visit(Self& self, Visitor&& visitor) {
-    visitor(Parameter{"scene", self.scene, Bounds{}, "", "place and traffic"});
-    visitor(Parameter{"sensor", self.sensor, Bounds{}, "", "beams, usual height and range"});
-    visitor(Parameter{"labelling", self.labelling, Bounds{}, "",
-                      "whether objects are labelled moving in all scans if they ever move, or at "
-                      "the instant"});
-    visitor(Parameter{"rig", self.rig, Bounds{}, "",
-                      "several sensors in one cloud, in the frame of the body"});
-    visitor(Parameter{"scans", self.scans, closed(1, 1000000), "scans", "length of the sequence"});
-    visitor(Parameter{"seed", self.seed, Bounds{}, "",
-                      "seed of the layout and the traffic of the scene"});
-    visitor(Parameter{"day", self.day, closed(0, 1000), "",
-                      "day of a place of scene urban or static: other movers, other parked "
-                      "vehicles, a few real changes; 0: a place without changes"});
-    visitor(Parameter{"rate", self.rate, closed(1, 50), "1/s", "scans per second"});
-    visitor(Parameter{"ego_speed", self.ego_speed, closed(-1, 50), "m/s",
-                      "cruising speed; negative: usual for the scene"});
-    visitor(Parameter{"traffic", self.traffic, closed(0, 4), "",
-                      "ratio of the number of moving objects to the default of the scene"});
-    visitor(Parameter{"sensor_height", self.sensor_height, closed(0, 10), "m",
-                      "height of the sensor over ground; 0: usual for the sensor"});
-    visitor(Parameter{"max_range", self.max_range, closed(0, 160), "m",
-                      "longest measured range; 0: usual for the sensor"});
-    visitor(Parameter{"mounting_pitch", self.mounting_pitch, closed(-45, 45), "deg",
-                      "tilt of the sensor, positive looks down"});
-    visitor(Parameter{"mounting_roll", self.mounting_roll, closed(-45, 45), "deg",
-                      "tilt of the sensor to the side"});
-    visitor(Parameter{"range_noise", self.range_noise, closed(0, 1), "m",
-                      "standard deviation of measured ranges"});
-    visitor(Parameter{"dropout", self.dropout, closed(0, 10), "",
-                      "scale of lost returns (dark, grazing, far); 0 loses none"});
-    visitor(Parameter{"pose_noise_translation", self.pose_noise_translation, closed(0, 10), "m",
-                      "standard deviation of the written poses, per axis"});
-    visitor(Parameter{"pose_noise_rotation", self.pose_noise_rotation, closed(0, 45), "deg",
-                      "standard deviation of the written poses, per axis"});
-    visitor(Parameter{"gait", self.gait, Bounds{}, "",
-                      "how the sensor is carried: on a vehicle, by a walking person, or on a robot "
-                      "with legs"});
-    visitor(Parameter{"foliage", self.foliage, Bounds{}, "",
-                      "solid or open crowns, bushes and hedges"});
-    visitor(
-        Parameter{"halt", self.halt, closed(0, 3600), "s",
-                  "time in the middle of the sequence in which the ego vehicle brakes and stands"});
-    visitor(Parameter{"direction_noise", self.direction_noise, closed(0, 5), "deg",
-                      "standard deviation of the direction of a beam: its width"});
-    visitor(Parameter{"ego_points", self.ego_points, Bounds{}, "",
-                      "whether scans contain points on the roof of the ego vehicle"});
-    visitor(Parameter{"rolling_shutter", self.rolling_shutter, Bounds{}, "",
-                      "whether sensor and objects move while a scan is measured; needs deskewed or "
-                      "a --format with times of points"});
-    visitor(
-        Parameter{"deskewed", self.deskewed, closed(0, 1), "",
-                  "share of the sensor's motion within a scan that is corrected; 0: points stay "
-                  "in the frames of their times"});
-    visitor(Parameter{"beam_bias", self.beam_bias, closed(0, 1), "m",
-                      "standard deviation of the constant range error of each beam"});
-    visitor(Parameter{"divergence", self.divergence, closed(0, 2), "deg",
-                      "full width of a beam: mixed returns at edges"});
-    visitor(Parameter{"glass_passes", self.glass_passes, closed(0, 1), "",
-                      "share of the beams that pass through the panes of vehicles"});
-    visitor(Parameter{"packet_loss", self.packet_loss, closed(0, 1), "",
-                      "share of the packets of some columns that are lost"});
-    visitor(
-        Parameter{"pose_drift", self.pose_drift, closed(0, 10), "m",
-                  "standard deviation of the drift of the written poses after 100 m, per axis"});
-    visitor(Parameter{"clutter", self.clutter, closed(0, 4), "",
-                      "ratio of thin things (wires, railings, signs, bicycles, trolleys) to their "
-                      "usual number in a street"});
-    visitor(Parameter{"static_instances", self.static_instances, Bounds{}, "",
-                      "whether buildings, poles, fences and plants have instance ids, too"});
+    const auto add = [&visitor](const char* name, auto& value, Bounds bounds, const char* unit,
+                                const char* description) {
+      visitor(Parameter{name, value, bounds, unit, description});
+    };
+    const Bounds any, share = closed(0, 1);
+    add("scene", self.scene, any, "", "place and traffic");
+    add("sensor", self.sensor, any, "", "beams, usual height and range");
+    add("labelling", self.labelling, any, "",
+        "whether objects are labelled moving in all scans if they ever move, or at the instant");
+    add("rig", self.rig, any, "", "several sensors in one cloud, in the frame of the body");
+    add("gait", self.gait, any, "", "how the sensor is carried");
+    add("foliage", self.foliage, any, "", "solid or open crowns, bushes and hedges");
+    add("scans", self.scans, closed(1, 1000000), "scans", "length of the sequence");
+    add("seed", self.seed, any, "", "seed of the layout and the traffic of the scene");
+    add("day", self.day, closed(0, 1000), "",
+        "day of a place of scene urban or static: other movers, other parked vehicles, a few real "
+        "changes; 0: a place without changes");
+    add("rate", self.rate, closed(1, 50), "1/s", "scans per second");
+    add("ego_speed", self.ego_speed, closed(-1, 50), "m/s", "negative: usual for the scene");
+    add("halt", self.halt, closed(0, 3600), "s", "time of braking and standing, in the middle");
+    add("traffic", self.traffic, closed(0, 4), "", "ratio to the usual number of moving objects");
+    add("clutter", self.clutter, closed(0, 4), "", "ratio to the usual number of thin things");
+    add("sensor_height", self.sensor_height, closed(0, 10), "m", "0: usual for the sensor");
+    add("max_range", self.max_range, closed(0, 160), "m", "0: usual for the sensor");
+    add("mounting_pitch", self.mounting_pitch, closed(-45, 45), "deg", "positive looks down");
+    add("mounting_roll", self.mounting_roll, closed(-45, 45), "deg", "tilt to the side");
+    add("range_noise", self.range_noise, share, "m", "standard deviation of measured ranges");
+    add("direction_noise", self.direction_noise, closed(0, 5), "deg",
+        "standard deviation of the direction of a beam");
+    add("beam_bias", self.beam_bias, share, "m",
+        "standard deviation of the constant range error of each beam");
+    add("divergence", self.divergence, closed(0, 2), "deg",
+        "full width of a beam: mixed returns at edges");
+    add("dropout", self.dropout, closed(0, 10), "",
+        "scale of lost returns (dark, grazing, far); 0 loses none");
+    add("glass_passes", self.glass_passes, share, "",
+        "share of the beams that pass through the panes of vehicles");
+    add("packet_loss", self.packet_loss, share, "", "share of lost packets, each of some columns");
+    add("pose_noise_translation", self.pose_noise_translation, closed(0, 10), "m",
+        "standard deviation of the written poses, per axis and scan");
+    add("pose_noise_rotation", self.pose_noise_rotation, closed(0, 45), "deg",
+        "standard deviation of the written poses, per axis and scan");
+    add("pose_drift", self.pose_drift, closed(0, 10), "m",
+        "standard deviation of the drift of the written poses after 100 m, per axis");
+    add("ego_points", self.ego_points, any, "", "whether scans contain the roof below the sensor");
+    add("static_instances", self.static_instances, any, "",
+        "whether buildings, poles, fences and plants have instance ids, too");
+    add("rolling_shutter", self.rolling_shutter, any, "",
+        "whether sensor and objects move while a scan is measured; needs deskewed or a --format "
+        "with times of points");
+    add("deskewed", self.deskewed, share, "",
+        "share of the sensor's motion within a scan that is corrected; 0: points stay in the "
+        "frames of their times");
   }
 
   /// Whether the written poses differ from the true ones.

@@ -1,78 +1,60 @@
 // One place on several days.
 #include <algorithm>
-#include <limits>
-#include <utility>
 
-#include "simulation/materials.hpp"
-#include "simulation/random.hpp"
-#include "simulation/scenes/layout.hpp"
 #include "simulation/simulator.hpp"
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {
 namespace {
 
-enum class ChangeKind { kContainer, kFence, kTree };
-
 /// Something that stands on the pavement from one day to another.
 struct Change {
-  ChangeKind kind;
-  int first_day;
-  int last_day = std::numeric_limits<int>::max();
+  semantic::Class label;
+  Size size;  // m
+  int first_day, last_day;
 };
 
-constexpr Change kChanges[] = {
-    {ChangeKind::kContainer, 2, 3}, {ChangeKind::kFence, 3},    {ChangeKind::kTree, 1, 1},
-    {ChangeKind::kContainer, 3},    {ChangeKind::kFence, 1, 2}, {ChangeKind::kTree, 1, 3},
-};
+constexpr Change kChanges[] = {{semantic::kOtherObject, {4.0, 1.6, 1.7}, 2, 3},
+                               {semantic::kFence, {6.0, 0.1, 1.8}, 3, 9999},
+                               {semantic::kVegetation, {0.4, 0.4, 7.0}, 1, 1},
+                               {semantic::kOtherObject, {4, 1.6, 1.7}, 3, 9999},
+                               {semantic::kFence, {6.0, 0.1, 1.8}, 1, 2},
+                               {semantic::kVegetation, {0.4, 0.4, 7.0}, 1, 3}};
 
-/// Class, size and shape of a change.
-Object object_of(ChangeKind kind, Random& random) {
-  Object object;
-  switch (kind) {
-    case ChangeKind::kFence:
-      object.label = semantic::kFence;
-      object.size = {6.0, 0.1, 1.8};
-      object.model = fence_model(6.0, 1.8, false);
-      break;
-    case ChangeKind::kTree:
-      object.label = semantic::kVegetation;
-      object.size = {0.4, 0.4, 7.0};
-      object.model = tree_model(false, 7.0, 1.8, 2.4, random);
-      break;
-    case ChangeKind::kContainer:
-      object.label = semantic::kOtherObject;
-      object.size = {4.0, 1.6, 1.7};
-      object.model = Model().block(kMaterials.street_furniture, -2, 2, -0.8, 0.8, 0, 1.7);
-      break;
-  }
-  return object;
+Model model_of(const Change& change, Random& random) {
+  const auto& [length, width, height] = change.size;
+  if (change.label == semantic::kFence) return fence_model(Fence::kWood, length, height, random);
+  if (change.label == semantic::kVegetation) return tree_model(false, height, 1.8, 2.4, random);
+  return Model().block(kMaterials.street_furniture, -length / 2, length / 2, -width / 2, width / 2,
+                       0, height);
 }
 
 /// Puts the changes of all days on the pavements beside the way of the sensor, and those of this
 /// day into `traffic`. The places depend on the layout and the seed only.
 void add_changes(const World& layout, const Config& config, Traffic& traffic) {
   const Street& street = layout.terrain.streets()[0];
+  const Traffic::Driver& ego = layout.traffic.drivers[0];
   FootprintSet taken = layout.traffic.fixed;
   Random random(mix(config.seed, 4242));
   std::uint32_t instance = kFirstChange;
-  const double way = travel(config, 8.5);
   for (const Change& change : kChanges) {
-    Random model_random = random.fork(random.bits());
-    Object object = object_of(change.kind, model_random);
+    Object object;
+    object.label = change.label;
+    object.size = change.size;
     object.instance = instance++;
-    const Size size = object.size;
+    object.model = model_of(change, random);
     for (int attempt = 0; attempt < 200; ++attempt) {
-      const double s = kBefore + random.uniform(0.1, 0.9) * way;
-      const int side = random.chance(0.5) ? 1 : -1;
+      const double s = ego.s + random.uniform(0.1, 0.9) * ego.cruise * config.scans / config.rate;
+      const double side = random.chance(0.5) ? 1 : -1;
       const Waypoint at =
           street.centre.beside(s, side * (street.half_width + 0.5 * street.pavement));
-      const Footprint place{at.position, at.heading, size.length / 2, size.width / 2};
-      const Vec2 along = (size.length / 2) * direction(at.heading);
-      const bool is_on_street = layout.terrain.distance_to_street(at.position) < 0.3 ||
-                                layout.terrain.distance_to_street(at.position + along) < 0.3 ||
-                                layout.terrain.distance_to_street(at.position - along) < 0.3;
-      if (is_on_street || !taken.is_free(place, 0.3)) continue;
+      const Footprint place{at.position, at.heading, change.size.length / 2, change.size.width / 2};
+      bool is_free = taken.is_free(place, 0.3);
+      for (const double along : {-0.5, 0.0, 0.5}) {
+        const Vec2 p = at.position + (along * change.size.length) * direction(at.heading);
+        is_free = is_free && layout.terrain.distance_to_street(p) >= 0.3;
+      }
+      if (!is_free) continue;
       taken.add(place);
       if (config.day < change.first_day || config.day > change.last_day) break;
       traffic.objects.push_back(std::move(object));
@@ -85,8 +67,12 @@ void add_changes(const World& layout, const Config& config, Traffic& traffic) {
 
 }  // namespace
 
-World on_day(World layout, World day, const Config& config) {
-  Traffic traffic = std::move(day.traffic);
+World build_world(const Config& config) {
+  if (config.day == 0) return build_scene(config);
+  Config everyday = config;
+  everyday.day = 0;
+  World layout = build_scene(everyday);
+  Traffic traffic = build_scene(config).traffic;
   traffic.fixed = layout.traffic.fixed;
   for (const ObjectPose& pose : traffic.parked) {
     traffic.fixed.add(traffic.footprint_of(pose.object, pose.at));

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulation/grid_index.hpp"
-
 namespace dynains::simulation {
 namespace {
 

@@ -5,7 +5,7 @@
 
 namespace dynains::simulation {
 
-/// Classes of SemanticKITTI.
+/// Classes of SemanticKITTI, at rest; models.cpp has those in motion.
 namespace semantic {
 enum Class : std::uint16_t {
   kOutlier = 1,
@@ -27,11 +27,6 @@ enum Class : std::uint16_t {
   kPole = 80,
   kSign = 81,
   kOtherObject = 99,
-  kMovingCar = 252,
-  kMovingBicyclist = 253,
-  kMovingPerson = 254,
-  kMovingBus = 257,
-  kMovingTruck = 258
 };
 }  // namespace semantic
 
@@ -70,7 +65,6 @@ struct Materials {
   Material railing{semantic::kFence, 0.5F, 0.03F, 0, 0, 0, 0};
   Material wire{semantic::kOtherObject, 0.3F, 0.1F, 0, 0, 0, 0};
   Material mesh{semantic::kOtherObject, 0.4F, 0.1F, 4.0F, 0, 0, 0};
-  Material pram{semantic::kPerson, 0.25F, 0.05F, 0, 0, 0.01F, 0};
   Material ego_roof{semantic::kOutlier, 0.3F, 0.1F, 0, 0, 0, 0};
 };
 inline constexpr Materials kMaterials;

@@ -67,8 +67,8 @@ Primitive transformed(const Rigid& T_target_source, const Primitive& source) {
 Interval intersect(const Primitive& primitive, Vec3 origin, Vec3 direction) {
   const Vec3 o = primitive.to_unit * (origin - primitive.centre);
   const Vec3 d = primitive.to_unit * direction;
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  Interval interval{-kInfinity, kInfinity};
+  const float far = std::numeric_limits<float>::infinity();
+  Interval interval{-far, far};
   switch (primitive.shape) {
     case Shape::kBox: {
       // At height z the half extent is 1 - lean * (z + 1).

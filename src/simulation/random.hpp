@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 namespace dynains::simulation {
 
@@ -49,6 +50,18 @@ class Random {
   /// In [0, count).
   std::size_t index(std::size_t count) {
     return static_cast<std::size_t>(unit() * static_cast<double>(count));
+  }
+  /// One of the pairs of a value and its weight.
+  template <class Value, std::size_t N>
+  Value draw(const std::pair<Value, double> (&choices)[N]) {
+    double sum = 0;
+    for (const auto& choice : choices) sum += choice.second;
+    double u = unit() * sum;
+    for (const auto& choice : choices) {
+      u -= choice.second;
+      if (u < 0) return choice.first;
+    }
+    return choices[N - 1].first;
   }
   /// A separate stream for one purpose.
   Random fork(std::uint64_t purpose) const { return Random(mix(state_, purpose)); }

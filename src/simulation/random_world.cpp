@@ -1,4 +1,4 @@
-#include <cstddef>
+#include <utility>
 
 #include "simulation/config.hpp"
 #include "simulation/random.hpp"
@@ -7,22 +7,7 @@ namespace dynains::simulation {
 namespace {
 
 template <class Value>
-struct Choice {
-  Value value;
-  double weight;
-};
-
-template <class Value, std::size_t N>
-Value draw(Random& random, const Choice<Value> (&choices)[N]) {
-  double sum = 0;
-  for (const auto& choice : choices) sum += choice.weight;
-  double u = random.unit() * sum;
-  for (const auto& choice : choices) {
-    u -= choice.weight;
-    if (u < 0) return choice.value;
-  }
-  return choices[N - 1].value;
-}
+using Choice = std::pair<Value, double>;  // and its weight
 
 constexpr Choice<Scene> kScenes[] = {
     {Scene::kMixed, 0.4},    {Scene::kRoom, 0.02},   {Scene::kCorridor, 0.015},
@@ -60,7 +45,7 @@ void draw_carrier(Config& config, Random& random) {
   config.mounting_pitch = tilt * pitch;
   config.mounting_roll = 0.6 * tilt * roll;
   if (!walks) {
-    config.sensor = draw(random, kVehicleSensors);
+    config.sensor = random.draw(kVehicleSensors);
     config.sensor_height = 1.4 + 1.2 * height;
     if (config.scene == Scene::kHighway) {
       config.ego_speed = 15 + 15 * speed;
@@ -69,7 +54,7 @@ void draw_carrier(Config& config, Random& random) {
     }
     return;
   }
-  config.sensor = draw(random, kCarriedSensors);
+  config.sensor = random.draw(kCarriedSensors);
   config.gait = by_hand ? Gait::kHandHeld : on_legs ? Gait::kLegged : Gait::kVehicle;
   config.sensor_height = by_hand ? 1.1 + 0.8 * height : 0.35 + 0.7 * height;
   config.ego_speed = 0.4 + 1.3 * speed;
@@ -95,11 +80,11 @@ Config random_world(std::uint64_t seed) {
   Random random(mix(seed, 8100));
   Config config;
   config.seed = seed;
-  config.scene = draw(random, kScenes);
+  config.scene = random.draw(kScenes);
   draw_carrier(config, random);
   draw_disturbances(config, random);
-  constexpr Choice<double> kRates[] = {{10, 0.8}, {20, 0.07}, {5, 0.08}, {2, 0.05}};
-  config.rate = draw(random, kRates);
+  const Choice<double> rates[] = {{10, 0.8}, {20, 0.07}, {5, 0.08}, {2, 0.05}};
+  config.rate = random.draw(rates);
   config.traffic = random.uniform(0.4, 1.8);
   config.clutter = random.uniform(0.2, 1.6);
   config.foliage = random.chance(0.5) ? Foliage::kOpen : Foliage::kSolid;

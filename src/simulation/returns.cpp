@@ -9,22 +9,19 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr float kPulse = 1.5F;     // m; nearer surfaces make one return
-constexpr float kBetween = 0.25F;  // m from both surfaces: a point of neither
-
 float power_of(const Surface& surface, float share) {
   return share * surface.reflectivity / std::max(surface.range * surface.range, 0.01F);
 }
 
-/// The return of two surfaces, `share` of the beam on the first.
+/// The return of two surfaces, `share` of the beam on the first: one if they are less than 1.5 m
+/// apart, which is of neither if it lies more than 0.25 m from both.
 Surface one_return(const Surface& own, const Surface& other, float share) {
-  if (std::abs(own.range - other.range) > kPulse) {
+  if (std::abs(own.range - other.range) > 1.5F) {
     return power_of(own, share) >= power_of(other, 1 - share) ? own : other;
   }
   Surface result = share >= 0.5F ? own : other;
   result.range = share * own.range + (1 - share) * other.range;
-  if (std::min(std::abs(result.range - own.range), std::abs(result.range - other.range)) >
-      kBetween) {
+  if (std::min(std::abs(result.range - own.range), std::abs(result.range - other.range)) > 0.25F) {
     result.label = semantic::kOutlier;
   }
   return result;

@@ -17,11 +17,6 @@ namespace dynains::simulation {
 namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
-constexpr double kMovedWay = 0.5;     // m
-constexpr double kSecondsOfDay = 86400.0;
-constexpr int kShutterParts = 40;     // of a scan, each measured at one time
-constexpr int kFewShutterParts = 12;  // of a scan whose points have no times
-
 /// A sensor of a rig, from the middle of the body on the ground.
 struct Mount {
   double x, y, z;     ///< m
@@ -123,33 +118,39 @@ class Simulator::Implementation {
   SimulatedScan scan(std::size_t index) {
     const Moment& moment = moments_.at(index);
     SimulatedScan result;
-    result.time = moment.time + kSecondsOfDay * std::max(0, config_.day - 1);
+    result.time = moment.time + 86400.0 * std::max(0, config_.day - 1);
     result.T_world_sensor = moment.T_world_sensor;
     result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
 
     const std::uint64_t scan_seed = mix(seed_of_day(500), index);
-    for (std::size_t k = 0; k < mounts_of(config_.rig).size(); ++k) {
-      measure_mounted(index, moment, k, mix(scan_seed, k), result);
-    }
-    if (config_.rig != Rig::kNone) return result;
-    if (!config_.rolling_shutter) {
+    if (!takes_time()) {
       measure_part(index, moment, {0, model_.columns}, scan_seed, result);
       return result;
     }
-    const bool has_times = config_.deskewed <= 0;
-    const int parts = has_times ? kShutterParts : kFewShutterParts;
+    // Sensors of a rig, or columns of a scan, fewer if their points have no times.
+    const std::vector<Mount>& mounts = mounts_of(config_.rig);
+    const bool has_times = mounts.empty() && config_.deskewed <= 0;
+    const int parts = has_times ? 40 : mounts.empty() ? 12 : static_cast<int>(mounts.size());
     for (int part = 0; part < parts; ++part) {
-      const BeamTable::Columns columns{model_.columns * part / parts,
-                                       model_.columns * (part + 1) / parts};
-      const double share = 0.5 * (columns.first + columns.last) / model_.columns;
-      const Moment now = between(moment, moments_.at(index + 1), share);
+      const Mount* const mount = mounts.empty() ? nullptr : &mounts[static_cast<std::size_t>(part)];
+      BeamTable::Columns columns{0, model_.columns};
+      if (mount == nullptr) {
+        columns = {model_.columns * part / parts, model_.columns * (part + 1) / parts};
+      }
+      const double middle = 0.5 * (columns.first + columns.last) / model_.columns;
+      Moment now =
+          between(moment, moments_.at(index + 1), mount == nullptr ? middle : mount->clock);
+      if (mount != nullptr) now.T_world_sensor = product(now.T_world_sensor, mount_pose(*mount));
       const std::size_t first = result.labels.size();
       measure_part(index, now, columns, mix(scan_seed, static_cast<std::uint64_t>(part)), result);
       if (has_times) {
         result.times.resize(result.labels.size(), static_cast<float>(now.time - moment.time));
-      } else {
-        deskew(moment, now, first, result);
+        continue;
       }
+      const Pose step = product(detail::inverted(moment.T_world_sensor), now.T_world_sensor);
+      move_points(mount == nullptr ? share_of(step, config_.deskewed) : step, first, result);
+      if (mount != nullptr)
+        result.sensors.resize(result.labels.size(), static_cast<std::uint8_t>(part));
     }
     return result;
   }
@@ -163,18 +164,15 @@ class Simulator::Implementation {
     std::vector<ObjectPose> objects;
   };
 
-  /// Moves the points from number `first` on from the frame at `now` to that at `stamp`, as far as
-  /// the motion is known.
-  void deskew(const Moment& stamp, const Moment& now, std::size_t first,
-              SimulatedScan& scan) const {
-    const Pose step = product(detail::inverted(stamp.T_world_sensor), now.T_world_sensor);
-    const double share = config_.deskewed;
-    // Turns within a scan are small.
+  /// Whether a scan is measured until the next one begins.
+  bool takes_time() const { return config_.rolling_shutter || config_.rig != Rig::kNone; }
+
+  /// A part of a small motion.
+  static Pose share_of(const Pose& step, double share) {
     const Eigen::Matrix3d turn =
         rotation(share * 0.5 * (step(1, 0) - step(0, 1)), share * 0.5 * (step(0, 2) - step(2, 0)),
                  share * 0.5 * (step(2, 1) - step(1, 2)));
-    move_points(isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3)), first,
-                scan);
+    return isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3));
   }
 
   /// Moves the points from number `first` on.
@@ -195,18 +193,6 @@ class Simulator::Implementation {
                    isometry(rotation(model_.yaw, 0, 0), 0, 0, 0));
   }
 
-  /// Adds the points of sensor `k` of the rig, in the frame of the body at the stamp.
-  void measure_mounted(std::size_t index, const Moment& stamp, std::size_t k, std::uint64_t seed,
-                       SimulatedScan& scan) {
-    const Mount& mount = mounts_of(config_.rig)[k];
-    Moment now = between(stamp, moments_.at(index + 1), mount.clock);
-    now.T_world_sensor = product(now.T_world_sensor, mount_pose(mount));
-    const std::size_t first = scan.labels.size();
-    measure_part(index, now, {0, model_.columns}, seed, scan);
-    move_points(product(detail::inverted(stamp.T_world_sensor), now.T_world_sensor), first, scan);
-    scan.sensors.resize(scan.labels.size(), static_cast<std::uint8_t>(k));
-  }
-
   /// Seed for a purpose, which differs from day to day.
   std::uint64_t seed_of_day(std::uint64_t purpose) const {
     const std::uint64_t seed = mix(config_.seed, purpose);
@@ -220,9 +206,7 @@ class Simulator::Implementation {
     const double dt = interval / steps;
     std::map<std::uint32_t, Vec2> first_seen;
     ever_moved_.assign(world_.traffic.objects.size(), false);
-    // The last scan of a rolling shutter, or of a rig, ends at one more moment.
-    const bool takes_time = config_.rolling_shutter || config_.rig != Rig::kNone;
-    const int moments = config_.scans + (takes_time ? 1 : 0);
+    const int moments = config_.scans + (takes_time() ? 1 : 0);
     for (int i = 0; i < moments; ++i) {
       const EgoPose ego = world_.traffic.ego();
       Moment moment;
@@ -233,7 +217,7 @@ class Simulator::Implementation {
       ever_moved_.resize(world_.traffic.objects.size(), false);
       for (const ObjectPose& pose : moment.objects) {
         const Vec2 first = first_seen.emplace(pose.object, pose.at.position).first->second;
-        const bool has_moved = norm(pose.at.position - first) > kMovedWay;
+        const bool has_moved = norm(pose.at.position - first) > 0.5;  // m
         if (pose.speed > kMovingSpeed || has_moved) ever_moved_[pose.object] = true;
       }
       moments_.push_back(std::move(moment));
@@ -309,11 +293,11 @@ class Simulator::Implementation {
 
   /// A person looks around all the time, and bobs with `stride` (0 to 1) at 1.8 steps a second.
   static Pose hand_held_sway(double stride, double time) {
-    constexpr double kLook = 1.15;  // rad/s; with the amplitude below up to 40 deg/s
+    const double look = 1.15 * time;  // with the amplitude below up to 40 deg/s
     const double step = 2 * kPi * 1.8 * time, deg = kPi / 180;
-    const double yaw = 0.6 * std::sin(kLook * time);
-    const double pitch = deg * (2.5 * std::sin(0.5 * kLook * time) + stride * std::sin(step));
-    const double roll = deg * 2 * std::sin(0.7 * kLook * time + 1);
+    const double yaw = 0.6 * std::sin(look);
+    const double pitch = deg * (2.5 * std::sin(0.5 * look) + stride * std::sin(step));
+    const double roll = deg * 2 * std::sin(0.7 * look + 1);
     return isometry(rotation(yaw, pitch, roll), 0, 0.03 * stride * std::sin(step / 2),
                     0.03 * stride * std::sin(step));
   }
@@ -363,7 +347,9 @@ class Simulator::Implementation {
           // Subtract first: large coordinates must not cost precision.
           Primitive near = primitive;
           near.centre = near.centre - origin;
-          renderer_.add(transformed(turn, near), static_instance(model) << 16, mix(salt, 1));
+          const std::uint32_t id = kFirstStatic + model % (kFirstChange - kFirstStatic);
+          renderer_.add(transformed(turn, near), config_.static_instances ? id << 16 : 0,
+                        mix(salt, 1));
         });
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
@@ -379,7 +365,7 @@ class Simulator::Implementation {
       Model shape;
       if (person) {
         const double stride = std::min(1.0, pose.speed / 1.0);
-        shape = pedestrian_model(object.size, object.seed, pose.phase, stride, object.pushes_pram);
+        shape = pedestrian_model(object.size, object.seed, pose.phase, stride);
       } else if (object.kind == Kind::kCyclist) {
         shape = cyclist_model(object.size, object.seed, pose.phase);
       }
@@ -403,7 +389,7 @@ class Simulator::Implementation {
     const Kind kind = object.kind;
     const bool moving = config_.labelling == Labelling::kEver ? ever_moved_[pose.object]
                                                               : pose.speed > kMovingSpeed;
-    return moving ? moving_label(kind) : resting_label(kind);
+    return moving ? traits_of(kind).moving : traits_of(kind).resting;
   }
 
   /// The ground nearer than `reach` (m) along a beam from `origin`; needs a prepared terrain.
@@ -512,12 +498,6 @@ class Simulator::Implementation {
         direction + Vec3{sigma * normal_float(mix(random, 4)), sigma * normal_float(mix(random, 5)),
                          sigma * normal_float(mix(random, 6))};
     return (1 / norm(beside)) * beside;
-  }
-
-  /// Instance id of a static thing; 0: none.
-  std::uint32_t static_instance(std::uint32_t model) const {
-    if (!config_.static_instances) return 0;
-    return kFirstStatic + model % (kFirstChange - kFirstStatic);
   }
 
   Config config_;

@@ -70,23 +70,31 @@ Route Route::shifted(double begin, double end, const std::function<double(double
   return Route(std::move(result));
 }
 
-std::vector<Vec2> turn_points(const Waypoint& from, const Waypoint& to) {
-  const Vec2 a = from.position, c = to.position;
-  const Vec2 u = direction(from.heading), v = direction(to.heading);
-  // Intersection of the two tangents, or the middle if they are parallel.
-  const double cross = u.x * v.y - u.y * v.x;
-  Vec2 b = 0.5 * (a + c);
-  if (std::abs(cross) > 0.2) {
-    const Vec2 between = c - a;
-    b = a + ((between.x * v.y - between.y * v.x) / cross) * u;
-  }
-  const auto count = static_cast<int>(std::max(6.0, norm(c - a) / 0.8));
+std::vector<Vec2> curve(const Waypoint& from, const Waypoint& to) {
+  const Vec2 between = to.position - from.position;
+  const double size = norm(between);
+  const auto count = static_cast<int>(std::max(6.0, size / 0.8));
   std::vector<Vec2> result;
   for (int i = 0; i <= count; ++i) {
-    const double w = static_cast<double>(i) / count;
-    result.push_back(((1 - w) * (1 - w)) * a + (2 * w * (1 - w)) * b + (w * w) * c);
+    const double u = static_cast<double>(i) / count, u2 = u * u, u3 = u2 * u;
+    result.push_back(from.position + (3 * u2 - 2 * u3) * between +
+                     (size * (u3 - 2 * u2 + u)) * direction(from.heading) +
+                     (size * (u3 - u2)) * direction(to.heading));
   }
   return result;
+}
+
+Route route_of_bends(const std::vector<Bend>& bends, double step, double swerve) {
+  std::vector<Vec2> points{{0, 0}};
+  double heading = 0, curvature = 0;
+  for (const Bend& bend : bends) {
+    for (double s = 0; s < bend.length; s += step) {
+      curvature += std::clamp(bend.curvature - curvature, -swerve, swerve);
+      heading += step * curvature;
+      points.push_back(points.back() + step * direction(heading));
+    }
+  }
+  return Route(std::move(points));
 }
 
 }  // namespace dynains::simulation

@@ -40,8 +40,17 @@ class Route {
   std::vector<double> arc_;
 };
 
-/// A quadratic curve from one waypoint into the direction of another, as a vehicle turns.
-std::vector<Vec2> turn_points(const Waypoint& from, const Waypoint& to);
+/// A cubic curve from one waypoint into the direction of another, as a vehicle turns or changes its
+/// lane.
+std::vector<Vec2> curve(const Waypoint& from, const Waypoint& to);
+
+/// Constant curvature (1/m) over a length (m).
+struct Bend {
+  double length, curvature;
+};
+/// Points `step` (m) apart. The curvature changes by at most `swerve` (1/m) from one to the next:
+/// no driver turns the wheel at once.
+Route route_of_bends(const std::vector<Bend>& bends, double step = 1, double swerve = 0.006);
 
 /// A carriageway with pavements on both sides.
 struct Street {

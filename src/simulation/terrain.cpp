@@ -6,56 +6,39 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr double kFar = 30.0;
+constexpr double kFar = 12.0;  // m, where streets do not matter any more
 
 double smooth_step(double u) {
   u = std::clamp(u, 0.0, 1.0);
   return u * u * (3 - 2 * u);
 }
 
+int tile_index(double v, double size) { return static_cast<int>(std::floor(v / size)); }
+
 /// A part of the centre of a street, and what distances to it need.
 struct Segment {
-  Segment(Vec2 from, Vec2 to) : a(from), ab(to - from), square(std::max(dot(ab, ab), 1e-9)) {}
+  Segment(const Street& of, Vec2 from, Vec2 to)
+      : street(&of), a(from), ab(to - from), square(std::max(dot(ab, ab), 1e-9)) {}
 
-  double squared_distance(Vec2 p) const {
+  double distance(Vec2 p) const {
     const Vec2 ap = p - a;
     const double u = std::clamp(dot(ap, ab) / square, 0.0, 1.0);
-    const Vec2 off = ap - u * ab;
-    return dot(off, off);
+    return norm(ap - u * ab);
   }
 
+  const Street* street;
   Vec2 a, ab;
   double square;  // m^2, of the length
 };
 
-int tile_index(double v, double size) { return static_cast<int>(std::floor(v / size)); }
-
-/// The part of a street that matters for one place.
-struct Corridor {
-  double distance(Vec2 p) const {
-    double square = 1e18;
-    for (const Segment& segment : segments) {
-      square = std::min(square, segment.squared_distance(p));
-    }
-    return std::sqrt(square);
-  }
-
-  const Street* street;
-  std::vector<Segment> segments;
-};
-
-std::vector<Corridor> corridors_near(const std::vector<Street>& streets, Vec2 centre,
-                                     double radius) {
-  std::vector<Corridor> result;
+std::vector<Segment> segments_near(const std::vector<Street>& streets, Vec2 centre, double radius) {
+  std::vector<Segment> result;
   for (const Street& street : streets) {
-    Corridor corridor{&street, {}};
     const auto& points = street.centre.points();
-    const double reach = radius + kFar + street.half_width;
     for (std::size_t i = 1; i < points.size(); ++i) {
-      const Segment segment(points[i - 1], points[i]);
-      if (std::sqrt(segment.squared_distance(centre)) < reach) corridor.segments.push_back(segment);
+      const Segment segment(street, points[i - 1], points[i]);
+      if (segment.distance(centre) < radius + kFar + street.half_width) result.push_back(segment);
     }
-    if (!corridor.segments.empty()) result.push_back(std::move(corridor));
   }
   return result;
 }
@@ -66,15 +49,15 @@ struct Ground {
   double pavement = 0;    ///< how far a pavement reaches beyond the point, positive if on it
 };
 
-Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
+Ground ground_at(const std::vector<Segment>& segments, Vec2 p) {
   Ground result;
-  for (const Corridor& corridor : corridors) {
-    const double edge = corridor.distance(p) - corridor.street->half_width;
+  for (const Segment& segment : segments) {
+    const double edge = segment.distance(p) - segment.street->half_width;
     if (edge < result.edge) {
       result.edge = edge;
-      result.half_width = corridor.street->half_width;
+      result.half_width = segment.street->half_width;
     }
-    result.pavement = std::max(result.pavement, corridor.street->pavement - edge);
+    result.pavement = std::max(result.pavement, segment.street->pavement - edge);
   }
   return result;
 }
@@ -83,9 +66,8 @@ Ground ground_at(const std::vector<Corridor>& corridors, Vec2 p) {
 
 Terrain::Terrain(const TerrainConfig& config, std::vector<Street> streets, Random random)
     : config_(config), streets_(std::move(streets)), salt_(random.bits()) {
-  constexpr int kWaves = 5;
   double steepness = 0;
-  for (int i = 0; i < kWaves; ++i) {
+  for (int i = 0; i < 5; ++i) {
     const double heading = random.uniform(0, 2 * kPi);
     const double length = config_.hill_length * random.uniform(0.6, 1.7);
     const double phase = random.uniform(0, 2 * kPi);
@@ -98,23 +80,12 @@ Terrain::Terrain(const TerrainConfig& config, std::vector<Street> streets, Rando
   steepest_ = static_cast<float>(steepness + 0.03 + config_.roughness);
 }
 
-void Terrain::add_hills(Vec2 corner, std::vector<double>& heights) const {
-  constexpr std::size_t kSamples = kCells + 1;
-  std::array<double, kSamples> sines, cosines;
+double Terrain::hills(Vec2 p) const {
+  double height = 0;
   for (const Wave& wave : waves_) {
-    for (std::size_t i = 0; i < kSamples; ++i) {
-      const double angle = wave.number.x * (corner.x + static_cast<double>(i) * kCell) + wave.phase;
-      sines[i] = wave.amplitude * std::sin(angle);
-      cosines[i] = wave.amplitude * std::cos(angle);
-    }
-    // sin(a + b) = sin(a) cos(b) + cos(a) sin(b), with a by the column and b by the row.
-    for (std::size_t row = 0; row < kSamples; ++row) {
-      const double angle = wave.number.y * (corner.y + static_cast<double>(row) * kCell);
-      const double sine = std::sin(angle), cosine = std::cos(angle);
-      double* const to = &heights[row * kSamples];
-      for (std::size_t i = 0; i < kSamples; ++i) to[i] += sines[i] * cosine + cosines[i] * sine;
-    }
+    height += wave.amplitude * std::sin(dot(wave.number, p) + wave.phase);
   }
+  return height;
 }
 
 double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
@@ -133,32 +104,19 @@ double Terrain::bumps(Vec2 p, double wavelength, std::uint64_t salt) const {
 
 void Terrain::build(int ix, int iy, Tile& tile) const {
   const Vec2 corner{ix * kTile, iy * kTile};
-  // Block by block: few segments are near one.
-  constexpr int kBlock = 16, kBlocks = kCells / kBlock + 1;
-  const double half = 0.5 * kBlock * kCell;
-  std::vector<std::vector<Corridor>> blocks;
-  blocks.reserve(grid_index(kBlocks, 0, kBlocks));
-  for (int row = 0; row < kBlocks; ++row) {
-    for (int column = 0; column < kBlocks; ++column) {
-      const Vec2 middle = corner + Vec2{half * (2 * column + 1), half * (2 * row + 1)};
-      blocks.push_back(corridors_near(streets_, middle, 1.42 * half));
-    }
-  }
-  std::vector<double> hills(grid_index(kCells + 1, 0, kCells + 1), 0.0);
-  add_hills(corner, hills);
+  const double half = kTile / 2;
+  const auto segments = segments_near(streets_, corner + Vec2{half, half}, 1.42 * half);
   for (int row = 0; row <= kCells; ++row) {
     for (int column = 0; column <= kCells; ++column) {
       const Vec2 p = corner + Vec2{column * kCell, row * kCell};
-      const auto block = grid_index(row / kBlock, column / kBlock, kBlocks);
-      const Ground ground = ground_at(blocks[block], p);
+      const Ground ground = ground_at(segments, p);
       const double off_street = smooth_step(ground.edge / 0.2);
       const double on_pavement = smooth_step(ground.pavement / 0.4);
       const double across = std::clamp(1 + ground.edge / ground.half_width, 0.0, 1.0);
       const double wild = off_street * (1 - on_pavement);
       const double uneven = config_.roughness * (0.3 + 0.7 * wild);
       const auto sample = grid_index(row, column, kCells + 1);
-      double height = hills[sample];
-      height += uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
+      double height = hills(p) + uneven * (0.6 * bumps(p, 4.0, 1) + 0.4 * bumps(p, 1.1, 2));
       height += config_.kerb * off_street * (0.5 + 0.5 * on_pavement);
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
       tile.heights[sample] = static_cast<float>(height);
@@ -182,7 +140,7 @@ const Terrain::Tile& Terrain::tile(int ix, int iy) {
 }
 
 double Terrain::distance_to_street(Vec2 p) const {
-  return ground_at(corridors_near(streets_, p, 0), p).edge;
+  return ground_at(segments_near(streets_, p, 0), p).edge;
 }
 
 double Terrain::height(Vec2 p) {
@@ -200,8 +158,7 @@ double Terrain::height(Vec2 p) {
 }
 
 void Terrain::prepare(Vec2 centre, double radius) {
-  constexpr std::size_t kKeep = 1500;
-  if (tiles_.size() > kKeep) tiles_.clear();  // most are left behind; others are made again
+  if (tiles_.size() > 1500) tiles_.clear();  // most are left behind; others are made again
   near_x_ = tile_index(centre.x, kTile) - kSide / 2;
   near_y_ = tile_index(centre.y, kTile) - kSide / 2;
   near_.fill(nullptr);
@@ -244,10 +201,10 @@ std::uint16_t Terrain::label_near(float x, float y) const {
 }
 
 Vec3 Terrain::normal_near(float x, float y) const {
-  constexpr float kStep = 0.3F;
-  const float dx = height_near(x + kStep, y) - height_near(x - kStep, y);
-  const float dy = height_near(x, y + kStep) - height_near(x, y - kStep);
-  const Vec3 normal{-dx, -dy, 2 * kStep};
+  const float step = 0.3F;
+  const float dx = height_near(x + step, y) - height_near(x - step, y);
+  const float dy = height_near(x, y + step) - height_near(x, y - step);
+  const Vec3 normal{-dx, -dy, 2 * step};
   return (1 / norm(normal)) * normal;
 }
 

@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "simulation/grid_index.hpp"
 #include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 #include "simulation/street.hpp"
@@ -30,7 +29,7 @@ class Terrain {
   Terrain(const TerrainConfig& config, std::vector<Street> streets, Random random);
 
   const std::vector<Street>& streets() const { return streets_; }
-  /// Distance to the edge of the nearest carriageway, negative on it. At most 30 m.
+  /// Distance to the edge of the nearest carriageway, negative on it. At most 12 m.
   double distance_to_street(Vec2 p) const;
   double height(Vec2 p);
 
@@ -56,8 +55,7 @@ class Terrain {
 
   const Tile& tile(int ix, int iy);
   void build(int ix, int iy, Tile& tile) const;
-  /// Adds the hills at the samples of the tile whose lowest corner is `corner`.
-  void add_hills(Vec2 corner, std::vector<double>& heights) const;
+  double hills(Vec2 p) const;
   /// Random heights in [-1, 1] with this wavelength (m).
   double bumps(Vec2 p, double wavelength, std::uint64_t salt) const;
   /// Samples from the first prepared tile, which has this index, to coordinate `v` (m).

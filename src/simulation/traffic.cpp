@@ -16,13 +16,6 @@ bool Signal::is_red(double time, int stream) const {
   return stream == 0 ? part >= 0.5 : part < 0.57 || part >= 0.92;
 }
 
-double Traffic::Door::angle(double time) const {
-  constexpr double kWide = 65 * kPi / 180, kSwing = 1.0;  // s
-  const double opened = std::clamp((time - open) / kSwing, 0.0, 1.0);
-  const double closed = std::clamp((time - close) / kSwing, 0.0, 1.0);
-  return kWide * (opened - closed);
-}
-
 std::size_t Traffic::add_object(Kind kind) { return add_object(kind, random_size(kind, random_)); }
 
 std::size_t Traffic::add_object(Kind kind, const Size& size) {
@@ -86,7 +79,10 @@ void Traffic::enter(Flow& flow, double s) {
     objects.pop_back();
     return;
   }
-  add_driver(object, flow.lane, s, speed);
+  Driver& driver = add_driver(object, flow.lane, s, speed);
+  if (!random_.chance(flow.stops)) return;
+  const double begin = time_ + random_.uniform(0, 20);
+  driver.schedule = {{begin, 0}, {begin + random_.uniform(5, 40), speed}};
 }
 
 void Traffic::fill(const Flow& flow) {
@@ -165,7 +161,7 @@ double Traffic::wanted_speed(const Driver& driver) const {
   for (const auto& change : driver.schedule) {
     if (time_ >= change.first) cruise = change.second;
   }
-  if (driver.waits_for_gap && driver.speed < 0.1 && cruise > 0) {
+  if (driver.yields && driver.speed < 0.1 && cruise > 0) {
     const Waypoint at = place_of(driver);
     for (const Body& body : bodies_) {
       if (body.driver == &driver || norm(body.velocity) < 1) continue;
@@ -371,14 +367,6 @@ std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
     if (norm(pose.at.position - centre) < radius) result.push_back(pose);
   };
   for (const ObjectPose& pose : parked) add(pose);
-  for (const Door& door : doors) {
-    constexpr double kStep = 0.05, kHalf = 0.5;  // s; m from the hinge to the middle
-    const double angle = door.angle(time_), before = door.angle(time_ - kStep);
-    if (angle <= 0 && before <= 0) continue;
-    Waypoint at = door.hinge;
-    at.heading -= door.side * angle;
-    add({static_cast<std::uint32_t>(door.object), at, kHalf * std::abs(angle - before) / kStep, 0});
-  }
   for (std::size_t i = 1; i < drivers.size(); ++i) {
     const Driver& driver = drivers[i];
     if (!driver.active) continue;

@@ -22,7 +22,6 @@ struct Object {
   Model model;                 ///< empty for people, whose shape changes
   std::uint16_t label = 0;     ///< SemanticKITTI class; 0: that of its kind
   std::uint32_t instance = 0;  ///< 0: by its number
-  bool pushes_pram = false;    ///< people only
 };
 
 /// Pose of an object at the time of one scan.
@@ -66,12 +65,11 @@ class Traffic {
     std::size_t lane = 0;
     double s = 0;  ///< of the vehicle's middle
     double speed = 0;
-    double cruise = 10;          ///< m/s
-    bool stays_at_end = false;   ///< parks at the end of the route instead of leaving the world
-    bool waits_for_gap = false;  ///< starts only if no vehicle comes from behind
-    bool yields = false;         ///< gives way to vehicles that are about to cross
-    double rest_gap = 2.0;       ///< m, gap to the vehicle in front at rest
-    double foresight = 1.2;      ///< s, how early people are given way to
+    double cruise = 10;         ///< m/s
+    bool stays_at_end = false;  ///< parks at the end of the route instead of leaving the world
+    bool yields = false;        ///< to vehicles that are about to cross, or come from behind
+    double rest_gap = 2.0;      ///< m, gap to the vehicle in front at rest
+    double foresight = 1.2;     ///< s, how early people are given way to
     /// From `first` seconds on, `second` replaces `cruise`.
     std::vector<std::pair<double, double>> schedule;
     double acceleration = 0;
@@ -91,16 +89,6 @@ class Traffic {
     double phase = 0;
   };
 
-  /// Door of a parked car: a separate object, seen while the door is open.
-  struct Door {
-    std::size_t object = 0;
-    Waypoint hinge;                   ///< the door closed, with the heading of the car
-    int side = 1;                     ///< 1 left, -1 right
-    double open = 0;                  ///< s; begins to open
-    double close = 1e9;               ///< s; begins to close
-    double angle(double time) const;  ///< rad
-  };
-
   /// New vehicles enter a lane at its start.
   struct Flow {
     std::size_t lane = 0;
@@ -108,6 +96,7 @@ class Traffic {
     double speed = 12;                           ///< m/s, about
     double trucks = 0, buses = 0, cyclists = 0;  ///< shares
     double vans = 0.15;                          ///< share
+    double stops = 0;                            ///< share that waits somewhere, and goes on
     double next_gap = 0;
   };
 
@@ -120,7 +109,6 @@ class Traffic {
   std::vector<Signal> signals;
   std::vector<Driver> drivers;  ///< the first is the ego vehicle
   std::vector<Walker> walkers;
-  std::vector<Door> doors;
   std::vector<Flow> flows;
 
   std::size_t add_object(Kind kind);

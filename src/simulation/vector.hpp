@@ -1,8 +1,10 @@
-// Small vectors and angles of the ray caster. Written out so that every compiler does the same
-// additions.
+// Small vectors, angles and grids of the ray caster. Written out so that every compiler does the
+// same additions.
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 namespace dynains::simulation {
 
@@ -67,6 +69,18 @@ struct Rigid {
 inline Vec3 operator*(const Rigid& t, Vec3 p) { return t.rotation * p + t.translation; }
 inline Rigid operator*(const Rigid& a, const Rigid& b) {
   return {a.rotation * b.rotation, a * b.translation};
+}
+
+/// Place of a cell in a grid of rows of `width` cells; neither `row` nor `column` is negative.
+constexpr std::size_t grid_index(int row, int column, int width) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(column);
+}
+
+/// Key of a cell of an unbounded grid.
+constexpr std::uint64_t cell_key(int x, int y) {
+  return static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 |
+         static_cast<std::uint32_t>(y);
 }
 
 }  // namespace dynains::simulation

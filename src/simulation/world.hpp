@@ -25,12 +25,12 @@ class StaticGeometry {
   /// some beyond; `model` counts the calls of add().
   template <class Visitor>
   void visit_near(Vec2 centre, double radius, Visitor&& visitor) const {
-    constexpr double kReach = 40.0;  // m, from the middle of a primitive to its ends, at most
     for (std::size_t i = 0; i < primitives_.size(); ++i) {
       const auto& [primitive, model] = primitives_[i];
       const Vec2 middle{static_cast<double>(primitive.centre.x),
                         static_cast<double>(primitive.centre.y)};
-      if (norm(middle - centre) <= radius + kReach) visitor(primitive, std::uint64_t{i}, model);
+      // No primitive reaches farther than 40 m from its middle.
+      if (norm(middle - centre) <= radius + 40) visitor(primitive, std::uint64_t{i}, model);
     }
   }
 
@@ -45,11 +45,9 @@ struct World {
   Traffic traffic;
 };
 
-/// Builds the scene at its start time.
+/// The scene at its start time.
+World build_scene(const Config& config);
+/// The same, on the day of the configuration.
 World build_world(const Config& config);
-
-/// The place of `layout` with the traffic and the parked vehicles of `day`, and the changes of the
-/// day. Both are of one seed and scene.
-World on_day(World layout, World day, const Config& config);
 
 }  // namespace dynains::simulation

@@ -11,8 +11,6 @@
 namespace dynains::simulation {
 namespace {
 
-constexpr const char* kFrame = "lidar";
-
 std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
   CloudLayout layout{{{"x", Scalar::kFloat},
                       {"y", Scalar::kFloat},
@@ -28,7 +26,7 @@ std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
     append_number(scan.labels[i], points);
     if (has_times) append_number(scan.times[i], points);
   }
-  return cloud_message(time, kFrame, layout, points);
+  return cloud_message(time, "lidar", layout, points);
 }
 
 }  // namespace
@@ -42,7 +40,7 @@ bool write_log(Simulator& simulator, const std::filesystem::path& file,
     const SimulatedScan scan = simulator.scan(i);
     const auto time = static_cast<std::uint64_t>(std::llround(scan.time * 1e9));
     writer.write(transforms, time,
-                 transform_message(time, "map", kFrame, scan.T_world_sensor_noisy));
+                 transform_message(time, "map", "lidar", scan.T_world_sensor_noisy));
     writer.write(clouds, time, cloud_of(scan, time));
     if (progress && !progress(i + 1, simulator.size())) return false;
   }

@@ -218,7 +218,7 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
     sim::Config config = dynains::test::drive_of(
         static_cast<sim::Scene>(i % value_names(sim::Scene()).size()),
-        static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size()), 1, 11 + i);
+        static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size()), 1, 12 + i);
     config.sensor_height = mount.height;
     config.mounting_pitch = mount.pitch;
     config.mounting_roll = mount.roll;

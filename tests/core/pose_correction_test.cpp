@@ -378,7 +378,7 @@ TEST_CASE("traffic that starts together does not correct an exact pose, large ob
 
 TEST_CASE("a scan of another place is lost, and a scan without points has no residual") {
   const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 4);
-  const std::vector<SimulatedScan> others = drive(Scene::kVegetation, Sensor::kHdl64, 1);
+  const std::vector<SimulatedScan> others = drive(Scene::kHall, Sensor::kHdl64, 1);
   PoseCorrection correction = after_all_but_last(scans);
   const Eigen::Isometry3d tilted =
       scans.back().T_world_sensor * perturbation({0.0, 0.0, 0.4}, {6.0, 5.0, 30.0});

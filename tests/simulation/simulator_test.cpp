@@ -119,7 +119,7 @@ TEST_CASE("instant labels are moving above half a metre per second") {
 }
 
 TEST_CASE("ever labels never change, and are moving if the object moves at any time") {
-  Config config = drive_of(Scene::kStopAndGo, Sensor::kVlp16, 80, 3);
+  Config config = drive_of(Scene::kStopAndGo, Sensor::kVlp16, 80, 6);
   Simulator ever(config);
   config.labelling = Labelling::kInstant;
   Simulator instant(config);
