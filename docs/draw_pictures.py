@@ -102,7 +102,6 @@ class Workshop:
     def street(self):
         return self.run(self.simulate("street"), "street", "--passes", "2", "--view")
 
-
     def drive(self):
         """The recording of the tutorial, as a folder."""
         sequence = self.simulate("drive", "--sensor", "hdl32", "--scans", "200", "--seed", "5")
@@ -255,7 +254,7 @@ def draw_beam(workshop):
     workshop.save(figure, "beam")
 
 
-WAITING_CAR = 2  # instance of the simulated queue: it stands for 8.6 s, then it leaves
+WAITING_CAR = 7  # instance of the simulated queue: it stands for 7.8 s, then it leaves
 
 
 def draw_belief(workshop):
