@@ -286,6 +286,20 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
     CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17));
     CHECK(visibility.bits(i, i + 1).hit == 0);
   }
+  // Measured from a place aside: a beam on the side of that place crosses what is free anyway.
+  for (const double side : {1.0, -1.0}) {
+    const Eigen::Vector3d viewpoint(30.0 * (std::cos(azimuth) - side * std::sin(azimuth)),
+                                    30.0 * (std::sin(azimuth) + side * std::cos(azimuth)), 0.0);
+    detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
+                            visibility, viewpoint.cast<float>());
+    for (std::size_t i = 0; i < count; ++i) {
+      INFO("sample " << i << " side " << side);
+      const bool is_before = -side * distances[i] > 0.25 * 0.17;
+      CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17 && !is_before));
+    }
+  }
+  detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
+                          visibility);
   // Another view of the same reference adds what it sees; its hits count more.
   image.build(grid, PointsView(), coarse_wall(grid, 30.0), {}, 0.0F, scratch);
   detail::add_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,

@@ -119,7 +119,9 @@ class ReferenceScans {
   void adapt(Span<const SensorModel> sensors) {
     grids_.clear();
     T_level_beams_.clear();
+    viewpoint_.setZero();
     for (const SensorModel& sensor : sensors) {
+      viewpoint_ += sensor.origin / static_cast<double>(sensors.size());
       grids_.push_back(RangeImageGrid::for_sensor(sensor));
       T_level_beams_.emplace_back(Pose::Identity());
       T_level_beams_.back().linear() = sensor.R_level_headed;
@@ -192,9 +194,10 @@ class ReferenceScans {
     return nullptr;
   }
 
-  /// Replaces `out` by the visibility of the first `count` points (m; padded for packs) of scan
-  /// number `scan` from a reference. If it has several scans, this scan and the adjacent ones are
-  /// not used.
+  /// Replaces `out` by the visibility of the first `count` points (m, level frame; padded for
+  /// packs) of scan number `scan` from a reference. If it has several scans, this scan and the
+  /// adjacent ones are not used. The points of several sensors count as seen from the middle
+  /// between these.
   const Visibility& test(const PointBuffer& points, std::size_t count, std::uint64_t scan,
                          const Pose& T_world_points, const ReferenceScan& reference,
                          Visibility& out) const {
@@ -204,8 +207,9 @@ class ReferenceScans {
       const ReferenceView& view = reference.views[i];
       if (scans_ > 1 && view.scan <= scan + 1 && scan <= view.scan + 1) continue;
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
+      const Eigen::Vector3d viewpoint = T_view_points * viewpoint_;
       add_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
-                     static_cast<float>(config_.margin_slope), out);
+                     static_cast<float>(config_.margin_slope), out, viewpoint.cast<float>());
       ++tested;
     }
     if (tested > 1) out.settle(count);
@@ -311,8 +315,9 @@ class ReferenceScans {
   int scans_ = 1;                      // of a reference
   std::vector<RangeImageGrid> grids_;  // by sensor
   std::vector<Pose> T_level_beams_;    // by sensor
-  bool is_level_ = true;               // the images of the only sensor are in the level frame
-  PointBuffer own_;                    // points of several sensors, by sensor
+  Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();  // mean origin of the sensors, level frame
+  bool is_level_ = true;  // the images of the only sensor are in the level frame
+  PointBuffer own_;       // points of several sensors, by sensor
   std::vector<std::uint8_t> own_moving_;
   std::vector<OwnPoints> own_of_;  // by sensor
   std::vector<std::size_t> next_;  // by sensor

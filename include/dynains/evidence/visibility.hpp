@@ -17,7 +17,7 @@
 
 namespace dynains::detail {
 
-/// Number of samples per block of test_visibility().
+/// Number of samples per block of add_visibility().
 inline constexpr std::size_t kBeamBlock = 256;
 
 /// Visibility of samples from one reference scan: for each sample one bit "free" and one bit "hit".
@@ -110,9 +110,12 @@ class ImageTest {
   using Float = typename Packs::Float;
   using Int = typename Packs::Int;
 
-  /// `to_image`: from the frame of the samples to the frame of the image.
-  ImageTest(const RangeImage& image, const PackTransform& to_image, float margin, float slope)
+  /// `to_image`: from the frame of the samples to the frame of the image. `viewpoint`: see
+  /// add_visibility().
+  ImageTest(const RangeImage& image, const PackTransform& to_image, float margin, float slope,
+            const Eigen::Vector3f& viewpoint)
       : to_image_(to_image),
+        viewpoint_{viewpoint.x(), viewpoint.y(), viewpoint.z()},
         locator_(image.grid()),
         margin_(margin * RangeImage::kCentimetres),
         slope_(slope * RangeImage::kCentimetres),
@@ -125,7 +128,7 @@ class ImageTest {
   /// is larger than the inner caches.
   void locate(const Float& x, const Float& y, const Float& z, std::int32_t* cell,
               float* range) const {
-    project(x, y, z, [&](const auto&, const Float& distance, const auto& at) {
+    project(x, y, z, [&](const auto&, const auto&, const Float& distance, const auto& at) {
       at.cell.store(cell);
       distance.store(range);
     });
@@ -166,9 +169,12 @@ class ImageTest {
   }
 
   /// Bits of the samples (m) that a beam passes near enough, of those in `cell`. The largest
-  /// lateral distance is the error of poses and points, and the width of a beam at its range.
+  /// lateral distance is the error of poses and points, and the width of a beam at its range. A
+  /// beam that passes before a sample, towards the viewpoint, by more than a part of this distance
+  /// crosses space that the beam of the sample itself found free: it tells nothing.
   unsigned is_near(const Float& x, const Float& y, const Float& z, const std::int32_t* cell) const {
     static constexpr PackConstant kReach(0.05F), kReachSlope(0.004F);  // m, m/m
+    static constexpr PackConstant kBefore(0.25F), kOne(1.0F);
     static constexpr PackConstant kStep(1.0F / RangeImage::kPlaces),
         kHalf(0.5F / RangeImage::kPlaces);
     std::int32_t packed[kPackWidth];
@@ -178,30 +184,41 @@ class ImageTest {
       return to_float(step) * Float(kStep) + Float(kHalf);
     };
     unsigned near = 0;
-    project(x, y, z, [&](const Float& level, const Float& distance, const auto& at) {
-      const Float aside = (within(beam >> 8) - at.column) * (sqrt(level) * Float(cell_width_));
+    project(x, y, z, [&](const auto& p, const Float& level, const Float& distance, const auto& at) {
+      const Float horizontal = sqrt(level);
+      const Float aside = (within(beam >> 8) - at.column) * (horizontal * Float(cell_width_));
       const Float above =
           (within(beam & Int(RangeImage::kPlaces - 1)) - at.row) * (distance * Float(cell_height_));
       const Float reach = distance * Float(kReachSlope) + Float(kReach);
-      near = (aside * aside + above * above <= reach * reach).bits();
+      // Direction from the samples to the viewpoint, along the columns and the rows.
+      const Float vx(viewpoint_[0]), vy(viewpoint_[1]), vz(viewpoint_[2]);
+      const Float dx = p[0] - vx;
+      const Float dy = p[1] - vy;
+      const Float dz = p[2] - vz;
+      const Float unit = Float(kOne) / (horizontal * distance * sqrt(dx * dx + dy * dy + dz * dz));
+      const Float back_aside = (vy * p[0] - vx * p[1]) * distance * unit;
+      const Float back_above = (vz * level - p[2] * (vx * p[0] + vy * p[1])) * unit;
+      near = ((aside * aside + above * above <= reach * reach) &
+              (aside * back_aside + above * back_above <= reach * Float(kBefore)))
+                 .bits();
     });
     return near;
   }
 
  private:
-  // Calls `use(squared horizontal distance, distance, place in the image)`, m^2 and m. Packs that
-  // are returned in a structure would go through memory.
+  // Calls `use(point in the frame of the image, squared horizontal distance, distance, place in the
+  // image)`, m and m^2. Packs that are returned in a structure would go through memory.
   template <class Use>
   void project(const Float& px, const Float& py, const Float& pz, const Use& use) const {
-    const Float x = to_image_(0, px, py, pz);
-    const Float y = to_image_(1, px, py, pz);
-    const Float z = to_image_(2, px, py, pz);
-    const Float level = x * x + y * y;
-    const Float distance = sqrt(level + z * z);
-    use(level, distance, locator_.template locate<Packs>(x, y, z, distance));
+    const Float p[] = {to_image_(0, px, py, pz), to_image_(1, px, py, pz),
+                       to_image_(2, px, py, pz)};
+    const Float level = p[0] * p[0] + p[1] * p[1];
+    const Float distance = sqrt(level + p[2] * p[2]);
+    use(p, level, distance, locator_.template locate<Packs>(p[0], p[1], p[2], distance));
   }
 
   PackTransform to_image_;
+  PackConstant viewpoint_[3];  // m, frame of the image
   ImageLocator locator_;
   PackConstant margin_, slope_;            // cm, cm/m
   PackConstant cell_width_, cell_height_;  // rad
@@ -212,15 +229,17 @@ class ImageTest {
 /// Adds what a range image shows of the first `count` samples (m; padded for packs) to bits that
 /// were cleared. A sample may become both "free" in one image and "hit" in another: call
 /// Visibility::settle() after the last one. `T_image_sample`: rigid. `margin`, `slope`: see
-/// ImageTest.
+/// ImageTest. `viewpoint`: the place that the samples were measured from, frame of the image, m; if
+/// there are several, its origin.
 inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
                            const PointBuffer& samples, std::size_t count, float margin, float slope,
-                           Visibility& visibility) {
+                           Visibility& visibility,
+                           const Eigen::Vector3f& viewpoint = Eigen::Vector3f::Zero()) {
   const PackTransform to_image(T_image_sample);
   with_packs([&](auto packs) {
     using Packs = decltype(packs);
     using Float = typename Packs::Float;
-    const ImageTest<Packs> test(image, to_image, margin, slope);
+    const ImageTest<Packs> test(image, to_image, margin, slope, viewpoint);
     const float* const x = samples.x.data();
     const float* const y = samples.y.data();
     const float* const z = samples.z.data();
@@ -262,9 +281,10 @@ inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
 /// The visibility of samples from one image, see add_visibility().
 inline void test_visibility(const RangeImage& image, const Pose& T_reference_sample,
                             const PointBuffer& samples, std::size_t count, float margin,
-                            float slope, Visibility& visibility) {
+                            float slope, Visibility& visibility,
+                            const Eigen::Vector3f& viewpoint = Eigen::Vector3f::Zero()) {
   visibility.clear(count);
-  add_visibility(image, T_reference_sample, samples, count, margin, slope, visibility);
+  add_visibility(image, T_reference_sample, samples, count, margin, slope, visibility, viewpoint);
 }
 
 }  // namespace dynains::detail
