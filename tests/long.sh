@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Tests that take longer than the suite, one a call:
 #
-# tests/long.sh fuzz NAME SECONDS   a fuzzer of tests/fuzz, for example pcd or facade
+# tests/long.sh fuzz NAME SECONDS   a fuzzer of tests/fuzz, for example pcd or facade; all: each
 # tests/long.sh asan|asan-gcc|tsan  the suite under sanitizers; GCC compiles other SIMD kernels
 # tests/long.sh coverage            lines of include/ and src/ that the tests reach
 # tests/long.sh disturbed STARTS    every state after a power cut, every error of every call, and so
@@ -27,8 +27,14 @@ debug=(-DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS=-O1)
 python=(-DDYNAINS_BUILD_PYTHON=ON -DPython3_EXECUTABLE=/usr/bin/python3)
 
 fuzz() {
-  CXX=clang++ build build-fuzz -DDYNAINS_BUILD_FUZZERS=ON -DCMAKE_BUILD_TYPE=Debug \
-    -DCMAKE_CXX_FLAGS=-O2
+  CXX=${CXX:-clang++} cmake -B build-fuzz -DDYNAINS_BUILD_FUZZERS=ON -DCMAKE_BUILD_TYPE=Debug \
+    -DCMAKE_CXX_FLAGS=-O2 -DDYNAINS_FUZZ_SECONDS="$2"
+  cmake --build build-fuzz -j2 --target fuzzers
+  if [[ $1 == all ]]; then
+    ctest --test-dir build-fuzz -L fuzz --output-on-failure -j2
+    return
+  fi
+  build-fuzz/tests/fuzz/dynains_write_seeds build-fuzz/tests/fuzz/corpus
   local options=("-max_total_time=$2" -timeout=20 -malloc_limit_mb=512)
   [[ $1 != facade ]] || options+=(-entropic=0 -detect_leaks=0 -max_len=256)
   cd build-fuzz/tests/fuzz
