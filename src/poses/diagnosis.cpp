@@ -148,12 +148,13 @@ RegisteredMotion motion_of_pair(const Pair& pair) {
   return {0, pair.first, pair.second, Pose::Identity(), {}, 0.0};
 }
 
-Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs) {
+Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs,
+                          bool with_surfaces = false) {
   Agreement mean{0.0, 0.0, 0};  // weighted by points
   for (const Pair& pair : pairs) {
     const auto T_a_b = motion(motion_of_pair(pair));
     if (!T_a_b) continue;
-    const Agreement one = pair.a.compare(pair.b, *T_a_b);
+    const Agreement one = pair.a.compare(pair.b, *T_a_b, with_surfaces);
     const auto points = static_cast<double>(one.points);
     mean.share += points * one.share;
     mean.gap += points * one.gap;
@@ -325,15 +326,18 @@ struct Evidence {
     return known;
   }
   /// The misfit (m) of a reading, by registered motions. Infinite if it explains no more than no
-  /// motion, or too few of the motions, if its unit or scale explains no more than turns alone, or
-  /// if landmarks meet better under the given poses.
+  /// motion, too few of the motions, or no more than a drift of the given poses (which can undo a
+  /// mirrored turn), if its unit or scale explains no more than turns alone, or if landmarks meet
+  /// better under the given poses.
   double misfit_of(const Reading& reading) const {
     const BodyMotion motion = motion_under(recording, reading);
     const Evidence known = where_known(motion);
     const double error = error_at_points(known.motions, motion);
+    const BodyMotion drifting = with_drift(given_motion(recording), known.motions);
     const bool is_explained =
         2 * known.motions.size() > motions.size() &&
         error < std::min(kRough, 0.5 * error_at_points(known.motions, no_motion)) &&
+        is_much_smaller(error, error_at_points(known.motions, drifting)) &&
         !miss_motion(known.motions, motion) &&
         (!changes_ways(reading) ||
          is_much_smaller(error, error_at_points(known.motions, turns_of(motion))));
@@ -365,14 +369,20 @@ std::optional<Reading> best_reading(const Evidence& evidence, const std::vector<
   return best;
 }
 
-/// Whether errors from one scan to the next exceed those that exact poses leave: by the noise of
-/// the registration, and by the motion within de-skewed scans, which is taken as even between two
+bool is_exact(const MotionError& error) {
+  return error.at_points < std::max(kExact, 2.0 * error.noise);
+}
+
+/// Whether errors over some scans exceed those that exact poses leave: by the noise of the
+/// registration, and by the motion within de-skewed scans, which is taken as even between two
 /// poses. If a sensor sways, the middle of a scan is off by an eighth of the change of motion, and
 /// that of the next scan by as much to the other side.
-bool is_inexact(const Recording& recording, const MotionError& steps) {
+/// `least`: of its errors.
+bool is_inexact(const Recording& recording, const MotionError& error, const MotionError& least) {
   constexpr double kUneven = 0.25;
-  double translation = std::max(kInexact, 3.0 * steps.translation_noise);
-  double rotation = std::max(kInexact / kLever, 3.0 * steps.rotation_noise);
+  if (is_exact(error)) return false;
+  double translation = std::max(least.translation, 3.0 * error.translation_noise);
+  double rotation = std::max(least.rotation, 3.0 * error.rotation_noise);
   if (recording.is_deskewed()) {
     std::vector<double> translations, rotations;
     for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
@@ -384,7 +394,32 @@ bool is_inexact(const Recording& recording, const MotionError& steps) {
     translation = std::max(translation, kUneven * median(std::move(translations)));
     rotation = std::max(rotation, kUneven * median(std::move(rotations)));
   }
-  return steps.translation > translation || steps.rotation > rotation;
+  return error.translation > translation || error.rotation > rotation;
+}
+
+/// Sets the errors of the poses in `d`, over the least number of scans over which they are inexact,
+/// or else from one scan to the next. Returns whether they are inexact: small errors add up, while
+/// those of single scans do not grow with the scans between. Smaller ones count if they grow.
+bool measure_errors(const Evidence& evidence, Diagnosis& d) {
+  constexpr double kGrowing = 2.5;  // ratio of errors over three scans or more and over one
+  MotionError least;
+  least.translation = kInexact;
+  least.rotation = kInexact / kLever;
+  for (std::size_t gap = 1; gap <= kMaxSpan; gap *= 3) {
+    const MotionError error =
+        motion_error(evidence.motions, given_motion(evidence.recording), Pose::Identity(), gap);
+    if (error.pairs < kMinPairs) break;
+    const bool is_found = is_inexact(evidence.recording, error, least);
+    if (gap > 1 && !is_found) continue;
+    least.translation = std::max(kExact, kGrowing * error.translation);
+    least.rotation = std::max(kExact / kLever, kGrowing * error.rotation);
+    d.translation_error = error.translation;
+    d.rotation_error = error.rotation;
+    d.registered_pairs = error.pairs;
+    d.error_span = gap;
+    if (is_found) return true;
+  }
+  return false;
 }
 
 /// Whether most of the pairs for which another motion is found (none, or that of a registration
@@ -410,12 +445,13 @@ bool are_refuted(const Evidence& evidence) {
   return 2 * refuted > evidence.pairs.size();
 }
 
-/// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd.
-PoseVerdict verdict_of_agreement(const Evidence& evidence) {
+/// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd. `d`: with the
+/// agreements that are shown.
+PoseVerdict verdict_of_agreement(const Evidence& evidence, const Diagnosis& d) {
   const Agreement &given = evidence.as_given, &standing = evidence.standing;
   const bool is_doubtful = given.share < kMinAgreement || is_clearly_better(standing, given);
   if (is_doubtful && are_refuted(evidence)) return PoseVerdict::kDisagree;
-  return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+  return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
 }
 
 void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
@@ -423,16 +459,12 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
   const std::vector<RegisteredMotion>& motions = evidence.motions;
   const BodyMotion given = given_motion(recording);
   const MotionError all = motion_error(motions, given);
-  const MotionError steps = motion_error(motions, given, Pose::Identity(), true);
-  d.translation_error = steps.translation;
-  d.rotation_error = steps.rotation;
-  d.registered_pairs = steps.pairs;
-  const bool is_exact = all.at_points < std::max(kExact, 2.0 * all.noise);
-  if (!is_exact) d.flaws = flaws_of(recording);
+  const bool are_inexact = measure_errors(evidence, d);
+  if (!is_exact(all)) d.flaws = flaws_of(recording);
   const bool is_flawed = d.flaws.has_equal_orientations || d.flaws.step > 0.0;
   if (all.at_points > kExact && !is_flawed) {
     std::vector<Reading> readings = usual_readings(recording);
-    if (!is_exact) {
+    if (!is_exact(all)) {
       for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);
     }
     const auto reading = best_reading(evidence, readings, all.at_points);
@@ -443,13 +475,13 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
       return;
     }
   }
-  d.verdict = verdict_of_agreement(evidence);
+  d.verdict = verdict_of_agreement(evidence, d);
   if (all.at_points > kRough || miss_motion(motions, given)) {
     d.verdict = PoseVerdict::kDisagree;
-  } else if (is_exact) {
-    if (d.verdict == PoseVerdict::kDisagree) d.verdict = PoseVerdict::kAgree;
-  } else if (d.verdict == PoseVerdict::kDisagree || is_inexact(recording, steps)) {
+  } else if (are_inexact || (d.verdict == PoseVerdict::kDisagree && !is_exact(all))) {
     d.verdict = PoseVerdict::kInexact;
+  } else if (d.verdict == PoseVerdict::kDisagree) {
+    d.verdict = PoseVerdict::kAgree;
   }
   const bool is_uncertain = d.translation_error > kInexact ||
                             kLever * d.rotation_error > kInexact;  // as their noise is large, too
@@ -469,10 +501,16 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   // Poses that are exact nearly everywhere need no further places.
   const BodyMotion given = given_motion(recording);
   const auto are_exact = [&](const std::vector<RegisteredMotion>& motions) {
-    const auto inexact = std::count_if(motions.begin(), motions.end(), [&](const auto& one) {
-      return error_at_points({one}, given) >= kExact;
-    });
-    return are_enough(motions, pairs) && 4 * static_cast<std::size_t>(inexact) <= motions.size();
+    std::map<std::size_t, std::pair<std::size_t, std::size_t>> counts;  // inexact and all, by gap
+    for (const RegisteredMotion& one : motions) {
+      auto& [inexact, all] = counts[one.second - one.first];
+      inexact += error_at_points({one}, given) >= kExact ? 1 : 0;
+      ++all;
+    }
+    return are_enough(motions, pairs) &&
+           std::all_of(counts.begin(), counts.end(), [](const auto& of_gap) {
+             return 4 * of_gap.second.first <= of_gap.second.second;
+           });
   };
   const bool is_world = recording.frame() == PointFrame::kWorld;
   std::vector<RegisteredMotion> motions;
@@ -487,19 +525,21 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   d.standing = agreement_under(no_motion, sampled.pairs);
   if (d.as_given.points < kMinCompared) return d;
   const Evidence evidence{recording, sampled.pairs, std::move(motions), d.as_given, d.standing};
+  d.as_given = agreement_under(given, sampled.pairs, true);
+  d.standing = agreement_under(no_motion, sampled.pairs, true);
   if (is_world) {
     constexpr double kTellingWay = 5.0;  // m
     d.verdict = follow_sensor(recording, kTellingWay).value_or(true)
-                    ? verdict_of_agreement(evidence)
+                    ? verdict_of_agreement(evidence, d)
                     : PoseVerdict::kDisagree;
     return d;
   }
   if (are_enough(evidence.motions, kMinPairs)) {
     judge_by_motions(evidence, d);
   } else {
-    d.verdict = verdict_of_agreement(evidence);
+    d.verdict = verdict_of_agreement(evidence, d);
   }
-  const bool is_apart = std::max(d.as_given.share, d.standing.share) < kMinAgreement;
+  const bool is_apart = std::max(evidence.as_given.share, evidence.standing.share) < kMinAgreement;
   if (d.verdict == PoseVerdict::kDisagree || (d.verdict == PoseVerdict::kNoMotion && is_apart)) {
     d.flaws.period = period_of_views(recording, sample);
     if (d.flaws.period > 0) d.verdict = PoseVerdict::kDisagree;
@@ -511,7 +551,7 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
 bool halves_error(const Recording& recording, const Diagnosis& d) {
   const auto suffice = [](const auto& motions) { return are_enough(motions, kMinPairs); };
   const std::vector<RegisteredMotion> motions = register_motions(recording, suffice);
-  const MotionError steps = motion_error(motions, given_motion(recording), Pose::Identity(), true);
+  const MotionError steps = motion_error(motions, given_motion(recording), Pose::Identity(), 1);
   return suffice(motions) && std::hypot(steps.translation, kLever * steps.rotation) <
                                  0.5 * std::hypot(d.translation_error, kLever * d.rotation_error);
 }

@@ -34,10 +34,11 @@ class Landmarks {
 
   std::size_t size() const { return points().size(); }
   const std::vector<Eigen::Vector3d>& points() const;
-  /// Agreement of `other` with this scan under the pose `T_this_other`. It is symmetric except for
-  /// occlusion. `most`: compared points, about.
+  /// Agreement of `other` with this scan under the pose `T_this_other`, at about 1200 points. It is
+  /// symmetric except for occlusion. `with_surfaces`: points agree with surfaces between points,
+  /// too, so that smooth walls do not tell where beams hit them.
   Agreement compare(const Landmarks& other, const Pose& T_this_other,
-                    std::size_t most = 1200) const;
+                    bool with_surfaces = false) const;
   /// Surfaces through the points; the first call builds them.
   const SurfaceGrid& surfaces() const;
   /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.

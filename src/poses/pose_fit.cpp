@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -376,6 +377,28 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
 
 double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body) {
   return motion_error(motions, body).at_points;
+}
+
+BodyMotion with_drift(const BodyMotion& body, const std::vector<RegisteredMotion>& motions) {
+  const auto scans = [](const RegisteredMotion& motion) {
+    return static_cast<double>(motion.second - motion.first);
+  };
+  std::array<std::vector<double>, 3> turns;  // from scan to scan, rad times kLever
+  for (const RegisteredMotion& motion : motions) {
+    const auto T = body(motion);
+    if (!T) continue;
+    const Vector6 r = residual(*T, motion.T_first_second, Pose::Identity());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      turns[axis].push_back(r[static_cast<Eigen::Index>(3 + axis)] / scans(motion));
+    }
+  }
+  Vector6 drift = Vector6::Zero();
+  drift.tail<3>() << median(turns[0]), median(turns[1]), median(turns[2]);
+  return [=](const RegisteredMotion& motion) {
+    auto T = body(motion);
+    if (T) *T = *T * stepped(Pose::Identity(), scans(motion) * drift);
+    return T;
+  };
 }
 
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

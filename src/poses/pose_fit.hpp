@@ -64,6 +64,9 @@ MotionError motion_error(const std::vector<RegisteredMotion>& motions, const Bod
 /// MotionError::at_points of all motions.
 double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body);
 
+/// `body`, with the turn from scan to scan that `motions` add to it in the median.
+BodyMotion with_drift(const BodyMotion& body, const std::vector<RegisteredMotion>& motions);
+
 /// Hand-eye calibration: T_body_sensor for which the motions of the body and of the sensor agree
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,

@@ -89,6 +89,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
                           check.findings + check.advice};
   add_options(result.options, check.flags);
   if (d.registered_pairs > 0) {
+    result.measured["error_span"] = d.error_span;
     result.translation_error = d.translation_error;
     result.rotation_error = 180.0 / M_PI * d.rotation_error;
   }
@@ -114,16 +115,17 @@ void bind_check(py::module_& module) {
           "verdict", &CheckedRecording::verdict,
           "'agree', 'inexact', 'no motion', 'otherwise' (under other options), 'disagree' or "
           "'unknown'.")
-      .def_readonly(
-          "translation_error", &CheckedRecording::translation_error,
-          "m, error of the poses from one scan to the next by registration; None if unknown.")
+      .def_readonly("translation_error", &CheckedRecording::translation_error,
+                    "m, error of the poses over measured['error_span'] scans by registration; None "
+                    "if unknown.")
       .def_readonly("rotation_error", &CheckedRecording::rotation_error, "deg, likewise.")
       .def_readonly(
           "measured", &CheckedRecording::measured,
           "By name: scan_files, pose_rows, scans (with a pose); period (s), step, longest_step (m) "
           "from scan to scan; points (per scan); invalid_share, ego_share (nearer than 2 m), "
-          "agreement (of two scans under the poses), 0 to 1; farthest (m, 99 % of ranges are "
-          "shorter); height (m, over the ground), tilt (deg), unless no ground was found.")
+          "agreement (of two scans under the poses), 0 to 1; error_span (scans, more than 1 if "
+          "errors add up); farthest (m, 99 % of ranges are shorter); height (m, over the ground), "
+          "tilt (deg), unless no ground was found.")
       .def("__repr__", [](const CheckedRecording& checked) { return checked.text; });
 
   const std::string doc =

@@ -13,11 +13,10 @@
 namespace dynains::program {
 namespace {
 
-/// "12 cm and 0.3 deg from one scan to the next".
+/// "12 cm and 0.3 deg over 9 scans".
 std::string error_text(const Diagnosis& d) {
   return evaluation::format_number(100.0 * d.translation_error, 0) + " cm and " +
-         evaluation::format_number(180.0 / M_PI * d.rotation_error, 1) +
-         " deg from one scan to the next";
+         evaluation::format_number(180.0 / M_PI * d.rotation_error, 1) + " deg " + span_text(d);
 }
 
 /// A setting as its flag has it; "false" for a flag that is left out. Empty for settings that no
@@ -111,6 +110,11 @@ std::string proposed_flags(const Recording& recording, const RecordingOptions& p
   return changes.left_out.empty() ? changes.flags : std::string();
 }
 
+std::string span_text(const Diagnosis& d) {
+  return d.error_span == 1 ? "from one scan to the next"
+                           : "over " + std::to_string(d.error_span) + " scans";
+}
+
 std::string advice(const Recording& recording, const Diagnosis& d) {
   switch (d.verdict) {
     case PoseVerdict::kAgree:
@@ -123,7 +127,7 @@ std::string advice(const Recording& recording, const Diagnosis& d) {
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
              ": expect losses; poses of a LiDAR odometry would do better." + text_on_flaws(d.flaws);
     case PoseVerdict::kNoMotion:
-      if (d.step * static_cast<double>(d.stride) > 1.0) {
+      if (d.step * static_cast<double>(d.stride) > 1.0 || d.standing.share < 0.5) {
         return "Too little stands beside the way to tell what the poses mean; nothing speaks "
                "against them.";
       }

@@ -12,6 +12,9 @@ namespace dynains::program {
 /// `--invert-poses --pose-units mm`; empty if nothing changes, or if a flag has to be left out.
 std::string proposed_flags(const Recording& recording, const RecordingOptions& proposal);
 
+/// Over how many scans errors are: "from one scan to the next" or "over 9 scans".
+std::string span_text(const Diagnosis& diagnosis);
+
 /// One sentence with the verdict on the poses and the proposed flags.
 std::string advice(const Recording& recording, const Diagnosis& diagnosis);
 

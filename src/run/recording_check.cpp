@@ -140,9 +140,9 @@ std::string describe(const Recording& recording, const Diagnosis& d,
   if (d.registered_pairs > 0) {
     add_line(text, "poses",
              "off by " + fixed(100.0 * d.translation_error, 1, " cm and ") +
-                 fixed(180.0 / M_PI * d.rotation_error, 2, " deg") +
-                 " from one scan to the next, by the registration of " +
-                 std::to_string(d.registered_pairs) + " pairs of scans");
+                 fixed(180.0 / M_PI * d.rotation_error, 2, " deg ") + span_text(d) +
+                 ", by the registration of " + std::to_string(d.registered_pairs) +
+                 " pairs of scans");
   }
   text << "\nscans " << d.stride << " apart, placed by\n";
   add_line(text, "  poses as given", to_text(d.as_given));

@@ -79,6 +79,31 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
   CHECK_FALSE(is_accepted(diagnose(drive.with_poses(Noise(0.2)))));
 }
 
+TEST_CASE("Errors that add up over many scans make poses inexact, and no mirror explains them") {
+  auto config = drive_of(simulation::Scene::kGarage, simulation::Sensor::kMid360, 40, 5);
+  config.ego_speed = 1.5;
+  const Drive drive(config);
+  CHECK(diagnose(Recording(drive.path())).verdict == PoseVerdict::kNoMotion);
+  const auto drifting = [&](double degrees) {
+    return diagnose(drive.with_poses([&](std::size_t i, const Pose& T) {
+      return Pose(T *
+                  Eigen::AngleAxisd(degrees * M_PI / 180.0 * double(i), Eigen::Vector3d::UnitZ()));
+    }));
+  };
+  for (const double degrees : {0.1, 0.25, -0.25}) {
+    const Diagnosis d = drifting(degrees);
+    CAPTURE(degrees, d.translation_error, d.rotation_error);
+    CHECK(d.verdict == PoseVerdict::kInexact);
+    CHECK(d.error_span > 1);
+    CHECK_FALSE(d.proposal.convention.left_handed);
+  }
+  const Diagnosis scaled = diagnose(drive.with_poses([](std::size_t, Pose T) {
+    T.translation() *= 1.03;
+    return T;
+  }));
+  CHECK(scaled.verdict == PoseVerdict::kInexact);
+}
+
 TEST_CASE("Exact poses are confirmed at a few places, and no others") {
   const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12));
   CHECK(are_poses_exact(Recording(drive.path())));

@@ -13,14 +13,14 @@ namespace dynains {
 
 /// Agreement of two scans above the ground.
 struct Agreement {
-  double share = 0.0;      ///< ratio of points with a point of the other scan within 0.3 m, [0, 1]
-  double gap = 1.0;        ///< mean distance to the nearest point of the other scan, m, at most 1
+  double share = 0.0;  ///< ratio of points with a surface of the other scan within 0.3 m, [0, 1]
+  double gap = 1.0;    ///< mean distance to the surfaces of the other scan, m, at most 1
   std::size_t points = 0;  ///< number of compared points
 };
 
 enum class PoseVerdict {
   kAgree,      ///< scans agree under the given poses
-  kInexact,    ///< scans agree, but the motion between neighbouring scans is inexact
+  kInexact,    ///< scans agree, but the motion over some scans is inexact
   kNoMotion,   ///< too little motion or too few objects for a decision
   kOtherwise,  ///< scans agree under `proposal`
   kDisagree,   ///< scans agree under nothing that was tried
@@ -54,10 +54,11 @@ struct Diagnosis {
   std::size_t stride = 0;      ///< scan i was compared with scan i + stride
   Agreement as_given;
   Agreement standing;  ///< under identity poses (no motion)
-  /// Difference of the given poses and the registration of neighbouring scans: medians over
+  /// Difference of the given poses and the registration of scans `error_span` apart: medians over
   /// `registered_pairs`, m and rad.
   double translation_error = 0.0;
   double rotation_error = 0.0;
+  std::size_t error_span = 1;        ///< scans, 1 unless errors only show over more
   std::size_t registered_pairs = 0;  ///< 0 if too few for a statement
   PoseFlaws flaws;
   RecordingOptions proposal;  ///< the given options, changed for kOtherwise
