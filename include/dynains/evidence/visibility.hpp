@@ -86,14 +86,20 @@ class Visibility {
   /// arrays are at least `count`, rounded up to a multiple of eight.
   void add_to(std::size_t count, std::uint8_t* free, std::uint8_t* hit) const {
     for (std::size_t i = 0; i < count; i += 8) {
-      for (std::size_t k = 0; k < 8; ++k) {
-        free[i + k] = static_cast<std::uint8_t>(free[i + k] + kBytesOfBits[free_[i / 8]][k]);
-        hit[i + k] = static_cast<std::uint8_t>(hit[i + k] + kBytesOfBits[hit_[i / 8]][k]);
-      }
+      add_bits(free_[i / 8], free + i);
+      add_bits(hit_[i / 8], hit + i);
     }
   }
 
  private:
+  // Adds eight bits to eight bytes, as one number: no sum exceeds its byte.
+  static void add_bits(std::uint8_t bits, std::uint8_t* bytes) {
+    std::uint64_t sum, more;
+    std::memcpy(&sum, bytes, sizeof(sum));
+    std::memcpy(&more, kBytesOfBits[bits].data(), sizeof(more));
+    sum += more;
+    std::memcpy(bytes, &sum, sizeof(sum));
+  }
   static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {
     std::uint64_t word;
     std::memcpy(&word, &bits[first / 8], sizeof(word));
