@@ -67,9 +67,10 @@ class SurroundingGround {
   Cell& cell_at(float x, float y) {
     const VoxelKey place =
         voxel_key(floor_to<std::int32_t>(x / kCell), floor_to<std::int32_t>(y / kCell), 0);
-    const std::uint32_t number = numbers_.insert(place);
-    if (number == cells_.size()) cells_.push_back({place, {}, {}, false});
-    return cells_[number];
+    if (last_ < cells_.size() && cells_[last_].place == place) return cells_[last_];
+    last_ = numbers_.insert(place);
+    if (last_ == cells_.size()) cells_.push_back({place, {}, {}, false});
+    return cells_[last_];
   }
 
   // Few points, or points on a line, do not define a plane.
@@ -92,6 +93,7 @@ class SurroundingGround {
 
   VoxelHashTable<> numbers_;  // of the cells
   std::vector<Cell> cells_;
+  std::size_t last_ = 0;  // cell of the last point
 };
 
 /// Finds the moved ground points of one scan: those under removed points, and those in voxels that
