@@ -1,12 +1,13 @@
 // Messages of results. The message type is a template parameter, of ROS 1 or ROS 2.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <string>
 
+#include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 
@@ -95,6 +96,36 @@ Message residual_message(const dynains::PoseResidual& residual, const Header& he
   set_pose(residual.T_previous_aligned, message.pose.pose);
   const std::array<double, 36> covariance = covariance_of_message(residual);
   for (std::size_t i = 0; i < covariance.size(); ++i) message.pose.covariance[i] = covariance[i];
+  return message;
+}
+
+/// Boxes of moving objects as a visualization_msgs/MarkerArray, which replaces the one before.
+/// `T_fixed_world`: of the objects, in the frame `header.frame_id`.
+template <class Message, class Header>
+Message objects_message(dynains::Span<const dynains::MovingObject> objects,
+                        const dynains::Pose& T_fixed_world, const Header& header) {
+  constexpr int kCube = 1, kDeleteAll = 3;
+  Message message;
+  message.markers.resize(1 + objects.size());
+  for (auto& marker : message.markers) marker.header = header;
+  message.markers[0].action = kDeleteAll;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const dynains::MovingObject& object = objects[i];
+    auto& marker = message.markers[1 + i];
+    marker.ns = "objects";
+    marker.id = static_cast<std::int32_t>(object.id);
+    marker.type = kCube;
+    dynains::Pose T_world_object = dynains::Pose::Identity();
+    T_world_object.translation() = object.centre;
+    T_world_object.linear().topLeftCorner<2, 2>() =
+        Eigen::Rotation2Dd(object.yaw).toRotationMatrix();
+    set_pose(T_fixed_world * T_world_object, marker.pose);
+    marker.scale.x = object.length;
+    marker.scale.y = object.width;
+    marker.scale.z = object.height;
+    marker.color.r = 1.0F;
+    marker.color.a = 0.5F;
+  }
   return message;
 }
 

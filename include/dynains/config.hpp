@@ -103,6 +103,7 @@ struct RemoverConfig {
   double mounting_roll = 0.0;   ///< deg, left side up
   int threads = 1;
   bool build_map = true;
+  bool objects = false;
 
   /// Verdicts by the method of the paper (Eq. 3-19).
   static RemoverConfig paper() {
@@ -164,6 +165,8 @@ struct RemoverConfig {
                       "2: two stages run in parallel, with the same verdicts; a final verdict "
                       "comes one scan later, unless it has no latency"});
     visitor(Parameter{"build_map", self.build_map, Bounds(), "", "accumulate the static map"});
+    visitor(Parameter{"objects", self.objects, Bounds(), "",
+                      "list moving instances as boxes with ids and velocities"});
   }
 
   /// Whether a scan starts a new epoch. `pause`: s since the previous scan. `distance`: m from its

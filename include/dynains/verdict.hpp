@@ -72,7 +72,7 @@ struct StageTimes {
   double map = 0.0;       ///< Eq. 1
 
   template <class Self, class Visitor>
-  static void visit(Self& self, Visitor&& visitor) {
+  static void visit(Self&& self, Visitor&& visitor) {
     visitor("ingest", self.ingest);
     visitor("ground", self.ground);
     visitor("window", self.window);
@@ -92,6 +92,40 @@ struct StageTimes {
   }
 };
 
+/// An instance that moves, as an upright box. RemoverConfig::objects.
+struct MovingObject {
+  std::uint32_t id = 0;  ///< the same in all scans, also after up to 1 s in which it was not seen
+  /// m, world frame, at the time of its points.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  /// m, along the yaw, across it, and of the points along z. Sides that the sensor has not seen yet
+  /// are missing.
+  double length = 0.0, width = 0.0, height = 0.0;
+  /// rad, about z of the world frame: direction of the motion, or of the longest side while that is
+  /// unknown.
+  double yaw = 0.0;
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s, along x and y of the world frame
+  std::uint32_t points = 0;                            ///< in this scan
+  std::uint64_t first_scan = 0, last_scan = 0;         ///< with the object, up to the newest push
+
+  /// Calls `visitor(name, number)` for each number.
+  template <class Self, class Visitor>
+  static void visit(Self&& self, Visitor&& visitor) {
+    visitor("id", self.id);
+    visitor("x", self.centre.x());
+    visitor("y", self.centre.y());
+    visitor("z", self.centre.z());
+    visitor("length", self.length);
+    visitor("width", self.width);
+    visitor("height", self.height);
+    visitor("yaw", self.yaw);
+    visitor("vx", self.velocity.x());
+    visitor("vy", self.velocity.y());
+    visitor("points", self.points);
+    visitor("first_scan", self.first_scan);
+    visitor("last_scan", self.last_scan);
+  }
+};
+
 /// Verdict on every point of one scan. Each span has one value per input point, in input order, and
 /// is valid until the next call of the remover.
 struct ScanVerdict {
@@ -108,6 +142,7 @@ struct ScanVerdict {
   Span<const float> beliefs = {};
   Span<const Cause> causes = {};
   ComparedPose compared = {};
+  Span<const MovingObject> objects = {};  ///< by id; empty without RemoverConfig::objects
 };
 
 namespace detail {

@@ -31,6 +31,20 @@ py::array_t<To> to_array_of(Span<const From> values) {
   return to_array(std::move(copy));
 }
 
+/// A structured array of float64, with a field for each number of an object.
+py::object objects_of(Span<const MovingObject> objects) {
+  std::vector<double> numbers;
+  for (const MovingObject& object : objects) {
+    MovingObject::visit(
+        object, [&](const char*, auto number) { numbers.push_back(static_cast<double>(number)); });
+  }
+  py::list fields;
+  const MovingObject none;
+  MovingObject::visit(none,
+                      [&](const char* name, auto) { fields.append(py::make_tuple(name, "f8")); });
+  return to_array(std::move(numbers), fields.size()).attr("view")(fields).attr("reshape")(-1);
+}
+
 /// ScanVerdict with arrays that Python owns.
 struct Verdict {
   std::uint64_t scan;
@@ -41,6 +55,7 @@ struct Verdict {
   py::array_t<std::uint32_t> instances;
   py::array_t<float> beliefs;
   py::array_t<std::uint8_t> causes;
+  py::object objects;
 
   explicit Verdict(const ScanVerdict& verdict)
       : scan(verdict.scan),
@@ -51,7 +66,8 @@ struct Verdict {
         labels(to_array_of<std::uint8_t>(verdict.labels)),
         instances(to_array_of<std::uint32_t>(verdict.instances)),
         beliefs(to_array_of<float>(verdict.beliefs)),
-        causes(to_array_of<std::uint8_t>(verdict.causes)) {}
+        causes(to_array_of<std::uint8_t>(verdict.causes)),
+        objects(objects_of(verdict.objects)) {}
 };
 
 struct Frame {
@@ -248,6 +264,10 @@ void bind_remover(py::module_& module) {
       .def_readonly("causes", &Verdict::causes,
                     "(N,) uint8, why the label is what it is; the numbers are those of "
                     "dynains/verdict.hpp.")
+      .def_readonly("objects", &Verdict::objects,
+                    "(M,) structured float64: moving objects by id, with Config.objects. Fields: "
+                    "id, x, y, z (m, world), length, width, height (m), yaw (rad), vx, vy (m/s), "
+                    "points, first_scan, last_scan.")
       .def("__repr__", [](const Verdict& verdict) { return represent(verdict); });
 
   py::class_<PoseResidual>(module, "PoseResidual",

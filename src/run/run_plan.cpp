@@ -146,6 +146,7 @@ RunOutputs outputs_of(const RunSettings& settings) {
   complete_log(outputs);
   complete_grid(outputs);
   check_passes(settings);
+  outputs.write_tracks = settings.config.objects;
   // The second pass reads the beliefs of the first one.
   if (outputs.write_page || (settings.passes > 1 && outputs.map_attributes)) {
     outputs.write_beliefs = true;

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <functional>
+#include <iomanip>
+#include <locale>
+#include <map>
 #include <numeric>
 #include <utility>
 
+#include "dynains/io/atomic_file.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/second_pass.hpp"
 #include "output_folder.hpp"
@@ -56,6 +60,28 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range) 
   return columns;
 }
 
+constexpr const char* kTracksFile = "tracks.csv";
+
+/// Writes a row for each object of each scan, by scan and id.
+void write_tracks(const std::filesystem::path& path, std::vector<TrackRow>& rows) {
+  std::map<std::uint32_t, std::uint64_t> last_scans;
+  for (const TrackRow& row : rows) last_scans[row.object.id] = row.object.last_scan;
+  AtomicFile file(path);
+  std::ostream& out = file.stream();
+  out.imbue(std::locale::classic());
+  out << std::setprecision(15) << "scan,time";
+  const MovingObject none;
+  MovingObject::visit(none, [&](const char* name, auto) { out << ',' << name; });
+  out << '\n';
+  for (TrackRow& row : rows) {
+    row.object.last_scan = last_scans[row.object.id];
+    out << row.scan << ',' << row.time;
+    MovingObject::visit(row.object, [&](const char*, auto number) { out << ',' << number; });
+    out << '\n';
+  }
+  file.commit();
+}
+
 /// Positions of the sensor, m, world frame.
 std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange& range) {
   std::vector<Eigen::Vector3d> path;
@@ -79,6 +105,7 @@ OutputListing RunOutputs::listing(const Recording& recording, const ScanRange& r
   OutputListing listing;
   listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
   if (!map.empty() && !has_outside_map()) listing.files.insert(listed_name(map_name()));
+  if (write_tracks) listing.files.insert(kTracksFile);
   if (write_poses) listing.files.insert(kEstimatedPoses);
   if (write_page) listing.files.insert(kViewPage);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
@@ -120,6 +147,7 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (outputs.write_online) online_labels_.emplace(outputs.folder / "online").create_folders();
   if (outputs.write_clean)
     clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
+  if (outputs.write_tracks) tracks_file_ = outputs.folder / kTracksFile;
   if (!outputs.map.empty()) map_ = open_map(outputs.map, recording, range, outputs);
   if (outputs.map_attributes) {
     map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
@@ -136,6 +164,12 @@ void RunResults::take_newest(const FrameResult& frame) {
 }
 
 void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
+  for (const MovingObject& object : verdict.objects) {
+    TrackRow& row =
+        tracks_.emplace_back(TrackRow{range_.first + verdict.scan, verdict.time, object});
+    row.object.first_scan += range_.first;
+    row.object.last_scan = row.scan;
+  }
   finish();
   judged_.arrays.take(verdict, needs_beliefs_);
   judged_.verdict = judged_.arrays.verdict(verdict);
@@ -246,6 +280,7 @@ void RunResults::commit() {
   finish();
   writing_online_.wait();
   dynamic_points_.commit();
+  if (!tracks_file_.empty()) write_tracks(tracks_file_, tracks_);
   overview_.picture().write_png(overview_file_);
   if (map_) map_->commit();
 }

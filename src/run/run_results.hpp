@@ -57,6 +57,7 @@ struct RunOutputs {
   bool write_poses = false;
   bool write_page = false;  ///< of dynains view
   bool write_beliefs = false;
+  bool write_tracks = false;    ///< of moving objects, RemoverConfig::objects
   bool one_thread = false;      ///< the caller reads and writes
   bool map_attributes = false;  ///< the map holds attributes of its points
   std::string crs;              ///< of a LAS map, as WKT; empty: none
@@ -84,6 +85,13 @@ struct JudgedScan {
   PointBuffer points;  ///< of the scan
   VerdictArrays arrays;
   ScanVerdict verdict;  ///< with these arrays
+};
+
+/// A moving object in a scan.
+struct TrackRow {
+  std::size_t scan = 0;
+  double time = 0.0;  ///< s
+  MovingObject object;
 };
 
 /// Takes verdicts as they come and streams them to files.
@@ -154,6 +162,8 @@ class RunResults {
   std::uint64_t points_ = 0;
   LabelCounts labels_;
   std::vector<ScanCounts> counts_;
+  std::filesystem::path tracks_file_;
+  std::vector<TrackRow> tracks_;
   std::uint64_t unclustered_ = 0;
   std::uint64_t below_movers_ = 0;
   // These belong to the writing thread until writing_.wait().

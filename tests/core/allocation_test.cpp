@@ -43,6 +43,7 @@ TEST_CASE("a warm remover allocates nothing, except for the map when it grows") 
   config.build_map = build_map;
   const auto [threads, tilt] = GENERATE(table<int, double>({{1, 0.3}, {2, 0.0}}));
   config.threads = threads;
+  config.objects = tilt == 0.0;
   // Short rings: after seven rounds of twelve scans, every place in them has held every scan.
   config.evidence.lookahead_scans = 6;
   config.evidence.lookback_scans = 20;

@@ -141,6 +141,18 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CHECK(count_lines(timing) == 13);
 }
 
+TEST_CASE("--objects writes a row of tracks.csv for each object of each scan") {
+  const Fixture fixture(40);
+  succeed(fixture.run({"--objects", "true", "--lookahead-scans", "5"}));
+  const std::string tracks = read_text(fixture.out + "/tracks.csv");
+  CHECK_THAT(tracks, StartsWith("scan,time,id,x,y,z,length,width,height,yaw,vx,vy,points,"
+                                "first_scan,last_scan\n"));
+  CHECK(count_lines(tracks) > 10);
+  CHECK(fixture.report()["outputs"]["files"].dump().find("tracks.csv") != std::string::npos);
+  succeed(fixture.run({"--force"}));
+  CHECK_FALSE(fs::exists(fixture.out + "/tracks.csv"));
+}
+
 TEST_CASE("A map of LAS holds classes and attributes of its points") {
   const Fixture fixture;
   const std::string map = fixture.folder / "map.las";

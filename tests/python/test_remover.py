@@ -32,11 +32,22 @@ def test_every_scan_gets_one_final_verdict(street, verdicts):
         assert verdict.beliefs.dtype == np.float32
         assert verdict.causes.shape == (count,)
         assert verdict.causes.dtype == np.uint8
+        assert verdict.objects.shape == (0,)
         assert verdict.time == scan.time
         np.testing.assert_allclose(verdict.T_world_sensor, scan.T_world_sensor, atol=1e-9)
     labels = np.concatenate([verdict.labels for verdict in verdicts])
     assert (labels == Label.DYNAMIC).any()
     assert dynains.is_static(labels).mean() > 0.5
+
+
+def test_moving_objects_are_an_array_with_named_fields(street):
+    found = [verdict.objects for verdict in final_verdicts(street, objects=True)[0]]
+    assert found[0].dtype.names[:7] == ("id", "x", "y", "z", "length", "width", "height")
+    objects = np.concatenate(found)
+    assert len(objects) > 0
+    assert (objects["points"] > 0).all()
+    assert (objects["first_scan"] <= objects["last_scan"]).all()
+    assert (np.hypot(objects["vx"], objects["vy"]) < 60).all()
 
 
 @pytest.mark.parametrize(

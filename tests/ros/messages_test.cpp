@@ -25,6 +25,22 @@ struct LookAlikePose {
   } pose;
 };
 
+struct LookAlikeMarker {
+  decltype(LookAlike::header) header;
+  std::string ns;
+  std::int32_t id = 0, type = 0, action = 0;
+  decltype(LookAlikePose().pose.pose) pose;
+  struct {
+    double x, y, z;
+  } scale;
+  struct {
+    float r, g, b, a;
+  } color;
+};
+struct LookAlikeMarkers {
+  std::vector<LookAlikeMarker> markers;
+};
+
 TEST_CASE("a map becomes a message with its points") {
   dynains::PointBuffer points;
   points.push_back(1.0F, 2.0F, 3.0F);
@@ -68,6 +84,34 @@ TEST_CASE("a residual becomes a pose whose covariance has the axes of the previo
       CHECK(message.pose.covariance[6 * row + column] == Approx(expected).margin(1e-12));
     }
   }
+}
+
+TEST_CASE("objects become boxes in the fixed frame that replace the last ones") {
+  dynains::MovingObject object;
+  object.id = 7;
+  object.centre = {2.0, 0.0, 0.5};
+  object.length = 4.0;
+  object.width = 1.8;
+  object.height = 1.5;
+  object.yaw = M_PI / 2.0;
+  const dynains::Pose T_fixed_world =
+      Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitZ());
+  decltype(LookAlike::header) header;
+  header.frame_id = "map";
+  const auto message = objects_message<LookAlikeMarkers>(
+      dynains::Span<const dynains::MovingObject>(&object, 1), T_fixed_world, header);
+  REQUIRE(message.markers.size() == 2);
+  CHECK(message.markers[0].action == 3);
+  const auto& marker = message.markers[1];
+  CHECK(marker.header.frame_id == "map");
+  CHECK(marker.id == 7);
+  CHECK(marker.pose.position.x == Approx(1.0));
+  CHECK(marker.pose.position.y == Approx(4.0));
+  CHECK(marker.pose.position.z == Approx(3.5));
+  CHECK(std::abs(marker.pose.orientation.z) == Approx(1.0));
+  CHECK(marker.scale.x == 4.0);
+  CHECK(marker.scale.y == 1.8);
+  CHECK(objects_message<LookAlikeMarkers>({}, T_fixed_world, header).markers.size() == 1);
 }
 
 }  // namespace

@@ -24,6 +24,7 @@
 #include <string>
 #include <utility>
 #include <vector>
+#include <visualization_msgs/msg/marker_array.hpp>
 
 #include "dynains/adapters/point_cloud2.hpp"
 #include "ros_common/find_pose.hpp"
@@ -39,6 +40,7 @@ using Cloud = sensor_msgs::msg::PointCloud2;
 using Residual = geometry_msgs::msg::PoseWithCovarianceStamped;
 using Diagnostics = diagnostic_msgs::msg::DiagnosticArray;
 using Odometry = nav_msgs::msg::Odometry;
+using Markers = visualization_msgs::msg::MarkerArray;
 using Transform = geometry_msgs::msg::TransformStamped;
 using Loop = RemoverLoop<Cloud::ConstSharedPtr>;
 using JoinedClouds = Frame<Cloud::ConstSharedPtr>;
@@ -156,6 +158,7 @@ class RemoverNode::Work {
       dynamic_.push_back(node.create_publisher<Cloud>("dynamic" + number, sensor, options));
     }
     residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
+    objects_ = node.create_publisher<Markers>("~/objects", sensor, options);
     auto map_options = options;
     map_options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
     if (has_odom_) {
@@ -231,6 +234,7 @@ class RemoverNode::Work {
       residual_->publish(std::make_unique<Residual>(
           residual_message<Residual>(*cleaned.frame.pose_residual, header)));
     }
+    if (is_judged && has_readers(*objects_)) publish_objects(cleaned, header);
     if (!has_odom_ || !cleaned.T_odom_sensor) return;
     auto odom = std::make_unique<Odometry>();
     odom->header = header;
@@ -240,6 +244,18 @@ class RemoverNode::Work {
     odom_->publish(std::move(odom));
     broadcaster_->sendTransform(
         transform_message<Transform>(*cleaned.T_odom_sensor, fixed_frame_, header));
+  }
+
+  template <class Header>
+  void publish_objects(const Cleaned& cleaned, Header header) {
+    const dynains::ScanVerdict& verdict = cleaned.frame.newest();
+    dynains::Pose T_fixed_world = dynains::Pose::Identity();
+    if (cleaned.T_odom_sensor) {  // the own odometry may have begun anew
+      T_fixed_world = *cleaned.T_odom_sensor * verdict.T_world_sensor.inverse();
+    }
+    header.frame_id = fixed_frame_;
+    objects_->publish(std::make_unique<Markers>(
+        objects_message<Markers>(verdict.objects, T_fixed_world, header)));
   }
 
   static bool has_readers(const rclcpp::PublisherBase& publisher) {
@@ -282,6 +298,7 @@ class RemoverNode::Work {
   std::vector<rclcpp::Publisher<Cloud>::SharedPtr> static_, dynamic_;  // by topic
   rclcpp::Publisher<Cloud>::SharedPtr map_;
   rclcpp::Publisher<Residual>::SharedPtr residual_;
+  rclcpp::Publisher<Markers>::SharedPtr objects_;
   rclcpp::Publisher<Odometry>::SharedPtr odom_;
   std::optional<tf2_ros::TransformBroadcaster> broadcaster_;
   rclcpp::Publisher<Diagnostics>::SharedPtr diagnostics_;

@@ -18,6 +18,7 @@
 #include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/ingest.hpp"
+#include "dynains/pipeline/object_tracks.hpp"
 #include "dynains/pipeline/plausibility_check.hpp"
 #include "dynains/pipeline/remover_pipeline.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
@@ -68,6 +69,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
         motion_(make_motion(config, config.evidence)),
         decision_(make_decision<Stages>(config, other_.get())),
         finishes_later_(other_ && decision_->latency() > 0),
+        newest_objects_(make_objects(config, latency() > 0, nullptr)),
+        final_objects_(make_objects(config, true, newest_objects_.get())),
         map_(config.map),
         scans_(std::max({decision_->window_length(), latency() + 1, kMinSlots})) {}
   // Not copyable: window_ refers to memory of clusterer_.
@@ -124,12 +127,13 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     const std::optional<PoseResidual> residual = pose_residual();
     const Plausibility shares = plausibility(newest, residual);
     newest.compared.suspicion = shares.suspicion;
+    unwritten_ = &newest;
+    if (newest_objects_) timed(times.verdict, [&] { make_newest(); });  // every scan, in order
     if (!finishes_later_) finish_due(times);
     const std::optional<ScanVerdict> finished = take_finished();
     if (finished && finished->scan == newest.scan) {
       newest_ = *finished;
-    } else {
-      unwritten_ = &newest;
+      unwritten_ = nullptr;
     }
     return {{*this, newest.scan}, finished,           times, residual,
             time_doubt(),         newest.began_epoch, shares};
@@ -173,6 +177,13 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   static const Config& validated(const Config& config) {
     config.validate();
     return config;
+  }
+
+  std::unique_ptr<ObjectTracks> make_objects(const Config& config, bool is_used,
+                                             ObjectTracks* later) const {
+    if (!config.objects || !is_used) return nullptr;
+    return std::make_unique<ObjectTracks>(config.evidence.track_length,
+                                          config.evidence.track_height, latency() + 1, later);
   }
 
   // Filters the input points. If the sensor is known, the valid points are rotated into the level
@@ -252,8 +263,16 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
 
   void make_newest() {
     if (unwritten_ == nullptr) return;
-    newest_ = newest_writer_.write(*unwritten_, decision_->verdict(*unwritten_, false));  // Eq. 2
+    newest_ = write(*unwritten_, decision_->verdict(*unwritten_, false), newest_writer_,
+                    newest_objects_.get());
     unwritten_ = nullptr;
+  }
+
+  static ScanVerdict write(const ScanSlot& scan, const EvidenceVerdict& evidence,
+                           VerdictWriter& writer, ObjectTracks* objects) {
+    ScanVerdict verdict = writer.write(scan, evidence);  // Eq. 2
+    if (objects != nullptr) verdict.objects = objects->observe(scan, evidence);
+    return verdict;
   }
 
   // The scan becomes final even if the map throws, because the ring reuses its slot.
@@ -263,7 +282,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     ScanVerdict verdict;
     timed(times.verdict, [&] {
       const EvidenceVerdict evidence = decision_->verdict(scan, true);
-      verdict = final_writer_.write(scan, evidence);
+      verdict = write(scan, evidence, final_writer_, final_objects_.get());
       if (build_map_) final_writer_.write_flags(scan, evidence);
     });
     if (build_map_) {
@@ -335,6 +354,9 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   void forget_scans() {
     decision_->clear();
     frame_.forget();
+    for (ObjectTracks* const objects : {newest_objects_.get(), final_objects_.get()}) {
+      if (objects != nullptr) objects->clear();
+    }
     unwritten_ = nullptr;
     scans_.clear();
     rate_ = {};
@@ -357,8 +379,9 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   bool finishes_later_;  // the next push finishes a scan, beside its first stages
   VerdictWriter newest_writer_;
   VerdictWriter final_writer_;
-  ScanVerdict newest_;                   // of the last push
-  const ScanSlot* unwritten_ = nullptr;  // its scan, until newest_ is made
+  std::unique_ptr<ObjectTracks> newest_objects_, final_objects_;  // null: not asked for
+  ScanVerdict newest_;                                            // of the last push
+  const ScanSlot* unwritten_ = nullptr;                           // its scan, until newest_ is made
   Map map_;
   ScanRing scans_;
   std::vector<std::uint32_t> split_input_;  // memory of GroundSplit::input, for one scan at a time

@@ -96,6 +96,22 @@ struct DiagnosticArray {
 };
 }  // namespace diagnostic_msgs::msg
 
+namespace visualization_msgs::msg {
+struct Marker {
+  std_msgs::msg::Header header;
+  std::string ns;
+  std::int32_t id = 0, type = 0, action = 0;
+  geometry_msgs::msg::Pose pose;
+  geometry_msgs::msg::Vector3 scale;
+  struct {
+    float r = 0.0F, g = 0.0F, b = 0.0F, a = 0.0F;
+  } color;
+};
+struct MarkerArray {
+  std::vector<Marker> markers;
+};
+}  // namespace visualization_msgs::msg
+
 namespace rcl_interfaces::msg {
 struct FloatingPointRange {
   double from_value = 0.0, to_value = 0.0;

@@ -1,0 +1,474 @@
+// Boxes and velocities of moving objects. Instances keep their ids from scan to scan (Eq. 4, or
+// FreeSpaceEvidence::predecessors()). Kalman filters of constant velocity join the parts of an
+// object, and bridge scans in which it is not seen. Goes beyond the paper.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "dynains/pipeline/scan_ring.hpp"
+#include "dynains/points.hpp"
+#include "dynains/verdict.hpp"
+#include "dynains/voxels/voxel_hash_table.hpp"
+
+namespace dynains::detail {
+
+/// Follows the dynamic points of consecutive verdicts. Those without latency have one object of
+/// this class, and the final ones another.
+class ObjectTracks {
+ public:
+  /// `max_length`, `max_height`: m, of an object. `memory`: scans for which a lost track is kept.
+  /// `later`: tracks that are scans ahead and outlive this, or null. Objects have their ids, and
+  /// begin with the motions, and have at least the sizes, that they know.
+  ObjectTracks(double max_length, double max_height, std::size_t memory, ObjectTracks* later)
+      : max_length_(max_length), max_height_(max_height), memory_(memory), later_(later) {}
+
+  /// Restores the state after construction; buffers keep their capacity.
+  void clear() {
+    forget_all();
+    last_id_ = 0;
+  }
+
+  /// Adds the verdict on the scan after the last one. The result is valid until the next call.
+  Span<const MovingObject> observe(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    if (scan.began_epoch) forget_all();
+    sensor_ = scan.T_world_level.translation();
+    for (Track& track : tracks_) predict(scan.time - time_, track);
+    time_ = scan.time;
+    begin_parts(scan);
+    follow_points(scan, evidence);
+    begin_tracks(scan);
+    measure_extents(scan, evidence);
+    objects_.clear();
+    for (Track& track : tracks_) {
+      if (track.points > 0) update(scan, track);
+    }
+    name_parts(scan);
+    join_tracks();
+    forget(scan.scan);
+    std::sort(objects_.begin(), objects_.end(),
+              [](const MovingObject& a, const MovingObject& b) { return a.id < b.id; });
+    return objects_;
+  }
+
+ private:
+  static constexpr double kMaxUnseen = 1.0;     // s
+  static constexpr double kError = 0.2;         // m, standard deviation of a measured centre
+  static constexpr double kAcceleration = 2.0;  // m/s^2, standard deviation
+  static constexpr double kSpeed = 15.0;        // m/s, standard deviation before it is measured
+  static constexpr double kDeviations = 3.0;    // of usual errors
+  static constexpr std::size_t kAxes = 9;       // directions that a box may have
+  // Distances between points of an object, m. Those between rings grow with the range.
+  static constexpr float kGap = 0.3F, kGapOfRange = 0.02F;
+  static constexpr float kGapOfInstance = 0.5F;  // m, added for points of an instance of the object
+
+  struct Track {
+    MovingObject object;
+    double seen = 0.0;                    // s, time of its last scan
+    double pp = 0.0, pv = 0.0, vv = 0.0;  // covariance of position and velocity, per axis
+    bool is_directed = false;             // its motion is certain, and so is its yaw
+    double yaw = 0.0, yaw_variance = M_PI * M_PI;
+    // In the newest scan:
+    std::uint32_t points = 0;
+    Eigen::Vector2f along, place;        // direction; predicted centre along it and to its left, m
+    Eigen::Array2f half;                 // of its sizes, m
+    Eigen::AlignedBox<float, 1> height;  // m
+    // Axes that its box may have, and extents along them and to their left, m from the sensor.
+    std::array<Eigen::Vector2f, kAxes> axes;
+    std::array<Eigen::AlignedBox2f, kAxes> extents;
+  };
+
+  // The dynamic points of an instance.
+  struct Part {
+    std::uint32_t named = kNoIndex;  // track of the instance in earlier scans
+    std::uint32_t track = kNoIndex;  // of most of its points in this scan, by Boyer and Moore
+    std::uint32_t lead = 0;          // of this track, in points
+    // Points that continue no track, m from the sensor along the axes of the world.
+    Eigen::AlignedBox3f box;
+    std::uint32_t points = 0;
+    std::uint32_t begun = kNoIndex;  // their track
+
+    void vote(std::uint32_t t) {
+      if (lead == 0) track = t;
+      lead += track == t ? 1U : -1U;
+    }
+  };
+
+  // An instance that was part of an object.
+  struct Named {
+    std::uint32_t instance, object;
+    std::uint64_t scan;  // the last one
+  };
+
+  template <class Visit>
+  static void for_each_dynamic(const ScanSlot& scan, const EvidenceVerdict& evidence,
+                               Visit&& visit) {
+    const Eigen::Matrix3f R_world_level = scan.T_world_level.linear().cast<float>();
+    const PointsView points = scan.split.non_ground();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const std::uint32_t group = evidence.group_of[i];
+      if (group == 0 || !is_dynamic(evidence.groups[group].cause)) continue;
+      const std::uint32_t cluster = evidence.cluster_of[group - 1];
+      if (cluster == kNoCluster) continue;
+      const Eigen::Vector3f point(points.x[i], points.y[i], points.z[i]);
+      visit(cluster, Eigen::Vector3f(R_world_level * point));
+    }
+  }
+
+  // A point along a direction and to its left.
+  template <class Point>
+  static Eigen::Vector2f along(const Eigen::Vector2f& u, const Point& point) {
+    return {u.x() * point.x() + u.y() * point.y(), u.x() * point.y() - u.y() * point.x()};
+  }
+  static Eigen::Matrix2d axes_of(double yaw) { return Eigen::Rotation2Dd(yaw).toRotationMatrix(); }
+  static Eigen::Vector2d size_of(const MovingObject& object) {
+    return {object.length, object.width};
+  }
+  Eigen::Vector2d from_sensor(const MovingObject& object) const {
+    return (object.centre - sensor_).head<2>();
+  }
+  bool is_followed(const Track& track) const { return time_ - track.seen <= kMaxUnseen; }
+
+  static void predict(double dt, Track& track) {
+    constexpr double kTurnRate = 0.3;  // rad/s, standard deviation
+    track.object.centre.head<2>() += dt * track.object.velocity;
+    const double noise = kAcceleration * kAcceleration * dt * dt;
+    track.pp += dt * (2.0 * track.pv + dt * track.vv) + 0.25 * dt * dt * noise;
+    track.pv += dt * track.vv + 0.5 * dt * noise;
+    track.vv += noise;
+    const double turn = kTurnRate * dt;
+    track.yaw_variance = std::min(M_PI * M_PI, track.yaw_variance + turn * turn);
+  }
+
+  void begin_parts(const ScanSlot& scan) {
+    parts_.assign(scan.ids.size(), Part());
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      const Track* const track = find(object_of(scan.ids[p]));
+      if (track == nullptr) continue;
+      parts_[p].named = static_cast<std::uint32_t>(track - tracks_.data());
+    }
+  }
+
+  // Points continue the nearest track, if its box is near enough.
+  void follow_points(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    for (Track& track : tracks_) {
+      track.along = axes_of(track.object.yaw).col(0).cast<float>();
+      track.place = along(track.along, from_sensor(track.object).cast<float>());
+      track.half = 0.5F * size_of(track.object).cast<float>().array();
+    }
+    track_of_.clear();
+    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const Eigen::Vector3f& point) {
+      const std::uint32_t t = track_around(point, parts_[p].named);
+      track_of_.push_back(t);
+      if (t != kNoIndex) {
+        ++tracks_[t].points;
+        parts_[p].vote(t);
+      } else {
+        parts_[p].box.extend(point);
+        ++parts_[p].points;
+      }
+    });
+  }
+
+  std::uint32_t track_around(const Eigen::Vector3f& point, std::uint32_t named) const {
+    std::uint32_t around = kNoIndex;
+    float least = kGap + kGapOfRange * point.head<2>().norm();
+    for (std::uint32_t t = 0; t < tracks_.size(); ++t) {
+      const Track& track = tracks_[t];
+      if (!is_followed(track)) continue;
+      const Eigen::Array2f offset = (along(track.along, point) - track.place).array();
+      float gap = (offset.abs() - track.half).max(0.0F).matrix().norm();
+      if (t == named) gap -= kGapOfInstance + static_cast<float>(std::sqrt(track.pp));
+      if (gap >= least) continue;
+      around = t;
+      least = gap;
+    }
+    return around;
+  }
+
+  // Other points begin tracks, those of the largest part first.
+  void begin_tracks(const ScanSlot& scan) {
+    constexpr std::uint32_t kMinPoints = 5;
+    order_.clear();
+    for (std::uint32_t p = 0; p < parts_.size(); ++p) {
+      const Eigen::Vector3d size = parts_[p].box.sizes().cast<double>();
+      if (parts_[p].points > 0 && size.head<2>().norm() <= max_length_ && size.z() <= max_height_) {
+        order_.push_back(p);
+      }
+    }
+    std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(parts_[b].points, a) < std::pair(parts_[a].points, b);
+    });
+    const std::size_t begun = tracks_.size();
+    for (const std::uint32_t p : order_) {
+      Part& part = parts_[p];
+      MovingObject object;
+      object.centre = sensor_ + part.box.center().cast<double>();
+      object.length = static_cast<double>(part.box.sizes().x());
+      object.width = static_cast<double>(part.box.sizes().y());
+      std::size_t t = begun;
+      while (t < tracks_.size() && !common_box(tracks_[t].object, object, kGap)) ++t;
+      if (t == tracks_.size()) {
+        if (part.points < kMinPoints) continue;
+        begin_track(scan, scan.ids[p], object);
+      }
+      tracks_[t].points += part.points;
+      part.begun = static_cast<std::uint32_t>(t);
+      if (part.track == kNoIndex) part.track = part.begun;
+    }
+  }
+
+  // The box of two objects along the axes of the first one, from its centre, m. None if they are
+  // not beside each other, or too large for one object.
+  std::optional<Eigen::AlignedBox2d> common_box(const MovingObject& first,
+                                                const MovingObject& second, float max_gap) const {
+    const Eigen::Matrix2d R = axes_of(first.yaw).transpose();
+    const Eigen::Vector2d half = 0.5 * size_of(first);
+    const Eigen::Vector2d other = 0.5 * (R * axes_of(second.yaw)).cwiseAbs() * size_of(second);
+    const Eigen::Vector2d offset = R * (second.centre - first.centre).head<2>();
+    const double gap = (offset.cwiseAbs() - half - other).cwiseMax(0.0).norm();
+    if (gap > std::min<double>(max_gap, std::max(half.norm(), other.norm()))) return std::nullopt;
+    Eigen::AlignedBox2d box(-half, half);
+    box.extend(Eigen::AlignedBox2d(offset - other, offset + other));
+    if (box.sizes().norm() > max_length_) return std::nullopt;
+    return box;
+  }
+
+  void begin_track(const ScanSlot& scan, std::uint32_t instance, const MovingObject& object) {
+    Track track;
+    track.object = object;
+    track.vv = kSpeed * kSpeed;
+    const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(instance);
+    const Track* const known = find(id) != nullptr ? nullptr : known_later(id);
+    if (known != nullptr) {
+      track = *known;
+      track.object.centre = object.centre;
+      const double deviation = kAcceleration * (later_->time_ - time_);
+      track.vv = deviation * deviation;
+    } else {
+      track.object.id = next_id();
+    }
+    track.points = 0;
+    track.pp = kError * kError;
+    track.pv = 0.0;
+    track.object.first_scan = scan.scan;
+    tracks_.push_back(track);
+  }
+
+  std::uint32_t next_id() { return later_ != nullptr ? later_->next_id() : ++last_id_; }
+
+  // The object of an instance, or 0.
+  std::uint32_t object_of(std::uint32_t instance) const {
+    for (const Named& named : named_) {
+      if (named.instance == instance) return named.object;
+    }
+    return 0;
+  }
+  const Track* find(std::uint32_t id) const {
+    const auto found = std::find_if(tracks_.begin(), tracks_.end(),
+                                    [&](const Track& track) { return track.object.id == id; });
+    return found == tracks_.end() ? nullptr : &*found;
+  }
+  const Track* known_later(std::uint32_t id) const {
+    return later_ == nullptr ? nullptr : later_->find(id);
+  }
+
+  // Yaws that a box may have, as far as that of the track is uncertain.
+  static double yaw_of(const Track& track, std::size_t k) {
+    constexpr double kWidth = 4.0;  // standard deviations
+    const double range = std::min(0.5 * M_PI, kWidth * std::sqrt(track.yaw_variance));
+    return track.yaw + range / kAxes * (static_cast<double>(k) - 0.5 * (kAxes - 1));
+  }
+
+  void measure_extents(const ScanSlot& scan, const EvidenceVerdict& evidence) {
+    for (Track& track : tracks_) {
+      track.height.setEmpty();
+      for (std::size_t k = 0; k < kAxes && track.points > 0; ++k) {
+        track.axes[k] = axes_of(yaw_of(track, k)).col(0).cast<float>();
+        track.extents[k].setEmpty();
+      }
+    }
+    std::size_t i = 0;
+    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const Eigen::Vector3f& point) {
+      const std::uint32_t followed = track_of_[i++];
+      const std::uint32_t t = followed != kNoIndex ? followed : parts_[p].begun;
+      if (t == kNoIndex) return;
+      tracks_[t].height.extend(Eigen::Matrix<float, 1, 1>(point.z()));
+      for (std::size_t k = 0; k < kAxes; ++k) {
+        tracks_[t].extents[k].extend(along(tracks_[t].axes[k], point));
+      }
+    });
+  }
+
+  // The yaw with the smallest box: vehicles have right angles. Its first side is the longest unless
+  // the motion is known.
+  static Eigen::AlignedBox2f choose_yaw(Track& track) {
+    const auto best = std::min_element(
+        track.extents.begin(), track.extents.end(),
+        [](const auto& a, const auto& b) { return a.sizes().prod() < b.sizes().prod(); });
+    track.object.yaw = yaw_of(track, static_cast<std::size_t>(best - track.extents.begin()));
+    if (track.is_directed || best->sizes().x() >= best->sizes().y()) return *best;
+    track.object.yaw += 0.5 * M_PI;
+    return {Eigen::Vector2f(best->min().y(), -best->max().x()),
+            Eigen::Vector2f(best->max().y(), -best->min().x())};
+  }
+
+  void update(const ScanSlot& scan, Track& track) {
+    MovingObject& object = track.object;
+    const Track* const known = known_later(object.id);
+    const Eigen::Vector2d centre = measure_centre(choose_yaw(track), known, track);
+    if (object.first_scan == scan.scan) {
+      object.centre.head<2>() = centre;
+    } else {
+      correct(centre, track);
+    }
+    object.centre.z() = sensor_.z() + static_cast<double>(track.height.center().x());
+    object.height = static_cast<double>(track.height.sizes().x());
+    object.points = std::exchange(track.points, 0);
+    object.last_scan = scan.scan;
+    track.seen = scan.time;
+    turn(track);
+    if (!track.is_directed) return;
+    objects_.push_back(object);
+    if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
+  }
+
+  // The measured centre, by the side towards the sensor and the size: a far side may be hidden.
+  Eigen::Vector2d measure_centre(const Eigen::AlignedBox2f& extent, const Track* known,
+                                 Track& track) const {
+    MovingObject& object = track.object;
+    const Eigen::Matrix2d axes = axes_of(object.yaw);
+    const Eigen::Vector2d expected = axes.transpose() * from_sensor(object);
+    Eigen::Vector2d centre = sensor_.head<2>();
+    for (int k = 0; k < 2; ++k) {
+      double& size = k == 0 ? object.length : object.width;
+      const double low = static_cast<double>(extent.min()[k]);
+      const double high = static_cast<double>(extent.max()[k]);
+      const double before = size, middle = 0.5 * (low + high);
+      size = remembered_size(track, size, high - low);
+      if (known != nullptr && known->is_directed) {
+        size = std::max(size, size_of(known->object)[k]);
+      }
+      const double hidden = 0.5 * (size - (high - low));
+      if (low <= 0.0 && high >= 0.0) {  // both ends are equally far away
+        const double slack = std::abs(hidden);
+        centre += std::clamp(expected[k], middle - slack, middle + slack) * axes.col(k);
+        continue;
+      }
+      const double away = low > 0.0 ? 1.0 : -1.0;
+      centre += (middle + away * hidden) * axes.col(k);
+      object.centre.head<2>() += 0.5 * away * (size - before) * axes.col(k);
+    }
+    return centre;
+  }
+
+  // The size of an object after it was seen as `seen`: nearly the largest one, since parts may be
+  // hidden. Its box may have other axes until it is directed.
+  static double remembered_size(const Track& track, double size, double seen) {
+    constexpr double kGrowth = 0.5, kShrinkage = 0.08;  // of the difference, in each scan
+    if (!track.is_directed) return seen;
+    return size + (seen > size ? kGrowth : kShrinkage) * (seen - size);
+  }
+
+  static void correct(const Eigen::Vector2d& centre, Track& track) {
+    const double variance = track.pp + kError * kError;
+    const double gain = track.pp / variance, speed_gain = track.pv / variance;
+    const Eigen::Vector2d error = centre - track.object.centre.head<2>();
+    track.object.centre.head<2>() += gain * error;
+    track.object.velocity += speed_gain * error;
+    track.vv -= speed_gain * track.pv;
+    track.pv *= 1.0 - gain;
+    track.pp *= 1.0 - gain;
+  }
+
+  // The yaw follows the motion while that is certain.
+  static void turn(Track& track) {
+    const Eigen::Vector2d& velocity = track.object.velocity;
+    const double variance = track.vv / velocity.squaredNorm();  // of the direction
+    if (!(variance * kDeviations * kDeviations <= 1.0)) return;
+    const double direction = std::atan2(velocity.y(), velocity.x());
+    if (!std::exchange(track.is_directed, true)) {
+      track.yaw = direction;
+      track.yaw_variance = variance;
+    }
+    const double gain = track.yaw_variance / (track.yaw_variance + variance);
+    track.yaw += gain * std::remainder(direction - track.yaw, 2.0 * M_PI);
+    track.yaw_variance *= 1.0 - gain;
+  }
+
+  void name_parts(const ScanSlot& scan) {
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      if (parts_[p].track == kNoIndex) continue;
+      const Named now = {scan.ids[p], tracks_[parts_[p].track].object.id, scan.scan};
+      const auto same = std::find_if(named_.begin(), named_.end(), [&](const Named& named) {
+        return named.instance == now.instance;
+      });
+      same == named_.end() ? named_.push_back(now) : static_cast<void>(*same = now);
+    }
+  }
+
+  // Tracks beside each other that move alike are parts of one object. The older one stays.
+  void join_tracks() {
+    constexpr float kMaxGap = 0.7F;    // m
+    constexpr double kUnlikely = 4.0;  // squared deviation of a difference between velocities
+    for (std::size_t a = 0; a < tracks_.size(); ++a) {
+      for (std::size_t b = tracks_.size(); --b > a;) {
+        MovingObject& to = tracks_[a].object;
+        const MovingObject& from = tracks_[b].object;
+        const bool move_alike = (to.velocity - from.velocity).squaredNorm() <=
+                                kUnlikely * (tracks_[a].vv + tracks_[b].vv);
+        if (!is_directed_now(tracks_[a]) || !is_directed_now(tracks_[b]) || !move_alike) continue;
+        const auto box = common_box(to, from, kMaxGap);
+        if (!box) continue;
+        to.centre.head<2>() += axes_of(to.yaw) * box->center();
+        to.length = box->sizes().x();
+        to.width = box->sizes().y();
+        for (Named& named : named_) {
+          if (named.object == from.id) named.object = to.id;
+        }
+        tracks_.erase(tracks_.begin() + static_cast<std::ptrdiff_t>(b));
+      }
+    }
+  }
+  bool is_directed_now(const Track& track) const {
+    return track.is_directed && track.seen >= time_;
+  }
+
+  void forget_all() {
+    tracks_.clear();
+    named_.clear();
+  }
+
+  void forget(std::uint64_t scan) {
+    const auto is_lost = [&](const Track& track) {
+      return !is_followed(track) && scan > track.object.last_scan + memory_;
+    };
+    tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_lost), tracks_.end());
+    const auto is_old = [&](const Named& named) {
+      return scan > named.scan + memory_ && find(named.object) == nullptr;
+    };
+    named_.erase(std::remove_if(named_.begin(), named_.end(), is_old), named_.end());
+  }
+
+  double max_length_, max_height_;
+  std::size_t memory_;
+  ObjectTracks* later_;
+  double time_ = 0.0;                                 // s, of the newest scan
+  Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // its position, m, world frame
+  std::uint32_t last_id_ = 0;
+  std::vector<Track> tracks_;
+  std::vector<Named> named_;
+  std::vector<Part> parts_;              // by cluster of the newest scan
+  std::vector<std::uint32_t> track_of_;  // by dynamic point, the track that it continues
+  std::vector<std::uint32_t> order_;     // parts with points that continue no track, largest first
+  std::vector<MovingObject> objects_;
+};
+
+}  // namespace dynains::detail
