@@ -126,8 +126,7 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
 /// The floors of surfaces that are large, or the largest ones there are.
 std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors,
                                                   double step) const {
-  constexpr double kCell = 1.0;          // m: a gap without ground that does not end a surface
-  constexpr std::size_t kMinCells = 10;  // the roof of a car is smaller
+  constexpr double kCell = 1.0;  // m: a gap without ground that does not end a surface
   VoxelHashTable<> numbers;
   std::vector<VoxelKey> keys;
   std::vector<std::uint32_t> cell_of;
@@ -142,7 +141,8 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
   ComponentSearch().for_each(keys, numbers, [&](const std::vector<std::uint32_t>& members) {
     for (const std::uint32_t cell : members) size[cell] = members.size();
   });
-  const std::size_t least = std::min(kMinCells, *std::max_element(size.begin(), size.end()));
+  // The roof of a car is smaller than ten cells.
+  const std::size_t least = std::min<std::size_t>(10, *std::max_element(size.begin(), size.end()));
   std::vector<Floor> large;
   for (std::size_t i = 0; i < floors.size(); ++i) {
     if (size[cell_of[i]] >= least) large.push_back(floors[i]);

@@ -10,8 +10,7 @@
 namespace dynains::grid {
 namespace {
 
-constexpr double kBeamReach = 30.0;  // m, that beams count
-constexpr std::int64_t kGap = 3;     // cells of a wall without points; no robot passes it
+constexpr std::int64_t kGap = 3;  // cells of a wall without points; no robot passes it
 
 /// The part of a beam that is lower than `low`, as shares of its way. `from`, `to`: m over ground.
 std::array<double, 2> low_part(double from, double to, double low) {
@@ -102,7 +101,8 @@ void GridMaker::add_beams(const Eigen::Vector3d& sensor, Span<const Eigen::Vecto
   const std::optional<Floors::Height> from = height_of(sensor);
   if (!from) return;
   const double low = 0.5 * config_.max_height;
-  const auto ranges = static_cast<std::size_t>(kBeamReach / config_.resolution);
+  // Beams count up to 30 m.
+  const auto ranges = static_cast<std::size_t>(30.0 / config_.resolution);
   const auto azimuths = static_cast<std::size_t>(2.0 * M_PI * static_cast<double>(ranges));
   begun_.assign(azimuths * (ranges + 1), 0);
   for (const Eigen::Vector3d& end : ends) {

@@ -82,13 +82,11 @@ class GridMaker {
   Cell* cell_at(const Eigen::Vector3d& position);
   void add_obstacle(std::int64_t x, std::int64_t y);
   void count(std::uint8_t& scans, std::uint8_t& latest, Cell& cell) const;
+  /// By three scans or more: fewer may show what passed unnoticed.
   bool is_obstacle(const Cell& cell) const {
-    return cell.has_obstacle && cell.obstacle > cell.clear &&
-           cell.obstacle >= std::min(kMinScans, scan_);
+    return cell.has_obstacle && cell.obstacle > cell.clear && cell.obstacle >= std::min(3, scan_);
   }
   void close_gaps(OccupancyGrid& grid) const;
-
-  static constexpr int kMinScans = 3;  // of an obstacle; fewer may be what passed unnoticed
 
   Config config_;
   std::int64_t reach_;  // cells, in which scans see one obstacle

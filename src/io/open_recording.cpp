@@ -32,7 +32,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMaxSensor = 1000.0;  // m, as of RemoverConfig::sensors
-constexpr const char* kSensorPoses = "sensors.txt";
 
 constexpr const char* kAccepted =
     "expected a KITTI folder (velodyne/NNNNNN.bin, poses.txt), or a folder of .pcd, .ply, .bin, "
@@ -212,7 +211,7 @@ void find_columns(RecordingContents& r, const ScanReader& reader) {
 }
 
 void find_sensors(RecordingContents& r) {
-  const fs::path file = r.folder / kSensorPoses;
+  const fs::path file = r.folder / "sensors.txt";
   if (r.options.sensors.empty() && is_folder(r.folder) && is_file(file)) {
     r.options.sensors = read_trajectory(file).poses;
     r.files.push_back(file);
@@ -250,9 +249,8 @@ PointFrame guess_frame(const RecordingContents& r) {
   return around_pose > around_origin ? PointFrame::kWorld : PointFrame::kSensor;
 }
 
-/// Warns of scans that are missing among scans at even intervals.
+/// Warns of scans that are missing among scans at even intervals, to 20 % of the usual one.
 void warn_of_lost_scans(RecordingContents& r) {
-  constexpr double kEven = 0.2;  // of the usual interval
   std::vector<double> steps;
   for (std::size_t i = 1; i < r.scans.size(); ++i) {
     if (r.scans[i].index != r.scans[i - 1].index + 1) continue;
@@ -262,7 +260,7 @@ void warn_of_lost_scans(RecordingContents& r) {
   std::size_t even = 0;
   double lost = 0.0, longest = 0.0;
   for (const double step : steps) {
-    even += std::abs(step / period - 1.0) < kEven ? 1 : 0;
+    even += std::abs(step / period - 1.0) < 0.2 ? 1 : 0;
     lost += std::max(0.0, std::round(step / period) - 1.0);
     longest = std::max(longest, step);
   }

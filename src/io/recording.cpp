@@ -22,8 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSensorFolder = "sensor";
-
 /// Beams without a return stay at the origin.
 void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
   for (std::size_t i = 0; i < scan.size(); ++i) {
@@ -47,12 +45,11 @@ fs::path label_file(const fs::path& folder, const std::string& scan) {
   return folder / "labels" / (scan + ".label");
 }
 
-/// Classes of SemanticKITTI for intensities 0 and 1.
+/// Classes of SemanticKITTI for intensities 0 and 1: another object, another vehicle that moves.
 std::vector<std::uint32_t> labels_of_intensity(const RecordedScan& scan) {
-  constexpr std::uint32_t kOtherObject = 99, kMovingOtherVehicle = 259;
   std::vector<std::uint32_t> labels;
   for (std::size_t k = 3; k < scan.xyzi.size(); k += 4) {
-    labels.push_back(scan.xyzi[k] > 0.0F ? kMovingOtherVehicle : kOtherObject);
+    labels.push_back(scan.xyzi[k] > 0.0F ? 259U : 99U);
   }
   return labels;
 }
@@ -125,7 +122,7 @@ void Recording::read_sensors(std::size_t i, RecordedScan& scan) const {
     scan.sensor.clear();
     return;
   }
-  const fs::path file = contents_.folder / kSensorFolder / (name(i) + ".id");
+  const fs::path file = contents_.folder / "sensor" / (name(i) + ".id");
   if (is_file(file)) {
     ByteReader reader(file);
     if (reader.remaining() != scan.size()) {

@@ -104,10 +104,7 @@ class Odometry::Loop {
     return extrapolate(Pose::Identity(), T_last_newest_, period / period_);
   }
 
-  bool are_scans_missing(double period) const {
-    constexpr double kMissing = 1.5;  // periods
-    return period_ > 0.0 && period > kMissing * period_;
-  }
+  bool are_scans_missing(double period) const { return period_ > 0.0 && period > 1.5 * period_; }
 
   /// The first motion is not predicted, and neither is what happens while scans are missing.
   bool is_predictable(double period) const { return !first_ && !are_scans_missing(period); }
@@ -199,14 +196,13 @@ class Odometry::Loop {
   }
 
   void add_to_map(Span<const PointLabel> labels) {
-    constexpr double kForget = 0.1;  // of the reach
     map_.begin_scan(T_world_last_ * scan_.centre());
     for (const ScanPreparation::Point& point : scan_.map_points()) {
       if (!labels.empty() && labels[point.index] == PointLabel::kDynamic) continue;
       map_.insert(T_world_last_ * point.position);
     }
     const Eigen::Vector3d& centre = T_world_last_.translation();
-    if ((centre - centre_).norm() < kForget * config_.farthest) return;
+    if ((centre - centre_).norm() < 0.1 * config_.farthest) return;
     map_.forget_beyond(centre, 1.1 * config_.farthest);
     centre_ = centre;
   }

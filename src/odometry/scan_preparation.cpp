@@ -101,7 +101,6 @@ void ScanPreparation::prepare(const Pose& motion, double period) {
 
 void ScanPreparation::thin_out() {
   constexpr double kSmall = 0.25;  // m
-  constexpr double kFiner = 0.7;   // ratio of edges
   const double small = scale_ * kSmall, nearest = scale_ * nearest_;
   map_points_.clear();
   taken_.clear();
@@ -112,7 +111,7 @@ void ScanPreparation::thin_out() {
       continue;
     if (adds(taken_, voxel_at(p, small))) map_points_.push_back({p, i});
   }
-  for (used_edge_ = std::max(edge_, small);; used_edge_ = std::max(kFiner * used_edge_, small)) {
+  for (used_edge_ = std::max(edge_, small);; used_edge_ = std::max(0.7 * used_edge_, small)) {
     keypoints_.clear();
     taken_.clear();
     for (const Point& point : map_points_) {
@@ -147,10 +146,9 @@ Landmarks ScanPreparation::landmarks() const {
 }
 
 void ScanPreparation::adapt() {
-  constexpr double kMinEdge = 0.3, kMaxEdge = 1.5;  // m
   const double share = static_cast<double>(keypoints_.size()) / static_cast<double>(kWanted);
-  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * kMinEdge,
-                     scale_ * kMaxEdge);
+  edge_ = std::clamp(used_edge_ * std::sqrt(std::clamp(share, 0.5, 2.0)), scale_ * 0.3,
+                     scale_ * 1.5);  // m
 }
 
 }  // namespace dynains::odometry

@@ -5,12 +5,6 @@
 #include "progress.hpp"
 
 namespace dynains::program {
-namespace {
-
-constexpr const char* kGroup = "What the files of SEQ mean (dynains check SEQ finds out)";
-
-}  // namespace
-
 RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required) {
   command
       .add_option("SEQ", folder,
@@ -22,9 +16,9 @@ RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool 
       ->required(required)
       ->type_name("");
   RecordingSettings::visit(
-      settings, SettingFlags{command, kGroup, [this](const auto& flag, const auto& text) {
-                               settings.flags[flag] = text;
-                             }});
+      settings,
+      SettingFlags{command, "What the files of SEQ mean (dynains check SEQ finds out)",
+                   [this](const auto& flag, const auto& text) { settings.flags[flag] = text; }});
 }
 
 Recording RecordingFlags::open_of_run(const ResultFolder& out, const std::string& command) {

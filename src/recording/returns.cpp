@@ -11,13 +11,10 @@ namespace dynains {
 namespace {
 
 constexpr double kKeyWay = 2.0;         // m, between two key scans
-constexpr double kNearby = 8.0;         // m, between two sensors that see the same surfaces
 constexpr double kMinInliers = 0.6;     // share of points
 constexpr double kMaxMovement = 0.05;   // m, of points 10 m away, of scans that fit
 constexpr double kMapDeviation = 0.03;  // m, of the earlier poses around, at 10 m
 constexpr float kStoredStep = 0.002F;   // m, of stored coordinates
-constexpr std::size_t kMaxPoints = 12000;
-constexpr std::size_t kMaxScans = 16;
 
 using Steps = std::array<std::int16_t, 3>;
 
@@ -31,7 +28,7 @@ bool ReturnToPlace::is_known() const { return inliers >= kMinInliers && deviatio
 
 // Puts the points that stand into kept_, and into the store.
 void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
-  const std::size_t stride = 1 + points.size() / kMaxPoints;
+  const std::size_t stride = 1 + points.size() / 12000;
   kept_.points.clear();
   bytes_.clear();
   for (std::size_t i = 0; i < points.size(); i += stride) {
@@ -128,7 +125,7 @@ bool Returns::is_key(const Eigen::Vector3d& sensor, bool begins) {
   return true;
 }
 
-// Puts the old key scans of a visit that are near the sensor into near_.
+// Puts the 16 old key scans of a visit that are nearest to the sensor into near_.
 void Returns::choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor) {
   const auto distance = [&](const KeyScan* key) {
     return (key->T_world_sensor.translation() - sensor).norm();
@@ -140,7 +137,7 @@ void Returns::choose_near(std::uint32_t visit, const Eigen::Vector3d& sensor) {
   }
   std::stable_sort(near_.begin(), near_.end(),
                    [&](const KeyScan* a, const KeyScan* b) { return distance(a) < distance(b); });
-  near_.resize(std::min(near_.size(), kMaxScans));
+  near_.resize(std::min<std::size_t>(near_.size(), 16));
 }
 
 void Returns::choose_visit(const Pose& T_world_sensor) {
@@ -152,7 +149,8 @@ void Returns::choose_visit(const Pose& T_world_sensor) {
     const ReturnToPlace place = aligned(T_world_sensor);
     found_.push_back(place);
     const bool fits = place.fits();
-    if (visit == visit_) leaves = place.is_wrong() || (!fits && place.distance < kNearby);
+    // Sensors up to 8 m apart see the same surfaces.
+    if (visit == visit_) leaves = place.is_wrong() || (!fits && place.distance < 8.0);
     if (!fits || (is_known && visit != visit_)) continue;
     is_known = true;
     chosen = visit;

@@ -39,10 +39,9 @@ class FreeSpaceSum {
   /// `samples` are visible: less than 30 %, or less than two unless it has only one.
   static std::optional<float> free_ratio(std::uint32_t free, std::uint32_t hit,
                                          std::uint32_t samples) {
-    constexpr float kMinVisible = 0.3F;
     const auto visible = static_cast<float>(free + hit);
     const auto least = static_cast<float>(std::min(2U, samples));
-    if (free + hit == 0 || visible < std::max(least, kMinVisible * static_cast<float>(samples))) {
+    if (free + hit == 0 || visible < std::max(least, 0.3F * static_cast<float>(samples))) {
       return std::nullopt;
     }
     return static_cast<float>(free) / visible;
@@ -58,8 +57,7 @@ class FreeSpaceSum {
   /// Eq. 18). `level`: log-odds, >= 0. `free_ratio`: ratio of free to visible samples, [0, 1].
   /// `weight`: factor of the increment.
   void raise(float& level, float free_ratio, float weight = 1.0F) const {
-    constexpr float kWhollyFree = 0.9F;
-    level += (free_ratio > kWhollyFree ? 2.0F : 1.0F) * weight * increment_;
+    level += (free_ratio > 0.9F ? 2.0F : 1.0F) * weight * increment_;
   }
   /// Adds the negative increment of a hit; stops at zero.
   void lower(float& level) const { level = std::max(0.0F, level + decrement_); }

@@ -278,7 +278,6 @@ class GroundSegmenter {
   // Whether the ground of a patch lies more than `ground_step` above that of most neighbours. False
   // if fewer than four neighbours have ground. On a slope, as many neighbours are higher as lower.
   bool overhangs(std::size_t patch) const {
-    constexpr int kMinKnown = 4;
     const float limit = heights_[patch] - static_cast<float>(config_.ground_step);
     int known = 0;
     int lower = 0;
@@ -286,7 +285,7 @@ class GroundSegmenter {
       known += std::isnan(heights_[other]) ? 0 : 1;
       lower += heights_[other] < limit ? 1 : 0;
     }
-    return known >= kMinKnown && 2 * lower > known;
+    return known >= 4 && 2 * lower > known;
   }
 
   // Ground that overhangs is none. Not in the outermost zone, where a slope of a few percent is a

@@ -72,8 +72,7 @@ class BlockTable {
   }
 
   void grow() {
-    constexpr std::size_t kMin = 1024;
-    numbers_.assign(std::max(kMin, 2 * numbers_.size()), kNoIndex);
+    numbers_.assign(std::max<std::size_t>(1024, 2 * numbers_.size()), kNoIndex);
     std::uint32_t number = 0;
     for (const MapBlock& block : blocks_) numbers_[slot_of(block.index)] = number++;
   }

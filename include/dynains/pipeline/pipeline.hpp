@@ -72,7 +72,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
         newest_objects_(make_objects(config, latency() > 0, nullptr)),
         final_objects_(make_objects(config, true, newest_objects_.get())),
         map_(config.map),
-        scans_(std::max({decision_->window_length(), latency() + 1, kMinSlots})) {}
+        // At least two: ids are propagated from the previous scan.
+        scans_(std::max({decision_->window_length(), latency() + 1, std::size_t{2}})) {}
   // Not copyable: window_ refers to memory of clusterer_.
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
@@ -172,8 +173,6 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   }
 
  private:
-  static constexpr std::size_t kMinSlots = 2;  // ids are propagated from the previous scan
-
   static const Config& validated(const Config& config) {
     config.validate();
     return config;

@@ -384,12 +384,11 @@ class RecordingPlaces {
     const Tile* const tile = tiles_.find(tile_of(cell));
     return tile == nullptr ? nullptr : tile->places.find(cell);
   }
-  // Null: there are too few ground points in the column of a cell.
+  // Null: there are less than 20 ground points in the column of a cell.
   const GroundColumn* find_ground(VoxelKey cell) {
-    constexpr std::uint32_t kMin = 20;
     const Tile* const tile = tiles_.find(tile_of(cell));
     const GroundColumn* const found = tile == nullptr ? nullptr : &tile->ground[Tile::column(cell)];
-    return found == nullptr || found->count < kMin ? nullptr : found;
+    return found == nullptr || found->count < 20 ? nullptr : found;
   }
 
   PagedTiles<Tile> tiles_;

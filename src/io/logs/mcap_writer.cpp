@@ -11,8 +11,6 @@
 namespace dynains {
 namespace {
 
-constexpr std::size_t kChunkSize = std::size_t{1} << 22;  // bytes, about
-
 using Fields = ByteWriter;  // content of a record
 
 std::string record(mcap::Opcode opcode, const Fields& content) {
@@ -95,7 +93,7 @@ void McapWriter::write(std::uint16_t channel, std::uint64_t time, const MessageS
                   .raw(fields.bytes())
                   .bytes();
   records_.append(message.data(), message.size());
-  if (records_.size() >= kChunkSize) finish_chunk();
+  if (records_.size() >= 1U << 22U) finish_chunk();
 }
 
 void McapWriter::finish_chunk() {

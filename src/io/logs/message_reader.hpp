@@ -21,9 +21,8 @@ class MessageReader {
         bytes_(place_, 0, message.data, message.size) {
     if (encoding_ == MessageEncoding::kOther) fail("expected a message of ROS 1 or ROS 2");
     if (encoding_ != MessageEncoding::kCdr) return;
-    constexpr std::uint8_t kLittleEndian = 1;
     const std::uint8_t* const header = take(4, "the header of CDR");
-    if (header[0] != 0 || header[1] != kLittleEndian) {
+    if (header[0] != 0 || header[1] != 1) {
       fail("expected plain CDR, little endian, found the representation " +
            std::to_string(header[0] * 256 + header[1]));
     }

@@ -41,8 +41,8 @@ PointColumns PointCloud2::columns() const {
 }
 
 void PointCloud2::read_fields(MessageReader& in) {
-  constexpr std::size_t kMinField = 13;  // bytes: length of the name, offset, datatype, count
-  const std::uint32_t count = in.length(kMinField, "fields");
+  // Each has 13 bytes or more: length of the name, offset, datatype, count.
+  const std::uint32_t count = in.length(13, "fields");
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::string name = in.string("a field name");
     const auto offset = in.number<std::uint32_t>("a field offset");

@@ -9,12 +9,10 @@
 namespace dynains {
 namespace {
 
-/// Whether points 10 m away keep their place from one pose to another.
+/// Whether points 10 m away keep their place, to 10 cm, from one pose to another.
 bool are_alike(const Pose& a, const Pose& b) {
-  constexpr double kMaxDistance = 0.1;  // m
   const Pose T = a.inverse() * b;
-  return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() <
-         kMaxDistance;
+  return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() < 0.1;
 }
 
 std::optional<Pose> pose_at(const Trajectory& trajectory, double time, double longest_gap) {

@@ -73,8 +73,8 @@ void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
                   " bytes of a point");
     }
     const Role role = role_of(name);
-    constexpr std::uint8_t kIsScaled = 0x18;
-    if (type != 0 && (options & kIsScaled) == 0 && (role == Role::kRing || role == Role::kLabel)) {
+    // Neither scaled nor with an offset.
+    if (type != 0 && (options & 0x18) == 0 && (role == Role::kRing || role == Role::kLabel)) {
       add_column(sink, header, {role, offset, scalar});
     }
     offset += size;

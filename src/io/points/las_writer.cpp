@@ -59,14 +59,13 @@ LasWriter::LasWriter(const std::filesystem::path& path, const LasOptions& option
 
 /// Has the same length for every number of points.
 std::string LasWriter::header() const {
-  constexpr std::uint16_t kWktIsUsed = 1U << 4U;
-  constexpr std::uint16_t kWktRecord = 2112;
   std::string records = extra_bytes_vlr();
   if (!options_.wkt.empty()) {
-    records += vlr("LASF_Projection", kWktRecord, "OGC WKT", options_.wkt + '\0');
+    records += vlr("LASF_Projection", 2112, "OGC WKT", options_.wkt + '\0');
   }
   ByteWriter out;
-  out.text(las::kMagic, las::kMagic.size()).zeros(2).number(kWktIsUsed).zeros(16);
+  // Bit 4: coordinate systems are texts (WKT).
+  out.text(las::kMagic, las::kMagic.size()).zeros(2).number(std::uint16_t{1U << 4U}).zeros(16);
   out.number(std::uint8_t{1}).number(std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files
@@ -92,7 +91,6 @@ std::string LasWriter::header() const {
 }
 
 void LasWriter::add(const LasPoint& point) {
-  constexpr std::uint8_t kOnlyReturn = 1U << 4U | 1U;
   const double most = std::numeric_limits<std::int32_t>::max();
   std::array<std::int32_t, 3> steps{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -108,7 +106,8 @@ void LasWriter::add(const LasPoint& point) {
   }
   ByteWriter record;
   for (const std::int32_t step : steps) record.number(step);
-  record.number(point.intensity).number(kOnlyReturn).number(std::uint8_t{0});
+  // Return 1 of 1.
+  record.number(point.intensity).number(std::uint8_t{1U << 4U | 1U}).number(std::uint8_t{0});
   record.number(point.classification).number(std::uint8_t{0});
   record.number(std::int16_t{0}).number(std::uint16_t{0}).number(point.time);
   record.number(point.belief).number(point.cause).number(point.instance);
