@@ -1,10 +1,12 @@
 #include "scan_files.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <system_error>
 
 #include "dynains/io/point_file.hpp"
+#include "dynains/median.hpp"
 #include "failure.hpp"
 #include "text.hpp"
 
@@ -48,26 +50,66 @@ bool is_before(const std::string& a, const std::string& b) {
   return a_ends == b_ends ? a < b : a_ends;
 }
 
-/// Time that a name is: seconds with a decimal point, of which the fraction counts nanoseconds if
-/// `counts_nanoseconds`; 10 to 19 digits for s, ms, us or ns since 1970; or SECONDS_NANOSECONDS.
-std::optional<double> time_of_name(const std::string& name, bool counts_nanoseconds) {
-  const auto digits = [](std::string_view text) {
-    return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
-  };
+bool are_digits(std::string_view text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
+}
+
+/// A name of two numbers, seconds and a part of a second.
+struct SecondsName {
+  std::string seconds, part;
+  bool has_point = false;  ///< between both; else `_` or `-`, as in SECONDS_NANOSECONDS
+};
+
+std::optional<SecondsName> seconds_name(const std::string& name) {
   const std::size_t separator = name.find_first_of("._-");
-  if (separator == std::string::npos) {
-    if (!digits(name) || name.size() < 10 || name.size() > 19 || name.front() == '0') {
-      return std::nullopt;
-    }
-    return to_seconds(*text::parse_number(name));
+  if (separator == std::string::npos) return std::nullopt;
+  SecondsName result{name.substr(0, separator), name.substr(separator + 1), name[separator] == '.'};
+  const std::size_t whole = result.seconds.size();
+  const bool is_time = are_digits(result.seconds) && are_digits(result.part) &&
+                       result.part.size() <= 9 && (result.has_point ? whole <= 12 : whole == 10);
+  return is_time ? std::optional(result) : std::nullopt;
+}
+
+/// Time of a name without a separator: 10 to 19 digits for s, ms, us or ns since 1970.
+std::optional<double> time_of_digits(const std::string& name) {
+  if (!are_digits(name) || name.size() < 10 || name.size() > 19 || name.front() == '0') {
+    return std::nullopt;
   }
-  const std::string whole = name.substr(0, separator);
-  const std::string part = name.substr(separator + 1);
-  if (!digits(whole) || !digits(part) || whole.size() > 12 || part.size() > 9) return std::nullopt;
-  if (name[separator] == '.' && !counts_nanoseconds) return text::parse_number(name);
-  // SECONDS_NANOSECONDS, as the stamps of ROS have it.
-  if (name[separator] != '.' && whole.size() != 10) return std::nullopt;
-  return *text::parse_number(whole) + 1e-9 * *text::parse_number(part);
+  return to_seconds(*text::parse_number(name));
+}
+
+/// Mean difference of the steps between times from the middle one, s.
+double unevenness(std::vector<double> times) {
+  std::sort(times.begin(), times.end());
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  const double usual = median(steps);
+  double sum = 0.0;
+  for (const double step : steps) sum += std::abs(step - usual);
+  return sum / static_cast<double>(std::max<std::size_t>(1, steps.size()));
+}
+
+/// Times of names of two numbers. The second one is a decimal fraction behind a point. It may also
+/// count ms, us or ns, which some recorders write without leading zeros: as scans mostly follow
+/// each other evenly, it does if times are more even then.
+std::vector<double> times_of(const std::vector<SecondsName>& names) {
+  std::size_t digits = 0;  // of the longest part
+  bool has_zeros = false, has_point = false;
+  for (const SecondsName& name : names) {
+    digits = std::max(digits, name.part.size());
+    has_zeros = has_zeros || (name.part.size() > 1 && name.part.front() == '0');
+    has_point = has_point || name.has_point;
+  }
+  std::vector<double> counted, decimal;
+  const double unit = std::pow(1e-3, std::ceil(static_cast<double>(digits) / 3.0));  // s
+  for (const SecondsName& name : names) {
+    const double seconds = *text::parse_number(name.seconds);
+    counted.push_back(seconds + unit * *text::parse_number(name.part));
+    decimal.push_back(*text::parse_number(name.seconds + '.' + name.part));
+  }
+  if (!has_point) return counted;
+  const bool may_count = digits % 3 == 0 && !has_zeros;
+  return may_count && unevenness(counted) <= unevenness(decimal) ? counted : decimal;
 }
 
 }  // namespace
@@ -131,25 +173,17 @@ bool is_number(const std::string& name) {
 }
 
 std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names) {
-  const auto fraction_of = [](const std::string& name) {
-    const std::size_t point = name.find('.');
-    return point == std::string::npos ? std::string() : name.substr(point + 1);
-  };
-  constexpr std::size_t kDigits = 9;  // of nanoseconds
-  const bool are_long = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
-    return fraction_of(name).size() == kDigits;
-  });
-  const bool have_zeros = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
-    const std::string fraction = fraction_of(name);
-    return fraction.size() > 1 && fraction.front() == '0';
-  });
+  std::vector<SecondsName> of_two_numbers;
   std::vector<double> times;
   for (const std::string& name : names) {
-    const std::optional<double> time = time_of_name(name, are_long && !have_zeros);
-    if (!time) return std::nullopt;
-    times.push_back(*time);
+    const auto parts = seconds_name(name);
+    const auto time = parts ? std::nullopt : time_of_digits(name);
+    if (parts) of_two_numbers.push_back(*parts);
+    if (time) times.push_back(*time);
   }
-  return times;
+  if (of_two_numbers.size() == names.size()) return times_of(of_two_numbers);
+  if (times.size() == names.size()) return times;
+  return std::nullopt;
 }
 
 }  // namespace dynains

@@ -578,6 +578,30 @@ TEST_CASE("Digits behind the point of a name are decimals, or nanoseconds withou
   check({"1700000000.011149430", "1700000001.5"}, 0.01114943, 1.5);
 }
 
+TEST_CASE("Parts of a second in names are read so that scans follow each other evenly") {
+  using Names = std::vector<std::string>;
+  const auto times = [](const Names& names) {
+    const TemporaryFolder folder;
+    for (const std::string& name : names)
+      write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
+    RecordingOptions options;
+    options.without_poses = true;
+    const Recording recording(folder.path(), options);
+    std::vector<long> milliseconds;
+    for (std::size_t i = 0; i < recording.size(); ++i) {
+      milliseconds.push_back(std::lround(1e3 * (recording.time(i) - 1700000000.0)));
+    }
+    return milliseconds;
+  };
+  const std::vector<long> counted = {911, 1011, 1111, 1211};
+  const std::string a = "1700000000", b = "1700000001";
+  CHECK(times({a + ".911149", b + ".11149", b + ".111149", b + ".211149"}) == counted);
+  CHECK(times({a + "_911149", b + "_11149", b + "_111149", b + "_211149"}) == counted);
+  CHECK(times({a + ".911", b + ".11", b + ".111", b + ".211"}) == counted);
+  CHECK(times({a + ".7", a + ".8", a + ".901", b + ".0"}) ==
+        std::vector<long>{700, 800, 901, 1000});
+}
+
 TEST_CASE("Names of 19 digits are times") {
   const TemporaryFolder folder;
   for (const char* name : {"1566535940000000000", "1566535940100000000"}) {
