@@ -120,6 +120,16 @@ class Odometry::Loop {
     return fit >= kMin || fit >= kMin * scan_.expected_fit();
   }
 
+  /// Whether the scan fits worse beside its place, along the direction that surfaces determine
+  /// worst. Their scatter seems to determine a motion along smooth walls, where any fits as well.
+  bool is_held(const Registration& found) const {
+    constexpr double kAside = 0.5;    // m
+    constexpr double kAsGood = 0.98;  // ratio of fits
+    Pose T_beside = found.T_a_b;
+    T_beside.translation() += kAside * map_scale_ * found.uncertain[0];
+    return fit_of(map_, scan_.keypoints(), T_beside) < kAsGood * found.score;
+  }
+
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
     constexpr int kMaxTurns = 4;
@@ -141,6 +151,7 @@ class Odometry::Loop {
       result.fit = best ? best->score : 0.0;
       if (!is_overlap(result.fit)) return OdometryLoss::kNoOverlap;
       result.free_directions = best->free_directions;
+      if (result.free_directions == 0 && !is_held(*best)) result.free_directions = 1;
       const Pose T_last_before = T_last_newest;
       T_last_newest = T_world_last_.inverse() * best->T_a_b;
       if (scan_.has_one_time() || extent_of(T_last_before.inverse() * T_last_newest) < kConverged) {

@@ -58,6 +58,21 @@ double worst_error(const Drive& drive) {
   return worst;
 }
 
+TEST_CASE("Scans along smooth walls have a free direction, though many points fit there") {
+  const auto free_scans = [](simulation::Scene scene) {
+    simulation::Simulator simulator(drive_of(scene, simulation::Sensor::kOs0_128, 8, 6102));
+    Odometry odometry;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < simulator.size(); ++i) {
+      const simulation::SimulatedScan scan = simulator.scan(i);
+      count += odometry.push(points_of(scan), {}, scan.time).free_directions > 0 ? 1 : 0;
+    }
+    return count;
+  };
+  CHECK(free_scans(simulation::Scene::kTunnel) >= 6);
+  CHECK(free_scans(simulation::Scene::kUrban) == 0);
+}
+
 TEST_CASE("In a hall, a crowd and a forest, poses are found to centimetres, also without removal") {
   using simulation::Scene;
   for (const Scene scene : {Scene::kHall, Scene::kCrowd, Scene::kForest}) {
