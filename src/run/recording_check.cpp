@@ -80,9 +80,6 @@ void add_remarks(std::ostream& text, const Diagnosis& d) {
   } else if (d.farthest > 0.0 && d.farthest < 2.0) {
     text << "note: all ranges are below 2 m: points seem not to be in metres\n";
   }
-  if (d.ego_share > 0.3) {
-    text << "note: many points are nearer than 2 m; see --min-range\n";
-  }
 }
 
 /// Adds the findings that need more scans than the diagnosis reads. Throws IoError.

@@ -92,26 +92,27 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
                 " invalid (NaN, infinite or at the origin)");
 }
 
-/// Warns if most points, or most of those above the ground, were not judged, if most of the removed
+/// Warns if many points, or most of those above the ground, were not judged, if most of the removed
 /// ones are ground, and of odd scans.
 void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTiming& timing,
                    const RunListener& listener) {
   const LabelCounts& labels = results.labels();
-  const auto warn_if_most = [&](std::uint64_t part, std::uint64_t whole, const char* text) {
-    if (2 * part > whole)
+  const auto warn_above = [&](double share, std::uint64_t part, std::uint64_t whole,
+                              const char* text) {
+    if (static_cast<double>(part) > share * static_cast<double>(whole))
       listener.warn(std::to_string(100 * part / whole) + " % of the points " + text);
   };
   // Beams without a return are not judged in any recording; those of a box are.
   const bool has_box = !plan.sequence.options().self_boxes.empty();
   const std::uint64_t lost = labels[PointLabel::kInvalid];
-  warn_if_most(labels[PointLabel::kOutOfRange] + (has_box ? lost : 0),
-               results.points() - (has_box ? 0 : lost),
-               "are not judged: nearer than --min-range, farther than --max-range, deeper than "
-               "--noise-depth, or in --self-box");
-  warn_if_most(results.unclustered(), labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
-               "above the ground are in no cluster and not judged; see --cluster-range");
-  warn_if_most(results.below_movers(), labels[PointLabel::kDynamic],
-               "that are removed are ground below what moves; see --footprint");
+  warn_above(0.3, labels[PointLabel::kOutOfRange] + (has_box ? lost : 0),
+             results.points() - (has_box ? 0 : lost),
+             "are not judged: nearer than --min-range, farther than --max-range, deeper than "
+             "--noise-depth, or in --self-box");
+  warn_above(0.5, results.unclustered(), labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
+             "above the ground are in no cluster and not judged; see --cluster-range");
+  warn_above(0.5, results.below_movers(), labels[PointLabel::kDynamic],
+             "that are removed are ground below what moves; see --footprint");
   std::vector<ScanCounts> counts = results.counts();
   for (std::size_t i = 0; i < counts.size(); ++i) {
     counts[i].fits = timing.rows[i].pose_residual.has_value();

@@ -42,31 +42,28 @@ PointBuffer points_of_sensor(const Recording& recording, const RecordedScan& sca
 }
 
 /// The largest OwnBody::min_range() of the sensors in a sample of the scans of `range`, m, at most
-/// `otherwise`; that value if the sensor moves less than 5 m, or if the scans are too few. A body
-/// that reaches farther is judged like other things; otherwise the road around it would be lost.
-/// Throws IoError.
+/// `otherwise`; that value if the scans are too few. A body that reaches farther is judged like
+/// other things; otherwise the road around it would be lost. Throws IoError.
 double own_body_range(const Recording& recording, const ScanRange& range, double otherwise) {
   const std::size_t count = std::min<std::size_t>(24, range.size());
-  std::vector<std::size_t> chosen;
-  double motion = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    chosen.push_back(range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1)));
-    motion = std::max(motion, (recording.T_world_sensor(chosen.back()).translation() -
-                               recording.T_world_sensor(range.first).translation())
-                                  .norm());
-  }
-  if (motion < 5.0) return otherwise;
-  std::vector<std::vector<PointBuffer>> scans(std::max<std::size_t>(1, recording.sensors().size()));
+  const std::size_t sensors = std::max<std::size_t>(1, recording.sensors().size());
+  std::vector<std::vector<PointBuffer>> scans(sensors);
+  std::vector<std::vector<Pose>> poses(sensors);
   RecordedScan scan;
-  for (const std::size_t i : chosen) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = range.first + (count == 1 ? 0 : k * (range.size() - 1) / (count - 1));
     recording.read_scan(i, scan);
-    for (std::size_t sensor = 0; sensor < scans.size(); ++sensor) {
+    for (std::size_t sensor = 0; sensor < sensors; ++sensor) {
       scans[sensor].push_back(points_of_sensor(recording, scan, sensor));
+      poses[sensor].push_back(recording.T_world_sensor(i));
+      if (!recording.sensors().empty()) {
+        poses[sensor].back() = poses[sensor].back() * recording.sensors()[sensor];
+      }
     }
   }
   double range_of_bodies = 0.0;
-  for (const std::vector<PointBuffer>& own : scans) {
-    const OwnBody body = estimate_own_body(own);
+  for (std::size_t sensor = 0; sensor < sensors; ++sensor) {
+    const OwnBody body = estimate_own_body(scans[sensor], poses[sensor]);
     if (!body.known) return otherwise;
     range_of_bodies = std::max(range_of_bodies, body.min_range());
   }

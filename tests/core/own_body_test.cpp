@@ -73,6 +73,37 @@ TEST_CASE("Somebody who follows the robot is no part of it, unless he keeps stil
   }
 }
 
+/// Two walls, 1.4 m to each side of a sensor on the line between them.
+void add_corridor(std::vector<PointBuffer>& scans) {
+  for (PointBuffer& scan : scans) {
+    for (float x = -8.0F; x < 8.0F; x += 0.04F) {
+      for (float z = -1.2F; z < 0.4F; z += 0.1F) {
+        scan.push_back(x, 1.4F, z);
+        scan.push_back(x, -1.4F, z);
+      }
+    }
+  }
+}
+
+TEST_CASE("What keeps its place in the world is no body, and the body is found beside it") {
+  const double step = GENERATE(0.0, 0.4);  // m
+  std::vector<PointBuffer> scans = drive_past(step);
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    poses.emplace_back(Eigen::Translation3d(step * static_cast<double>(i), 0.0, 0.0));
+  }
+  add_corridor(scans);
+  CHECK(estimate_own_body(scans).reach > 1.3);
+  CHECK(estimate_own_body(scans, poses).reach == 0.0);
+  for (PointBuffer& scan : scans) {
+    for (float z = -0.9F; z < -0.2F; z += 0.03F) {
+      for (float y = -0.2F; y < 0.2F; y += 0.03F) scan.push_back(-1.0F, y, z);
+    }
+  }
+  const double reach = estimate_own_body(scans, poses).reach;
+  CHECK(reach == Approx(step > 0.0 ? 1.0 : 0.0).margin(0.05));
+}
+
 TEST_CASE("Few scans tell nothing of the body") {
   CHECK_FALSE(estimate_own_body(drive_past(1.0, 7)).known);
   CHECK(estimate_own_body(drive_past(1.0, 8)).known);

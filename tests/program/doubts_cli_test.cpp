@@ -1,5 +1,7 @@
 // Messages about faulty recordings, and no message about right ones.
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
@@ -345,6 +347,58 @@ TEST_CASE("run refuses clouds in the frame of a body, and names where their beam
   double x = 0.0, y = 0.0, z = 0.0;
   REQUIRE(origin >> x >> y >> z);
   CHECK((Eigen::Vector3d(x, y, z) - Eigen::Vector3d(1.0, 0.0, 1.8)).norm() < 0.05);
+}
+
+TEST_CASE("Clouds of more than a turn without times are told, and those of one turn are not") {
+  const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 12, 3));
+  // In the order of their measurement: rings are interleaved.
+  const auto write_turns = [&](double degrees) {
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      std::vector<std::array<float, 5>> points;  // azimuth (rad) first
+      const std::vector<float>& xyzi = drive.scan(i).xyzi;
+      for (std::size_t k = 0; k < xyzi.size(); k += 4) {
+        const float azimuth = std::atan2(xyzi[k + 1], xyzi[k]);
+        points.push_back({azimuth, xyzi[k], xyzi[k + 1], xyzi[k + 2], xyzi[k + 3]});
+        const double again = -M_PI + (degrees - 360.0) * M_PI / 180.0;
+        if (azimuth > again) continue;
+        points.push_back(points.back());
+        points.back()[0] += 2.0F * static_cast<float>(M_PI);
+      }
+      std::sort(points.begin(), points.end());
+      std::vector<float> turned;
+      for (const auto& p : points) turned.insert(turned.end(), p.begin() + 1, p.end());
+      write_scan(drive.file_of(i), turned);
+    }
+  };
+  const std::string told = "deg, so that their ends overlap";
+  write_turns(392.0);
+  CHECK_THAT(drive.run().err, ContainsSubstring("clouds go around by 392 " + told) ||
+                                  ContainsSubstring("clouds go around by 391 " + told));
+  CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring(told));
+  write_turns(360.0);
+  CHECK_THAT(drive.run().err, !ContainsSubstring(told));
+}
+
+TEST_CASE("People near a robot that stands are judged, and many points that are not are told") {
+  const Drive drive;
+  drive.with_poses([](std::size_t, const Pose&) { return Pose::Identity(); });
+  // One still scene, with a person who walks around the sensor, 1.8 m away.
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    std::vector<float> xyzi = drive.scan(0).xyzi;
+    const double around = 0.1 * static_cast<double>(i);
+    for (double side = -0.25; side < 0.25; side += 0.01) {
+      for (double z = -1.4; z < 0.2; z += 0.02) {
+        const double x = 1.8 * std::cos(around) - side * std::sin(around);
+        const double y = 1.8 * std::sin(around) + side * std::cos(around);
+        for (const double value : {x, y, z, 0.3}) xyzi.push_back(static_cast<float>(value));
+      }
+    }
+    write_scan(drive.file_of(i), xyzi);
+  }
+  CHECK(drive.run().code == 0);
+  CHECK(drive.report().at("labels").at("dynamic") > 10000);
+  CHECK_THAT(drive.run({"--min-range", "7"}).err,
+             ContainsSubstring("% of the points are not judged: nearer than --min-range"));
 }
 
 TEST_CASE("check names ways of the poses that are too long, and the factor") {

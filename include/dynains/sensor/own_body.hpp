@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 #include <vector>
 
 #include "dynains/median.hpp"
 #include "dynains/points.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 
@@ -60,16 +62,38 @@ class NearestReturns {
       const float range = p.norm();
       if (!(range > 0.0F)) continue;
       const std::size_t column = cell(angles.azimuth[i] + 180.5F, kColumn, kColumns);
-      Return& nearest = nearest_[column * kRows + cell(angles.elevation[i] + 90.5F, kRow, kRows)];
+      Return& nearest = nearest_[direction(angles.azimuth[i], angles.elevation[i])];
       if (range < nearest.range) nearest = {range, p};
       if (height_of(p) < 0.25) {
         nearest_ground_[column] = std::min(nearest_ground_[column], p.head<2>().norm());
       }
     }
+    ranges_.emplace_back();
     for (std::size_t d = 0; d < nearest_.size(); ++d) {
+      ranges_.back().push_back(nearest_[d].range);
       if (std::isfinite(nearest_[d].range)) by_direction_[d].push_back(nearest_[d]);
     }
     for (std::size_t c = 0; c < kColumns; ++c) ground_[c].push_back(nearest_ground_[c]);
+  }
+
+  /// How the returns of scan `i` around the direction of a point (m, its sensor frame) compare with
+  /// the point: 1 if one lies there, -1 if beams pass it, 0 if it is hidden, or no beam is near.
+  int seen_at(std::size_t i, const Eigen::Vector3f& p) const {
+    constexpr float kDegrees = 180.0F / static_cast<float>(M_PI);
+    constexpr std::size_t kAround = 2;  // rows, as beams of a sparse sensor are 2 deg apart
+    const float horizontal = p.head<2>().norm();
+    if (!(horizontal < kMaxRange)) return 0;
+    const std::size_t at =
+        direction(kDegrees * std::atan2(p.y(), p.x()), kDegrees * std::atan2(p.z(), horizontal));
+    float beyond = std::numeric_limits<float>::infinity();  // m, of the nearest to the point
+    for (std::size_t d = std::max(at, kAround) - kAround; d <= at + kAround; ++d) {
+      if (d >= ranges_[i].size()) break;
+      const float one = ranges_[i][d] - p.norm();
+      if (std::abs(one) < std::abs(beyond)) beyond = one;
+    }
+    const float tolerance = 0.1F * (1.0F + p.norm());
+    if (std::isinf(beyond) || beyond < -tolerance) return 0;
+    return beyond > tolerance ? -1 : 1;
   }
 
   /// Height of a point above the ground, m; infinite if the ground is not known.
@@ -93,6 +117,9 @@ class NearestReturns {
   static constexpr std::size_t kColumns = 181;
   static constexpr std::size_t kRows = 182;
 
+  static std::size_t direction(float azimuth, float elevation) {
+    return cell(azimuth + 180.5F, kColumn, kColumns) * kRows + cell(elevation + 90.5F, kRow, kRows);
+  }
   static std::size_t cell(float angle, float size, std::size_t count) {
     return std::min(static_cast<std::size_t>(angle / size), count - 1);
   }
@@ -100,6 +127,7 @@ class NearestReturns {
   Mounting mounting_;
   std::vector<std::vector<Return>> by_direction_;
   std::vector<std::vector<float>> ground_;  // by azimuth, scan by scan
+  std::vector<std::vector<float>> ranges_;  // m, of the nearest returns, by scan and direction
   PointBuffer near_;
   std::vector<Return> nearest_;
   std::vector<float> nearest_ground_;
@@ -133,6 +161,51 @@ SteadyReturn steady_return(std::vector<NearestReturns::Return>& returns, std::si
   }
   result.steady = static_cast<double>(alike) / static_cast<double>(scans);
   return result;
+}
+
+/// For each scan the motion from it to another one, the farthest within 3 m, where most of the near
+/// things are seen again.
+inline std::vector<std::pair<std::size_t, Pose>> motions_nearby(const std::vector<Pose>& poses) {
+  std::vector<std::pair<std::size_t, Pose>> result;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    double farthest = -1.0;
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      const Pose T_k_i = poses[k].inverse() * poses[i];
+      const double distance = T_k_i.translation().norm();
+      if (k == i || distance > 3.0 || distance <= farthest) continue;
+      if (farthest >= 0.0) result.pop_back();
+      result.emplace_back(k, T_k_i);
+      farthest = distance;
+    }
+  }
+  return result;
+}
+
+/// Whether a steady point (m, sensor frame) keeps its place in the world, as the walls of a
+/// corridor do and everything around a sensor that stands.
+inline bool keeps_its_place(const Eigen::Vector3f& point, const NearestReturns& nearest,
+                            const std::vector<std::pair<std::size_t, Pose>>& motions) {
+  int balance = 0, seen = 0;
+  for (const auto& [scan, T] : motions) {
+    const int one = nearest.seen_at(scan, (T * point.cast<double>()).cast<float>());
+    balance += one;
+    seen += std::abs(one);
+  }
+  return seen > 0 && balance >= 0;
+}
+
+/// Leaves out candidates beside those that keep their place in the world, whose own places no other
+/// scan may see.
+inline void leave_out_beside(const std::vector<SteadyReturn>& fixed,
+                             std::vector<SteadyReturn>& candidates) {
+  constexpr float kBeside = 0.3F;  // m
+  const auto is_beside = [&](const SteadyReturn& one) {
+    return std::any_of(fixed.begin(), fixed.end(), [&](const SteadyReturn& other) {
+      return (other.point - one.point).norm() < kBeside;
+    });
+  };
+  candidates.erase(std::remove_if(candidates.begin(), candidates.end(), is_beside),
+                   candidates.end());
 }
 
 /// Middle of the mountings by a few of `scans`.
@@ -170,24 +243,30 @@ inline double reach_of_body(std::vector<SteadyReturn> candidates) {
 }  // namespace detail
 
 /// Finds the returns of the own body: near ones that are constant in the sensor frame while the
-/// sensor moves. `scans`: m, sensor frame, finite points; at least 8 scans of a drive of several
-/// metres, with turns if possible. While the sensor stands still, everything near it is taken for
-/// the body. The body is assumed to end 4.5 m from the sensor, to be 0.4 m above the
+/// sensor moves. `scans`: m, sensor frame, finite points; at least 8 scans. `poses`: of the sensor
+/// at each of them in one static frame; what keeps its place there, as everything does around a
+/// sensor that stands, is no body. Without poses, the scans must be of a drive of several metres,
+/// with turns if possible. The body is assumed to end 4.5 m from the sensor, to be 0.4 m above the
 /// ground, and to hide the ground below it. The result is not known for fewer scans. Allocates
 /// memory and takes some tens of milliseconds, so call it once, before the first push: a stream
 /// cannot know it at its first scan.
-inline OwnBody estimate_own_body(const std::vector<PointBuffer>& scans) {
+inline OwnBody estimate_own_body(const std::vector<PointBuffer>& scans,
+                                 const std::vector<Pose>& poses = {}) {
   if (scans.size() < 8) return {};
+  const auto motions = detail::motions_nearby(poses);
   const Mounting mounting = detail::usual_mounting(scans);
   detail::NearestReturns nearest(mounting);
   for (const PointBuffer& scan : scans) nearest.add(scan);
-  std::vector<detail::SteadyReturn> candidates;
+  std::vector<detail::SteadyReturn> candidates, fixed;
   nearest.for_each_direction(
       [&](std::vector<detail::NearestReturns::Return>& returns, double ground) {
         const auto height = [&](const Eigen::Vector3f& p) { return nearest.height_of(p); };
         const auto one = detail::steady_return(returns, scans.size(), height, ground);
-        if (one.steady > 0.0) candidates.push_back(one);
+        if (!(one.steady > 0.0)) return;
+        const bool is_fixed = detail::keeps_its_place(one.point, nearest, motions);
+        (is_fixed ? fixed : candidates).push_back(one);
       });
+  detail::leave_out_beside(fixed, candidates);
   return {true, detail::reach_of_body(std::move(candidates))};
 }
 
