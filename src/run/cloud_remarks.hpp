@@ -12,8 +12,8 @@ namespace dynains::program {
 
 /// A remark if coordinates lie so far from the origin of the world that float32 puts them into
 /// stripes, or if the points of the first scan lie on a grid of 5 cm or more; another one if
-/// neighbouring clouds are equal, though the sensor moves between them. Reads a few scans of
-/// `range`. Throws IoError.
+/// neighbouring clouds are equal, or more than a turn, though the sensor moves between them. Reads a
+/// few scans of `range`. Throws IoError.
 std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range);
 
 /// Advice if a few scans of `range` show no ground below the sensor, else nothing. A run finds the

@@ -125,7 +125,7 @@ std::string advice(const Recording& recording, const Diagnosis& d) {
              (d.mounting.known ? "; no option is needed." : ".");
     case PoseVerdict::kInexact:
       return "Scans and poses agree roughly, but the poses are inexact by about " + error_text(d) +
-             ": expect losses; poses of a LiDAR odometry would do better." + text_on_flaws(d.flaws);
+             ": expect losses." + text_on_flaws(d.flaws);
     case PoseVerdict::kNoMotion:
       if (d.step * static_cast<double>(d.stride) > 1.0 || d.standing.share < 0.5) {
         return "Too little stands beside the way to tell what the poses mean; nothing speaks "
