@@ -189,8 +189,8 @@ struct PoseResidual {
   /// Corrected motion: pose of this scan in the sensor frame of the previous one. It is the pushed
   /// motion, except for rounding, if neither of both poses was corrected.
   Pose T_previous_newest = Pose::Identity();
-  /// The motion that fits best, whether or not it is certain: with its covariance, a measurement to
-  /// be fused with others. It depends on the pushed motion where is_supported() is false.
+  /// The motion that fits best, whether or not it is certain. Errors of a chain of them are not
+  /// independent. It depends on the pushed motion where is_supported() is false.
   Pose T_previous_aligned = Pose::Identity();
   /// Covariance of an error e of T_previous_aligned, row-major: translation along the axes x, y, z
   /// of the newest sensor frame (m), and rotation about them (rad); exact motion = aligned motion *
