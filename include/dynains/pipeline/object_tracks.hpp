@@ -410,7 +410,11 @@ class ObjectTracks {
       const auto same = std::find_if(named_.begin(), named_.end(), [&](const Named& named) {
         return named.instance == now.instance;
       });
-      same == named_.end() ? named_.push_back(now) : static_cast<void>(*same = now);
+      if (same != named_.end()) {
+        *same = now;
+      } else {
+        named_.push_back(now);
+      }
     }
   }
 
