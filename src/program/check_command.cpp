@@ -6,9 +6,9 @@
 
 #include "command.hpp"
 #include "recording_options.hpp"
-#include "run/output_folder.hpp"
-#include "run/pose_returns.hpp"
-#include "run/recording_check.hpp"
+#include "run/output/output_folder.hpp"
+#include "run/remarks/pose_returns.hpp"
+#include "run/remarks/recording_check.hpp"
 
 namespace dynains::program {
 namespace {

@@ -24,11 +24,11 @@
 #include "poses/scan_registration.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/input_files.hpp"
 #include "run/interrupt.hpp"
 #include "run/labelled_sequence.hpp"
 #include "run/map_spacing.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/input_files.hpp"
+#include "run/output/output_folder.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {

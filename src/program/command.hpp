@@ -5,7 +5,11 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+namespace dynains::run {}
+
 namespace dynains::program {
+
+using namespace run;  // what commands start
 
 // The callback of a subcommand does the work. It throws ConfigError for wrong flags, UsageError for
 // a folder in use, Interrupted after a signal, and other exceptions for failures. main() prints

@@ -13,9 +13,9 @@
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/input_files.hpp"
 #include "run/labelled_sequence.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/input_files.hpp"
+#include "run/output/output_folder.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
 namespace dynains::program {
 
@@ -32,8 +32,8 @@ class EvaluationOptions {
 class TextFile {
  public:
   /// Opens it unless `path` is empty: then there is none. Throws IoError.
-  TextFile(const std::string& path, bool force, const InputFiles& inputs) {
-    if (!path.empty()) file_.emplace(path, existing_by(force), inputs);
+  TextFile(const std::string& path, bool force, const run::InputFiles& inputs) {
+    if (!path.empty()) file_.emplace(path, run::existing_by(force), inputs);
   }
 
   /// Puts the file in place, whole or not at all. Throws IoError.
@@ -42,7 +42,7 @@ class TextFile {
   }
 
  private:
-  std::optional<OutputFile> file_;
+  std::optional<run::OutputFile> file_;
 };
 
 }  // namespace dynains::program

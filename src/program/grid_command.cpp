@@ -12,9 +12,9 @@
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/input_files.hpp"
 #include "run/interrupt.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/input_files.hpp"
+#include "run/output/output_folder.hpp"
 #include "run/write_grid.hpp"
 #include "run/write_view.hpp"
 

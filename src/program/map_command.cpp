@@ -11,7 +11,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "run/map_file.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
 namespace dynains::program {
 namespace {

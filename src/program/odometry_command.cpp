@@ -9,9 +9,9 @@
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
-#include "run/output_folder.hpp"
-#include "run/run_doubts.hpp"
-#include "run/start_check.hpp"
+#include "run/output/output_folder.hpp"
+#include "run/remarks/run_doubts.hpp"
+#include "run/remarks/start_check.hpp"
 
 namespace dynains::program {
 namespace {

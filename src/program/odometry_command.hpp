@@ -12,8 +12,8 @@ void add_compensated_flag(CLI::App& command, bool& is_compensated);
 
 /// As estimate_poses(), with progress on standard error. Warns of directions that nothing
 /// determines.
-PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& window, bool one_thread,
-                                    bool quiet);
+run::PoseEstimate estimate_with_progress(Recording& recording, const run::ScanWindow& window,
+                                         bool one_thread, bool quiet);
 
 void add_odometry_command(CLI::App& app);
 

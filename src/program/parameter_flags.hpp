@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "dynains/parameters.hpp"
-#include "run/parameter_values.hpp"
+#include "run/settings/parameter_values.hpp"
 
 namespace dynains::program {
 
@@ -16,16 +16,16 @@ namespace dynains::program {
 /// outlive the command. `defaults` are shown in --help.
 template <class Config>
 void add_parameter_flags(CLI::App& command, const Config& defaults, const std::string& group,
-                         ParameterValues& values) {
+                         run::ParameterValues& values) {
   Config::visit(defaults, [&](const auto& parameter) {
-    const std::string name = flag_name(parameter.name), flag = "--" + name;
+    const std::string name = run::flag_name(parameter.name), flag = "--" + name;
     const auto note = [&values, name, flag](const std::string& text) {
       values.set(name, text, flag);
     };
     const std::string help =
-        std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
+        std::string(parameter.help) + " [" + run::format_value(parameter.value) + ']';
     command.add_option_function<std::string>(flag, note, help)
-        ->type_name(describe_range(parameter))
+        ->type_name(run::describe_range(parameter))
         ->group(group);
   });
 }
@@ -35,7 +35,7 @@ template <class T>
 std::string help_of(const Parameter<T>& parameter) {
   const bool is_flag = std::is_same_v<std::remove_const_t<T>, bool>;
   return is_flag ? parameter.help
-                 : std::string(parameter.help) + " [" + format_value(parameter.value) + ']';
+                 : std::string(parameter.help) + " [" + run::format_value(parameter.value) + ']';
 }
 template <class T, class Read>
 std::string help_of(const TextParameter<T, Read>& parameter) {
@@ -53,11 +53,11 @@ struct SettingFlags {
 
   template <class Setting>
   void operator()(const Setting& setting) const {
-    const std::string flag = "--" + flag_name(setting.name);
+    const std::string flag = "--" + run::flag_name(setting.name);
     using Value = std::remove_reference_t<decltype(setting.value)>;
     CLI::Option* option = nullptr;
     const auto assign = [setting, flag, note = note](const std::string& text) {
-      assign_parameter(setting, text, flag);
+      run::assign_parameter(setting, text, flag);
       note(flag, text);
     };
     if constexpr (std::is_same_v<Value, bool>) {
@@ -65,7 +65,7 @@ struct SettingFlags {
       option = command.add_flag_function(flag, set, setting.help);
     } else {
       option = command.add_option_function<std::string>(flag, assign, help_of(setting));
-      option->type_name(describe_range(setting));
+      option->type_name(run::describe_range(setting));
     }
     if (*group != '\0') option->group(group);
   }

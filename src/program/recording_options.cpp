@@ -5,6 +5,9 @@
 #include "progress.hpp"
 
 namespace dynains::program {
+
+using namespace run;
+
 RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required) {
   command
       .add_option("SEQ", folder,

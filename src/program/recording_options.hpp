@@ -6,8 +6,8 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
-#include "run/output_folder.hpp"
-#include "run/recording_settings.hpp"
+#include "run/output/output_folder.hpp"
+#include "run/settings/recording_settings.hpp"
 
 namespace dynains::program {
 
@@ -26,13 +26,13 @@ struct RecordingFlags {
   Recording open(const std::filesystem::path& other) const;
   /// Opens the recording of a finished run with the flags of the run, as far as the command line
   /// names no others. `command`: the command line without SEQ, for messages. Throws IoError.
-  Recording open_of_run(const ResultFolder& out, const std::string& command);
+  Recording open_of_run(const run::ResultFolder& out, const std::string& command);
   /// Opens the recording without poses, for the odometry. `is_compensated`: see RecordingOptions.
   /// Throws ConfigError if a flag tells of poses.
   Recording open_without_poses(bool is_compensated) const;
 
   std::string folder;
-  RecordingSettings settings;  ///< with the flags on the command line
+  run::RecordingSettings settings;  ///< with the flags on the command line
 };
 
 }  // namespace dynains::program

@@ -16,7 +16,7 @@
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/label_writer.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/output_folder.hpp"
 #include "run/recorded_scans.hpp"
 #include "run/run_plan.hpp"
 #include "run/session_request.hpp"

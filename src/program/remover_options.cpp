@@ -7,6 +7,8 @@
 
 namespace dynains::program {
 
+using namespace run;
+
 RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
     : preset_(std::move(default_preset)) {
   command

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "dynains/compiled_remover.hpp"
-#include "run/parameter_values.hpp"
+#include "run/settings/parameter_values.hpp"
 
 namespace dynains::program {
 
@@ -32,7 +32,7 @@ class RemoverOptions {
  private:
   std::string preset_;
   std::string config_file_;
-  ParameterValues flags_;  // that were given
+  run::ParameterValues flags_;  // that were given
 };
 
 }  // namespace dynains::program

@@ -120,7 +120,7 @@ void run_as_asked(RunFlags& flags) {
   listener.progress = tell("scans");
   listener.revision_progress = tell("revised scans");
   PoseEstimate estimate;
-  const RunOutcome outcome = run(settings, open(flags, estimate), listener);
+  const RunOutcome outcome = run::run(settings, open(flags, estimate), listener);
   progress.reset();
 
   if (!outcome.complete) {

@@ -6,6 +6,8 @@
 
 namespace dynains::program {
 
+using namespace run;
+
 VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done) {
   if (variants.size() > evaluation::kMaxEstimates) {

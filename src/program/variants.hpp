@@ -26,11 +26,11 @@ using VariantVerdicts = std::vector<std::vector<std::uint8_t>>;
 
 /// Runs every variant over the window. `done(scans)` is called after each scan. Memory: 1 byte per
 /// point. Throws ConfigError for more than evaluation::kMaxEstimates variants.
-VariantVerdicts run_variants(LabelledSequence& sequence, const std::vector<Variant>& variants,
+VariantVerdicts run_variants(run::LabelledSequence& sequence, const std::vector<Variant>& variants,
                              Answer answer, const std::function<void(std::size_t)>& done);
 
 /// Both: the rows are identity, oracle, then the variants.
-evaluation::Evaluation evaluate_variants(LabelledSequence& sequence,
+evaluation::Evaluation evaluate_variants(run::LabelledSequence& sequence,
                                          const std::vector<Variant>& variants, Answer answer,
                                          const evaluation::EvaluationConfig& config,
                                          const std::function<void(std::size_t)>& done);

@@ -7,8 +7,8 @@
 
 #include "bindings.hpp"
 #include "recording.hpp"
-#include "run/recording_check.hpp"
-#include "run/recording_settings.hpp"
+#include "run/remarks/recording_check.hpp"
+#include "run/settings/recording_settings.hpp"
 #include "settings.hpp"
 
 namespace dynains::python {
@@ -77,7 +77,7 @@ py::dict measured(const Diagnosis& d) {
 
 CheckedRecording check_by_name(const py::object& recording, const py::kwargs& options) {
   const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
-  const program::RecordingCheck check = shared->read(program::check_recording);
+  const run::RecordingCheck check = shared->read(run::check_recording);
   const Diagnosis& d = check.diagnosis;
   CheckedRecording result{check.passed,
                           shared->options().attr("copy")(),
@@ -131,7 +131,7 @@ void bind_check(py::module_& module) {
   const std::string doc =
       "Reports within seconds whether a recording will work, and which options it needs.\n\n"
       "recording: a Recording, or its path and by name:\n" +
-      describe_settings<program::RecordingSettings>() +
+      describe_settings<run::RecordingSettings>() +
       "Returns a Diagnosis. Raises IoError if a file is broken.";
   module.def("check", &check_by_name, py::arg("recording"), doc.c_str());
 }

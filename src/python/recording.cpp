@@ -14,7 +14,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
-#include "run/recording_settings.hpp"
+#include "run/settings/recording_settings.hpp"
 #include "settings.hpp"
 
 namespace dynains::python {
@@ -23,7 +23,7 @@ namespace {
 using RecordingPointer = std::shared_ptr<SharedRecording>;
 
 RecordingPointer open(const std::filesystem::path& path, const py::dict& values) {
-  const program::RecordingSettings settings = to_recording_settings(values);
+  const run::RecordingSettings settings = to_recording_settings(values);
   std::optional<Recording> recording;
   {
     const py::gil_scoped_release release;
@@ -155,7 +155,7 @@ void bind_recording(py::module_& module) {
       "path: folder of KITTI, SemanticKITTI or nuScenes, folder of .pcd, .ply, .bin, .las, .npy, "
       ".xyz or .csv files, or log of ROS (.mcap, .db3, .bag, or a folder with metadata.yaml).\n"
       "What the files mean, by name (dynains.check finds out):\n" +
-      describe_settings<program::RecordingSettings>();
+      describe_settings<run::RecordingSettings>();
   const auto of = [](auto member) {
     return [member](const SharedRecording& recording) { return (recording.get().*member)(); };
   };

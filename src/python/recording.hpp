@@ -8,13 +8,13 @@
 #include <utility>
 
 #include "dynains/io/recording.hpp"
-#include "run/recording_settings.hpp"
+#include "run/settings/recording_settings.hpp"
 
 namespace dynains::python {
 
 class SharedRecording {
  public:
-  SharedRecording(Recording recording, pybind11::dict options, program::RecordingSettings settings)
+  SharedRecording(Recording recording, pybind11::dict options, run::RecordingSettings settings)
       : recording_(std::move(recording)),
         options_(std::move(options)),
         settings_(std::move(settings)) {}
@@ -23,7 +23,7 @@ class SharedRecording {
   const Recording& get() const { return recording_; }
   /// The keyword arguments that it was opened with.
   const pybind11::dict& options() const { return options_; }
-  const program::RecordingSettings& settings() const { return settings_; }
+  const run::RecordingSettings& settings() const { return settings_; }
 
   /// Calls `work` with the recording, without the interpreter's lock.
   template <class Work>
@@ -35,7 +35,7 @@ class SharedRecording {
  private:
   Recording recording_;
   pybind11::dict options_;
-  program::RecordingSettings settings_;
+  run::RecordingSettings settings_;
 };
 
 /// Opens a recording with keyword arguments, or takes an open one, to which none may be given.

@@ -22,8 +22,8 @@ namespace dynains::python {
 namespace {
 
 namespace fs = std::filesystem;
-using program::RunOutcome;
-using program::RunSettings;
+using run::RunOutcome;
+using run::RunSettings;
 
 // The arguments of run() without the recording and its options.
 struct RunArguments {
@@ -42,7 +42,7 @@ struct RunArguments {
 /// Takes an argument that is no flag of the program. False if `name` is none.
 bool take_object(RunArguments& run, const std::string& name, const py::handle& value) {
   if (name == "preset") {
-    const auto& names = program::preset_names();
+    const auto& names = run::preset_names();
     run.preset = to_text(value);
     if (std::find(names.begin(), names.end(), *run.preset) == names.end()) {
       refuse_value(name, value, "'default', 'offline', 'paper' or 'published'");
@@ -74,7 +74,7 @@ RunArguments take_arguments(py::dict& values) {
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
     if (take_object(run, name, value) || assign_setting(run.settings, name, value)) continue;
-    if (!has_setting<program::RecordingSettings>(name)) {
+    if (!has_setting<run::RecordingSettings>(name)) {
       throw ConfigError("unknown parameter " + name);
     }
     rest[key] = value;
@@ -89,13 +89,13 @@ void take_config(RunArguments& run) {
   settings.preset = run.preset.value_or("default");
   settings.config = run.config ? *run.config : DynaInsRemover::Config::preset(settings.preset);
   settings.config.validate();
-  settings.find_own_body = !run.config && !program::has_ranges_of_paper(settings.preset);
+  settings.find_own_body = !run.config && !run::has_ranges_of_paper(settings.preset);
 }
 
-program::RunListener listen(const RunArguments& run) {
-  program::RunListener listener;
+run::RunListener listen(const RunArguments& run) {
+  run::RunListener listener;
   // The process is that of others, such as the kernel of a notebook.
-  listener.second_signal = program::SecondSignal::kAsksAgain;
+  listener.second_signal = run::SecondSignal::kAsksAgain;
   listener.warn = [](const std::string& text) {
     const py::gil_scoped_acquire acquire;
     warn(text);
@@ -141,7 +141,7 @@ PreparedRun prepare(const py::object& recording, const fs::path& out, const py::
   take_config(arguments);
   RunSettings& settings = arguments.settings;
   settings.outputs.folder = out;
-  program::check_settings(settings);
+  run::check_settings(settings);
   const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
   if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared->get());
   settings.recording = shared->get().folder().string();
@@ -152,14 +152,14 @@ PreparedRun prepare(const py::object& recording, const fs::path& out, const py::
 
 RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
   const PreparedRun prepared = prepare(recording, out, values);
-  const program::RunListener listener = listen(prepared.arguments);
+  const run::RunListener listener = listen(prepared.arguments);
   RunOutcome outcome;
   {
     const py::gil_scoped_release release;
-    outcome = program::run(prepared.arguments.settings, prepared.recording->get(), listener);
+    outcome = run::run(prepared.arguments.settings, prepared.recording->get(), listener);
   }
   if (!outcome.complete) raise_signal(outcome);
-  const program::RunOutputs& outputs = outcome.outputs;
+  const run::RunOutputs& outputs = outcome.outputs;
   RunResult result{outputs.folder, {}, {}, {}};
   if (!outputs.map.empty()) result.static_map = outputs.folder / outputs.map_name();
   if (!outcome.page.empty()) result.page = outcome.page;
@@ -178,17 +178,17 @@ std::string represent(const RunResult& result) {
 /// Writes the page of a finished run. The recording and its options are those of the run unless
 /// they are given.
 fs::path write_page(const fs::path& out, const py::object& recording, std::size_t max_points) {
-  const auto open = [&](const program::ResultFolder& finished) {
+  const auto open = [&](const run::ResultFolder& finished) {
     if (!recording.is_none()) {
       const py::gil_scoped_acquire acquire;
       return to_recording(recording, py::dict())->get();
     }
-    program::RecordingSettings settings;
+    run::RecordingSettings settings;
     settings.complete(finished.marker().value("sequence_flags", nlohmann::ordered_json::object()));
     return Recording(finished.field<std::string>("/sequence"), settings.checked());
   };
   const py::gil_scoped_release release;
-  return program::add_page(out, open, max_points);
+  return run::add_page(out, open, max_points);
 }
 
 }  // namespace
@@ -213,7 +213,7 @@ void bind_run(py::module_& module) {
                              "File of the moving points.")
       .def_property_readonly("labels", file("labels"),
                              "Folder of the labels, a file for each scan.")
-      .def_property_readonly("picture", file(program::kOverviewPicture),
+      .def_property_readonly("picture", file(run::kOverviewPicture),
                              "Picture: before, after, removed.")
       .def_readonly("page", &RunResult::page, "Page for a browser; None unless view=True.")
       .def_readonly("report", &RunResult::report, "The content of report.json.")
@@ -224,7 +224,7 @@ void bind_run(py::module_& module) {
       "recording: a Recording, or its path. out: folder for the results; created, must be empty.\n"
       "By name:\n" +
       std::string(kObjects) + describe_settings<RunSettings>() +
-      "For the path of a recording also:\n" + describe_settings<program::RecordingSettings>() +
+      "For the path of a recording also:\n" + describe_settings<run::RecordingSettings>() +
       "Returns a RunResult. Ctrl-C ends the run after the scan at hand and raises "
       "KeyboardInterrupt; the results so far stay in out.partial until the next run. Raises "
       "IoError, ConfigError, PoseError, and UsageError if another run writes to the folder. Warns "
@@ -232,7 +232,7 @@ void bind_run(py::module_& module) {
   module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
   // For dynains.view().
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
-             py::arg("max_points") = program::kDefaultViewPoints);
+             py::arg("max_points") = run::kDefaultViewPoints);
 }
 
 }  // namespace dynains::python

@@ -5,7 +5,7 @@
 namespace dynains::python {
 namespace {
 
-using program::RecordingSettings;
+using run::RecordingSettings;
 
 std::string joined(const py::object& numbers) {
   std::string text;
@@ -40,7 +40,7 @@ RecordingSettings to_recording_settings(const py::dict& values) {
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
     if (!has_setting<RecordingSettings>(name)) throw ConfigError("unknown parameter " + name);
-    if (!value.is_none()) settings.assign("--" + program::flag_name(name), to_text(value), name);
+    if (!value.is_none()) settings.assign("--" + run::flag_name(name), to_text(value), name);
   }
   return settings;
 }

@@ -10,8 +10,8 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"
-#include "run/parameter_values.hpp"
-#include "run/recording_settings.hpp"
+#include "run/settings/parameter_values.hpp"
+#include "run/settings/recording_settings.hpp"
 
 namespace dynains::python {
 
@@ -29,7 +29,7 @@ bool assign_setting(Settings& settings, const std::string& name, const py::handl
   Settings::visit(settings, [&](const auto& setting) {
     if (name != setting.name) return;
     is_known = true;
-    if (!value.is_none()) program::assign_parameter(setting, to_text(value), name);
+    if (!value.is_none()) run::assign_parameter(setting, to_text(value), name);
   });
   return is_known;
 }
@@ -58,7 +58,7 @@ std::string describe_settings() {
   const Settings defaults;
   Settings::visit(defaults, [&](const auto& setting) {
     text += std::string("  ") + setting.name + ": " + setting.help + "; " +
-            program::describe_range(setting) + '\n';
+            run::describe_range(setting) + '\n';
   });
   return text;
 }
@@ -82,12 +82,12 @@ void add_properties(Class& bound) {
         parameter.name,
         [name](const Config& self) -> py::object { return to_dict(self)[name.c_str()]; },
         [name](Config& self, const py::object& value) { assign_setting(self, name, value); },
-        (std::string(parameter.help) + "; " + program::describe_range(parameter)).c_str());
+        (std::string(parameter.help) + "; " + run::describe_range(parameter)).c_str());
   });
 }
 
 /// Settings with the keyword arguments `values`. Throws ConfigError, also for an unknown name,
 /// IoError for a file of an extrinsic calibration.
-program::RecordingSettings to_recording_settings(const py::dict& values);
+run::RecordingSettings to_recording_settings(const py::dict& values);
 
 }  // namespace dynains::python

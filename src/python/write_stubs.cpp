@@ -10,8 +10,8 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/parameters.hpp"
-#include "run/recording_settings.hpp"
 #include "run/run_settings.hpp"
+#include "run/settings/recording_settings.hpp"
 
 namespace {
 
@@ -74,10 +74,10 @@ std::string expand(const std::string& indent, const std::string& line) {
     return lines_of<dynains::evaluation::EvaluationConfig>(indent, as_argument);
   }
   if (line == "@RECORDING_ARGUMENTS@") {
-    return lines_of<dynains::program::RecordingSettings>(indent, as_argument);
+    return lines_of<dynains::run::RecordingSettings>(indent, as_argument);
   }
   if (line == "@RUN_ARGUMENTS@") {
-    return lines_of<dynains::program::RunSettings>(indent, as_argument);
+    return lines_of<dynains::run::RunSettings>(indent, as_argument);
   }
   if (line.rfind("@property ", 0) == 0) {  // NAME: TYPE
     const std::size_t name = line.find(' ') + 1, colon = line.find(':');

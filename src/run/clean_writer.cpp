@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "io/points/point_file_copy.hpp"
-#include "output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 CleanWriter::CleanWriter(std::filesystem::path folder, const Recording& recording,
                          bool drop_not_judged)
@@ -59,4 +59,4 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
   writer.commit(AtomicFile::Sync::kLater);
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -8,7 +8,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 class CleanWriter {
  public:
@@ -32,4 +32,4 @@ class CleanWriter {
   bool drop_not_judged_;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -16,7 +16,7 @@
 #include "recorded_scans.hpp"
 #include "run_plan.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 std::string loss_at(const Recording& recording, std::size_t scan, std::size_t done,
@@ -118,4 +118,4 @@ bool is_own_trajectory(const std::filesystem::path& file) {
   return content.substr(0, end) == trajectory_head(content.substr(end));
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -12,7 +12,7 @@
 #include "run_timing.hpp"
 #include "scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The odometry lost track; results of the scans before it are complete.
 struct LostTrack : std::runtime_error {
@@ -45,4 +45,4 @@ void write_trajectory(const std::filesystem::path& file, const Recording& record
 /// Whether write_trajectory() has written the file as it is. Throws IoError.
 bool is_own_trajectory(const std::filesystem::path& file);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

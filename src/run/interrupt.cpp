@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <mutex>
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 // A signal handler can reach nothing but a global.
@@ -60,4 +60,4 @@ InterruptGuard::~InterruptGuard() {
 
 int InterruptGuard::signal() { return received; }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -1,7 +1,7 @@
 // Ctrl-C as a request that a loop looks at.
 #pragma once
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// A signal ended the work early; finished results are written.
 struct Interrupted {
@@ -25,4 +25,4 @@ class InterruptGuard {
   static int signal();
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -9,9 +9,9 @@
 #include "dynains/io/point_bytes.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "labelled_sequence.hpp"
-#include "output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 using Id = std::uint16_t;  // of an instance in a file; ids beyond start again at 1
@@ -117,4 +117,4 @@ void LabelFiles::read(const std::string& name, const RecordedScan& scan,
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

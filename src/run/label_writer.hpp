@@ -11,7 +11,7 @@
 #include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Lower 16 bits: 251 moving, 9 static (ground included), 0 not judged. Upper 16 bits: instance,
 /// 0 for none; ids beyond 65535 start again at 1.
@@ -46,4 +46,4 @@ class LabelFiles {
   void take_beliefs(Span<const float> beliefs);
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -7,7 +7,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_bytes.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace fs = std::filesystem;
 
 std::vector<std::uint32_t> read_run_labels(const fs::path& file, std::size_t count) {
@@ -100,4 +100,4 @@ void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& 
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

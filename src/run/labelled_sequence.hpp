@@ -13,7 +13,7 @@
 #include "dynains/threads/background.hpp"
 #include "scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Class ids that `dynains run` writes (SemanticKITTI-MOS).
 enum RunClass : std::uint32_t { kRunNotJudged = 0, kRunStatic = 9, kRunMoving = 251 };
@@ -74,4 +74,4 @@ class LabelledSequence {
   Background reading_;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -15,7 +15,7 @@
 #include "io/logs/log_scans.hpp"
 #include "labelled_sequence.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -130,4 +130,4 @@ std::optional<std::size_t> write_log(const RunPlan& plan, const fs::path& result
   return editor.unjudged();
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -7,7 +7,7 @@
 
 #include "run_plan.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Throws ConfigError if the recording of a run that writes its log is no log, or the target no
 /// MCAP.
@@ -18,4 +18,4 @@ void check_log_output(const RunPlan& plan);
 std::optional<std::size_t> write_log(const RunPlan& plan, const std::filesystem::path& results,
                                      const std::filesystem::path& file);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

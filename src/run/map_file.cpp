@@ -6,7 +6,7 @@
 
 #include "io/text.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 class PointMapFile final : public MapFile {
@@ -127,4 +127,4 @@ VoxelKey MapAttributeTable::key_of(const Eigen::Vector3d& position) const {
                    static_cast<std::int64_t>(index.z()));
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

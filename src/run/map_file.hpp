@@ -15,7 +15,7 @@
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Values of a point of a static map that the map itself does not hold.
 struct MapAttributes {
@@ -85,4 +85,4 @@ class MapFile {
 /// [0, 255], else 1.
 double las_intensity_scale(float most);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

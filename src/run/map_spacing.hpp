@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The edge of voxels that hold about one of `points` points of surfaces, m, from `least` on and
 /// about `most` at the most. `count(edge)`: number of voxels of this edge that hold points.
@@ -15,4 +15,4 @@ double edge_by_spacing(std::size_t points, double least, double most, Count&& co
   return edge;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

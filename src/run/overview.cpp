@@ -11,7 +11,7 @@
 
 #include "point_labels.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 constexpr int kTextHeight = 14;                                       // pixels
@@ -209,4 +209,4 @@ Picture Overview::picture() const {
   return picture;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -11,7 +11,7 @@
 #include "dynains/verdict.hpp"
 #include "picture.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 class Overview {
  public:
@@ -51,4 +51,4 @@ class Overview {
   std::vector<std::vector<Pixel>> rows_;  // of a panel; empty before the first point of a row
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -8,7 +8,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 Picture::Picture(int width, int height)
     : width_(width),
@@ -36,4 +36,4 @@ void Picture::write_png(const std::filesystem::path& path) const {
   file.commit();
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

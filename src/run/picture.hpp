@@ -8,7 +8,7 @@
 
 #include "dynains/voxels/voxel_hash_table.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct Colour {
   std::uint8_t r = 0, g = 0, b = 0;
@@ -51,4 +51,4 @@ class Picture {
   std::vector<std::uint8_t> pixels_;  // numbers
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,7 +10,7 @@
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct LabelCounts {
   std::array<std::uint64_t, 5> of{};  ///< by PointLabel
@@ -42,4 +42,4 @@ void for_each_moving(Span<const PointLabel> labels, Visit&& visit) {
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

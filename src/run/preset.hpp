@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The names that a run accepts, a part of those of DynaInsRemover::Config::preset().
 inline const std::vector<std::string>& preset_names() {
@@ -17,4 +17,4 @@ inline bool has_ranges_of_paper(const std::string& name) {
   return name == "paper" || name == "published";
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

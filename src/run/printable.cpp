@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <utility>
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 constexpr unsigned char kLeadOfControls = 0xC2;  // first byte of U+0080 to U+00BF
@@ -54,4 +54,4 @@ std::string on_one_line(const std::string& text) {
   return line;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

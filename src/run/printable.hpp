@@ -5,7 +5,7 @@
 #include <streambuf>
 #include <string>
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Replaces control characters by \xNN, so that file names cannot steer a terminal. Line feeds and
 /// tabs stay; UTF-8 stays, except its control characters (U+0080 to U+009F).
@@ -29,4 +29,4 @@ class PrintableStream : std::streambuf {
 /// The text on one line: line feeds and tabs become \n and \t.
 std::string on_one_line(const std::string& text);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace dynains::program {
+namespace dynains::run {
 
 ReadAhead::ReadAhead(const Recording& recording, std::size_t first, std::size_t last,
                      std::launch thread)
@@ -22,4 +22,4 @@ void ReadAhead::launch() {
   reading_.begin([this, i = next_++] { recording_.read_scan(i, scan_); });
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -7,7 +7,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/threads/background.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 class ReadAhead {
  public:
@@ -29,4 +29,4 @@ class ReadAhead {
   Background reading_;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,7 +10,7 @@
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 inline RawPoints<float> points_of(const RecordedScan& scan) {
   return {scan.xyzi.data(), scan.size(), 4, scan.sensor.empty() ? nullptr : scan.sensor.data()};
@@ -39,4 +39,4 @@ decltype(auto) naming_scan(const Recording& recording, std::size_t i, Work&& wor
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

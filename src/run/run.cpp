@@ -17,16 +17,16 @@
 #include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
-#include "output_folder.hpp"
-#include "run_doubts.hpp"
+#include "run/output/output_folder.hpp"
+#include "run/remarks/run_doubts.hpp"
+#include "run/remarks/start_check.hpp"
 #include "run_plan.hpp"
 #include "run_report.hpp"
 #include "run_sequence.hpp"
-#include "start_check.hpp"
 #include "write_grid.hpp"
 #include "write_view.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -306,4 +306,4 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
   return write_results(plan, listener, out, outside);
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

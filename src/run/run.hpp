@@ -14,7 +14,7 @@
 #include "run_results.hpp"
 #include "run_settings.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// How a run and its caller reach each other while it lasts.
 struct RunListener {
@@ -43,4 +43,4 @@ struct RunOutcome {
 /// UsageError.
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -15,7 +15,7 @@
 #include "recorded_scans.hpp"
 #include "write_grid.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -279,4 +279,4 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
           std::move(request),  std::move(session)};
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -5,14 +5,14 @@
 #include <string>
 
 #include "dynains/io/recording.hpp"
-#include "input_files.hpp"
-#include "output_folder.hpp"
+#include "run/output/input_files.hpp"
+#include "run/output/output_folder.hpp"
 #include "run_results.hpp"
 #include "run_settings.hpp"
 #include "scan_range.hpp"
 #include "session_request.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct RunPlan {
   RunSettings settings;  ///< complete
@@ -43,4 +43,4 @@ RunPlan make_plan(const RunSettings& given, Recording sequence);
 /// The scans in a window. Throws ConfigError if there is none.
 ScanRange select_scans(const Recording& sequence, const ScanWindow& window);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -14,7 +14,7 @@
 #include "dynains/io/extrinsic.hpp"
 #include "run_sequence.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 nlohmann::ordered_json to_json(std::vector<double> values) {
@@ -136,4 +136,4 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
   file.commit();
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

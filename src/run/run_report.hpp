@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "dynains/poses/diagnosis.hpp"
-#include "output_folder.hpp"
+#include "run/output/output_folder.hpp"
 #include "run_plan.hpp"
 #include "run_timing.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Statistics of one number, for example milliseconds, over all scans. Quantiles are the smallest
 /// value that at least that share of the values does not exceed; all 0 if there are none.
@@ -32,4 +32,4 @@ const OutputKind& run_output_kind();
 /// Throws IoError.
 void write_timing(const std::filesystem::path& path, const RunTiming& timing);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

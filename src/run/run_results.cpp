@@ -11,12 +11,12 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/second_pass.hpp"
-#include "output_folder.hpp"
 #include "point_labels.hpp"
 #include "read_ahead.hpp"
 #include "recorded_scans.hpp"
+#include "run/output/output_folder.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// Points lie around the poses; near the limit doubles cost little and lose nothing.
@@ -290,4 +290,4 @@ std::optional<std::size_t> RunResults::map_points() const {
   return map_->size();
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -23,10 +23,10 @@
 #include "grid/grid_maker.hpp"
 #include "label_writer.hpp"
 #include "map_file.hpp"
-#include "odd_scans.hpp"
-#include "output_listing.hpp"
 #include "overview.hpp"
 #include "point_labels.hpp"
+#include "run/output/output_listing.hpp"
+#include "run/remarks/odd_scans.hpp"
 #include "scan_range.hpp"
 
 namespace dynains {
@@ -34,7 +34,7 @@ class Returns;
 class SecondPass;
 }  // namespace dynains
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The picture of a run, see Overview.
 inline constexpr const char* kOverviewPicture = "overview.png";
@@ -178,4 +178,4 @@ class RunResults {
   void add_scan(const RecordedScan& scan, const ScanVerdict& verdict);
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -13,7 +13,7 @@
 #include "run_results.hpp"
 #include "run_timing.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Pushes scan i. Throws PoseError that names the scan.
 template <class Remover>
@@ -82,4 +82,4 @@ RunTiming run_sequence(Remover& remover, const Recording& recording, const ScanR
   return timing;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

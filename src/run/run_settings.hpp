@@ -10,11 +10,11 @@
 #include "dynains/config.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/recording/static_policy.hpp"
-#include "parameter_values.hpp"
-#include "recording_settings.hpp"
+#include "run/settings/parameter_values.hpp"
+#include "run/settings/recording_settings.hpp"
 #include "run_results.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct RunSettings {
   RunOutputs outputs;                   ///< as asked for
@@ -123,4 +123,4 @@ void RunSettings::visit_more(Self& self, Visitor&& visitor) {
                     "machines on which many runs use all cores"});
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -11,7 +11,7 @@
 
 #include "dynains/verdict.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct TimingRow {
   std::string scan;
@@ -31,4 +31,4 @@ struct RunTiming {
   double pipeline = 0.0;  ///< ms in the pipeline, all of the above included
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

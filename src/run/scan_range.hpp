@@ -7,9 +7,9 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/parameters.hpp"
-#include "parameter_values.hpp"
+#include "run/settings/parameter_values.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Scan numbers, both inclusive; an empty end is that of the recording.
 struct ScanWindow {
@@ -37,4 +37,4 @@ struct ScanRange {
 /// All scans of a recording, which has some.
 inline ScanRange whole_of(const Recording& recording) { return {0, recording.size() - 1}; }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -8,7 +8,7 @@
 #include "dynains/pose.hpp"
 #include "recorded_scans.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// Whether a session was aligned as the request asks for.
@@ -61,4 +61,4 @@ SessionRequest aligned(SessionRequest request, const Recording& recording, const
   return request;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,7 +10,7 @@
 #include "dynains/pose.hpp"
 #include "scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Which session goes into which map of many sessions.
 struct SessionRequest {
@@ -34,4 +34,4 @@ SessionRequest reposed_session(const std::filesystem::path& folder, const std::s
 /// if the scans do not fit, IoError.
 SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,9 +10,9 @@
 #include "dynains/voxels/voxel_hash_table.hpp"
 #include "label_writer.hpp"
 #include "map_spacing.hpp"
-#include "output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -136,4 +136,4 @@ PlacedGrid grid_of_map(const fs::path& map, const grid::Config& config) {
   return {maker.grid(), place.head<2>()};
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

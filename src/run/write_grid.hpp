@@ -10,7 +10,7 @@
 #include "dynains/io/recording.hpp"
 #include "grid/grid_maker.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Warning about the scans of a grid.
 inline constexpr const char* kGridOfOneScan =
@@ -41,4 +41,4 @@ PlacedGrid grid_of_run(const std::filesystem::path& folder, const Recording& rec
 /// The grid of a map alone: free is where ground was seen. Throws IoError, ConfigError.
 PlacedGrid grid_of_map(const std::filesystem::path& map, const grid::Config& config);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -11,14 +11,14 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/truth.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "json_file.hpp"
 #include "label_writer.hpp"
+#include "run/output/json_file.hpp"
 #include "run_report.hpp"
 #include "run_results.hpp"
 #include "viewer/page.hpp"
 #include "viewer/thinning.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -192,4 +192,4 @@ fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t
   return out.path() / kViewPage;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

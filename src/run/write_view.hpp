@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "output_folder.hpp"
+#include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Points on a page: for 1 million, it has some 10 MB.
 inline constexpr std::size_t kDefaultViewPoints = 1000000;
@@ -40,4 +40,4 @@ using OpenRecording = std::function<Recording(const ResultFolder& out)>;
 std::filesystem::path add_page(const std::filesystem::path& folder, const OpenRecording& open,
                                std::size_t max_points);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -9,11 +9,14 @@
 #include "program/program.hpp"
 #include "program/progress.hpp"
 #include "run/interrupt.hpp"
-#include "run/output_folder.hpp"
+#include "run/output/output_folder.hpp"
 #include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"
 
 namespace dynains::program {
+
+using namespace run;
+
 namespace {
 
 enum class Format { kKitti, kMcap };

@@ -24,7 +24,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "run/start_check.hpp"
+#include "run/remarks/start_check.hpp"
 #include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"
 #include "support/simulated_runs.hpp"
@@ -254,15 +254,15 @@ WrittenScans write_and_open(const Scans& scans, const Kind& kind,
 
 /// The warnings and the refusal that `dynains run` prints before its first scan.
 std::string start_of_run(const Recording& recording) {
-  const program::ScanRange range{0, recording.size() - 1};
+  const run::ScanRange range{0, recording.size() - 1};
   std::string said;
   try {
-    program::check_ranges(recording, range, RemoverConfig(), false);
+    run::check_ranges(recording, range, RemoverConfig(), false);
   } catch (const ConfigError& error) {
     return error.what();
   }
   for (const std::string& warning : recording.warnings()) said += warning + ' ';
-  const program::StartCheck start = program::check_start(recording, range, RemoverConfig(), false);
+  const run::StartCheck start = run::check_start(recording, range, RemoverConfig(), false);
   for (const std::string& warning : start.warnings) said += warning + ' ';
   return said + start.refusal;
 }

@@ -38,8 +38,8 @@ struct Options {
 };
 
 /// The parameters of `list`, such as "tau-contested=0.97,beta=2".
-program::ParameterValues values_of(const std::string& list) {
-  program::ParameterValues values;
+run::ParameterValues values_of(const std::string& list) {
+  run::ParameterValues values;
   if (list == "default") return values;
   std::istringstream stream(list);
   for (std::string item; std::getline(stream, item, ',');) {
@@ -47,7 +47,7 @@ program::ParameterValues values_of(const std::string& list) {
     if (equals == std::string::npos) {
       throw ConfigError("\"" + item + "\": expected name=value");
     }
-    const std::string name = program::flag_name(item.substr(0, equals));
+    const std::string name = run::flag_name(item.substr(0, equals));
     values.set(name, item.substr(equals + 1), name);
   }
   return values;
@@ -166,7 +166,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-void run(const Options& options) {
+void run_trials(const Options& options) {
   const std::vector<std::string>& settings = options.settings;
   std::vector<DynaInsRemover::Config> configs(settings.size());
   for (std::size_t s = 0; s < settings.size(); ++s) values_of(settings[s]).apply(configs[s]);
@@ -199,7 +199,7 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   try {
-    run(parse(argc, argv));
+    run_trials(parse(argc, argv));
   } catch (const std::exception& error) {
     std::cerr << "world_trials: " << error.what() << '\n';
     return 1;

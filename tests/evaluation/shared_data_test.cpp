@@ -6,7 +6,7 @@
 #include "support/catch.hpp"
 #include "support/recordings.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 namespace {
 
@@ -43,4 +43,4 @@ TEST_CASE("Identity and oracle are exact on a recorded busy street") {
   check_identity_and_oracle("pandaset_street");
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

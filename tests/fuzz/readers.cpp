@@ -13,7 +13,7 @@
 #include "io/files.hpp"
 #include "io/point_format_writer.hpp"
 #include "io/poses/kitti_files.hpp"
-#include "run/parameter_values.hpp"
+#include "run/settings/parameter_values.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
@@ -110,7 +110,7 @@ void run_xyz(Bytes bytes) { read_point_file("cloud.xyz", bytes); }
 void run_config(Bytes bytes) {
   const fs::path path = file_of("run.cfg", bytes);
   expect_value_or<ConfigError>(path, [](const fs::path& file) {
-    const program::ParameterValues values = program::read_config_file(file);
+    const run::ParameterValues values = run::read_config_file(file);
     DynaInsRemover::Config config;
     values.apply(config);
     DynaInsRemover::Config::visit(config, [](const auto& parameter) {

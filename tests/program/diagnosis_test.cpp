@@ -10,7 +10,7 @@
 
 #include "dynains/io/extrinsic.hpp"
 #include "program/start.hpp"
-#include "run/pose_advice.hpp"
+#include "run/remarks/pose_advice.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/written_drive.hpp"
@@ -50,10 +50,10 @@ class Street : public WrittenDrive {
   }
   /// The flags that a diagnosis of the present poses proposes.
   std::string flags(const Diagnosis& diagnosis) const {
-    return program::proposed_flags(Recording(path()), diagnosis.proposal);
+    return run::proposed_flags(Recording(path()), diagnosis.proposal);
   }
   std::string advice(const Diagnosis& diagnosis) const {
-    return program::advice(Recording(path()), diagnosis);
+    return run::advice(Recording(path()), diagnosis);
   }
 };
 
@@ -138,7 +138,7 @@ TEST_CASE("check names poses that belong to the scan before or behind, if the dr
     options.convention.shift = shift;
     const Recording recording(street.path(), options);
     const Diagnosis d = diagnose(recording);
-    return std::pair(d.verdict, program::proposed_flags(recording, d.proposal));
+    return std::pair(d.verdict, run::proposed_flags(recording, d.proposal));
   };
   CHECK(diagnosis_of(0) == std::pair(PoseVerdict::kAgree, std::string()));
   for (const int shift : {-2, -1, 1, 2}) {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "program/start.hpp"
-#include "run/odd_scans.hpp"
+#include "run/remarks/odd_scans.hpp"
 #include "simulation/config.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
@@ -121,9 +121,9 @@ TEST_CASE("run and check name scans with far fewer points than those before them
 
 TEST_CASE("Counts of points that vary from scan to scan are not those of cut files") {
   const auto thin = [](const std::vector<std::uint64_t>& points) {
-    std::vector<program::ScanCounts> counts;
+    std::vector<run::ScanCounts> counts;
     for (const std::uint64_t one : points) counts.push_back({one, 0});
-    return program::thin_scans(counts);
+    return run::thin_scans(counts);
   };
   using Scans = std::vector<std::size_t>;
   // A Mid-360 in a crowd.

@@ -1,4 +1,4 @@
-#include "run/output_folder.hpp"
+#include "run/output/output_folder.hpp"
 
 #include <unistd.h>
 
@@ -7,7 +7,7 @@
 #include "support/catch.hpp"
 
 using namespace dynains;
-using namespace dynains::program;
+using namespace dynains::run;
 using namespace dynains::test;
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;

@@ -10,6 +10,7 @@
 
 using namespace dynains;
 using namespace dynains::program;
+using namespace dynains::run;
 using namespace dynains::test;
 
 namespace {

@@ -8,7 +8,7 @@
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 constexpr Colour kWhite = {255, 255, 255};
@@ -54,4 +54,4 @@ TEST_CASE("A picture is white at first, and is read back from its PNG file") {
   CHECK_THROWS_AS(picture.write_png(folder.path() / "missing" / "picture.png"), IoError);
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -5,6 +5,7 @@
 #include "support/catch.hpp"
 
 using namespace dynains::program;
+using namespace dynains::run;
 using namespace dynains::test;
 
 TEST_CASE("Quantiles are measured values") {

@@ -12,7 +12,7 @@
 #include "support/catch.hpp"
 
 using namespace dynains;
-using namespace dynains::program;
+using namespace dynains::run;
 using namespace dynains::test;
 namespace fs = std::filesystem;
 

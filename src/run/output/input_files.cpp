@@ -5,7 +5,7 @@
 #include "dynains/errors.hpp"
 #include "io/scan_files.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace fs = std::filesystem;
 
 void InputFiles::add(const Recording& recording) {
@@ -48,4 +48,4 @@ void InputFiles::add_owner(const fs::path& folder, bool has_scans) {
     owners_.emplace(*identity, std::pair(folder, has_scans));
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,7 +10,7 @@
 #include "dynains/io/recording.hpp"
 #include "io/folder.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 class InputFiles {
  public:
@@ -51,4 +51,4 @@ class InputFiles {
   std::map<FileIdentity, std::pair<std::filesystem::path, bool>> owners_;
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

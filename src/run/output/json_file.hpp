@@ -9,7 +9,7 @@
 
 #include "dynains/errors.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Arrays and objects within each other that a JSON file may have.
 inline constexpr int kMaxJsonDepth = 64;
@@ -51,4 +51,4 @@ T required_json_field(const std::filesystem::path& path, const nlohmann::ordered
   throw IoError(path.string() + ": " + pointer + ": not found; expected a value");
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "scan_range.hpp"
+#include "run/scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// A remark if coordinates lie so far from the origin of the world that float32 puts them into
 /// stripes, or if the points of the first scan lie on a grid of 5 cm or more; another one if
@@ -21,4 +21,4 @@ std::vector<std::string> remarks_on_clouds(const Recording& recording, const Sca
 /// under a larger tilt, else the options that may help. Throws IoError.
 std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

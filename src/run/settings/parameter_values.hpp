@@ -14,7 +14,7 @@
 #include "dynains/parameters.hpp"
 #include "io/text.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// "tau_s" -> "tau-s", the name of the flag and of the line in a config file.
 std::string flag_name(std::string parameter_name);
@@ -157,4 +157,4 @@ class ParameterValues {
 /// ConfigError for a line of another form or a name that stands twice.
 ParameterValues read_config_file(const std::filesystem::path& path);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -6,7 +6,7 @@
 
 #include "dynains/errors.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 std::string listed_name(const std::string& name) {
   std::string text;
@@ -57,4 +57,4 @@ OutputListing read_listing(const std::filesystem::path& file, const nlohmann::or
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -6,7 +6,7 @@
 
 #include "io/input_file.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -53,4 +53,4 @@ std::string to_text(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -8,7 +8,7 @@
 #include "io/input_file.hpp"
 #include "parameter_values.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// `word` as a shell reads it back.
@@ -85,4 +85,4 @@ std::string RecordingSettings::as_given(const std::string& recording,
   return further.empty() ? text : text + ' ' + further;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

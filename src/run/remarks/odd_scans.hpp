@@ -8,7 +8,7 @@
 
 #include "dynains/io/recording.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct ScanCounts {
   std::uint64_t points = 0;
@@ -32,4 +32,4 @@ std::vector<std::string> remarks_on_odd_scans(const Recording& recording, std::s
                                               const std::vector<ScanCounts>& counts,
                                               bool compares_all);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

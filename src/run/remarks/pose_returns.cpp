@@ -11,9 +11,9 @@
 #include "dynains/evidence/free_space_config.hpp"
 #include "poses/given_motion.hpp"
 #include "poses/landmarks.hpp"
-#include "recorded_scans.hpp"
+#include "run/recorded_scans.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 std::size_t distance(std::size_t a, std::size_t b) { return a > b ? a - b : b - a; }
@@ -99,4 +99,4 @@ void write_closures(std::ostream& text, const std::vector<ReturnToPlace>& return
   }
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

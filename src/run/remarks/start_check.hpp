@@ -7,9 +7,9 @@
 
 #include "dynains/config.hpp"
 #include "dynains/io/recording.hpp"
-#include "scan_range.hpp"
+#include "run/scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Reads a few scans. Throws ConfigError if less than 1 % of their points are within `min_range`
 /// and `max_range`, or, unless `unit_is_given`, if more than 90 % are farther than any LiDAR sees:
@@ -32,4 +32,4 @@ struct StartCheck {
 StartCheck check_start(const Recording& recording, const ScanRange& range,
                        const RemoverConfig& config, bool accepts_poses);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -11,7 +11,7 @@
 #include "poses/in_two_threads.hpp"
 #include "poses/landmarks.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 constexpr std::size_t kBeside = 4;  // scans on each side that are compared with each other
@@ -153,4 +153,4 @@ std::vector<std::string> remarks_on_odd_scans(const Recording& recording, std::s
   return remarks;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -17,7 +17,7 @@
 #include "poses/sensor_agreement.hpp"
 #include "start_check.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 std::string fixed(double value, int digits, const char* unit = "") {
@@ -169,4 +169,4 @@ RecordingCheck check_recording(const Recording& recording) {
   return check;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

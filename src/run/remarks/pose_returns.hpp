@@ -10,7 +10,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/recording/returns.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Scans near each other that come back to scans near each other. Numbers are those of the
 /// recording.
@@ -37,4 +37,4 @@ std::string sentence(const ReturnError& error, const Recording& recording);
 /// of scans.
 void write_closures(std::ostream& text, const std::vector<ReturnToPlace>& returns);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

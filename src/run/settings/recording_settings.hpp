@@ -9,7 +9,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/parameters.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// A setting of a string or a path, which is the text as it is.
 template <class T>
@@ -128,4 +128,4 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                      "origin, or the sensors [that of the clouds]"));
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

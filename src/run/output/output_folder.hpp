@@ -18,7 +18,7 @@
 #include "json_file.hpp"
 #include "output_listing.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Absolute, links followed as far as there are any, and nothing behind the last name: two paths
 /// are of one place if these are equal, whether it is there yet or not.
@@ -199,4 +199,4 @@ class OutputFile {
   const Folder* folder_ = nullptr;  // of the target
 };
 
-}  // namespace dynains::program
+}  // namespace dynains::run

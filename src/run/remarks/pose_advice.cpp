@@ -7,10 +7,10 @@
 
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/extrinsic.hpp"
-#include "parameter_values.hpp"
-#include "recording_settings.hpp"
+#include "run/settings/parameter_values.hpp"
+#include "run/settings/recording_settings.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// "12 cm and 0.3 deg over 9 scans".
@@ -147,4 +147,4 @@ std::string advice(const Recording& recording, const Diagnosis& d) {
   return {};
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -10,10 +10,10 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/plausibility.hpp"
 #include "pose_returns.hpp"
-#include "run_timing.hpp"
-#include "scan_range.hpp"
+#include "run/run_timing.hpp"
+#include "run/scan_range.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// Scans in a row that no correct recording gives.
 struct SuspiciousScans {
@@ -46,4 +46,4 @@ std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& rec
 /// "jumps", "suspicious" and "returns" of a report.
 nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

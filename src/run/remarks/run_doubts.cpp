@@ -8,7 +8,7 @@
 #include "dynains/parameters.hpp"
 #include "poses/given_motion.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 std::string percent(float share) { return std::to_string(std::lround(100.0F * share)) + " %"; }
@@ -136,4 +136,4 @@ nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recordi
   return {{"jumps", jumps}, {"suspicious", parts}, {"returns", returns}};
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -16,7 +16,7 @@
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
@@ -391,4 +391,4 @@ void OutputFile::write(const std::function<void(std::ostream&)>& fill) {
   put_in_place();
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -18,7 +18,7 @@
 #include "poses/pose_fit.hpp"
 #include "poses/ray_origin.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// Judges the poses as `dynains check` does, unless a few places confirm them.
@@ -104,4 +104,4 @@ StartCheck check_start(const Recording& recording, const ScanRange& range,
   return result;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The name in printable ASCII: other bytes, and `%`, become `%XX`. Names need not be UTF-8.
 std::string listed_name(const std::string& name);
@@ -30,4 +30,4 @@ struct OutputListing {
 OutputListing read_listing(const std::filesystem::path& file, const nlohmann::ordered_json& marker,
                            const std::string& command);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

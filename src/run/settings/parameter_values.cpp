@@ -8,7 +8,7 @@
 #include "dynains/parameters.hpp"
 #include "io/input_file.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 template <class Real>
@@ -65,4 +65,4 @@ ParameterValues read_config_file(const std::filesystem::path& path) {
   return values;
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

@@ -6,7 +6,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/poses/diagnosis.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 struct RecordingCheck {
   Diagnosis diagnosis;
@@ -20,4 +20,4 @@ struct RecordingCheck {
 /// Looks at the size of every scan file and at a sample of scans. Throws IoError.
 RecordingCheck check_recording(const Recording& recording);
 
-}  // namespace dynains::program
+}  // namespace dynains::run

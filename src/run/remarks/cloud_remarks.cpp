@@ -15,7 +15,7 @@
 #include "dynains/sensor/mounting.hpp"
 #include "io/points/finite_points.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 namespace {
 
 /// Whether nearly all coordinates of an axis in the frame `file` lie multiples of `step` (m) apart.
@@ -259,4 +259,4 @@ std::optional<std::string> remark_on_tilt(const Recording& recording, const Scan
          " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
 }
 
-}  // namespace dynains::program
+}  // namespace dynains::run

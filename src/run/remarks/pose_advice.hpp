@@ -6,7 +6,7 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/poses/diagnosis.hpp"
 
-namespace dynains::program {
+namespace dynains::run {
 
 /// The flags of `dynains run` that change the given options into `proposal`, such as
 /// `--invert-poses --pose-units mm`; empty if nothing changes, or if a flag has to be left out.
@@ -18,4 +18,4 @@ std::string span_text(const Diagnosis& diagnosis);
 /// One sentence with the verdict on the poses and the proposed flags.
 std::string advice(const Recording& recording, const Diagnosis& diagnosis);
 
-}  // namespace dynains::program
+}  // namespace dynains::run
