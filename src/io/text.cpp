@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <iomanip>
 #include <sstream>
 
 namespace dynains::text {
@@ -23,6 +25,13 @@ std::string to_text(double value) {
   exact(text);
   text.precision(15);
   text << value;
+  return text.str();
+}
+
+std::string fixed(double value, int decimals, std::string_view unit) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream text;
+  exact(text) << std::fixed << std::setprecision(decimals) << value << unit;
   return text.str();
 }
 

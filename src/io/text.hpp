@@ -25,6 +25,8 @@ std::string lower_case(std::string text);
 
 /// The shortest form with at most 15 digits, independent of the locale.
 std::string to_text(double value);
+/// With a number of decimals, and a unit behind it; "-" if it is not finite.
+std::string fixed(double value, int decimals, std::string_view unit = {});
 /// "12.5 s".
 std::string in_seconds(double time);
 

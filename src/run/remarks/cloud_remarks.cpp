@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/median.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "io/points/finite_points.hpp"
+#include "io/text.hpp"
 
 namespace dynains::run {
 namespace {
@@ -91,7 +91,7 @@ std::optional<std::string> remark_on_grid(const RecordedScan& scan, const Pose& 
         !are_multiples(scan, T_file_sensor, 1, step)) {
       continue;
     }
-    return "points lie on a grid of " + evaluation::format_number(step, 2) +
+    return "points lie on a grid of " + text::fixed(step, 2) +
            " m, as after a voxel filter or a coarse conversion: record the clouds before it";
   }
   return std::nullopt;
@@ -122,9 +122,8 @@ std::optional<std::string> remark_on_stripes(const Recording& recording) {
     far = std::max(far, place);
   }
   if (widest == 0.0) return remark_on_grid(scan, T_world_sensor);
-  return "points were stored as float32 " + evaluation::format_number(far, 0) +
-         " m from the origin of the world, and lie in stripes of " +
-         evaluation::format_number(widest, 2) +
+  return "points were stored as float32 " + text::fixed(far, 0) +
+         " m from the origin of the world, and lie in stripes of " + text::fixed(widest, 2) +
          " m: store float64, or subtract an offset from points and poses before they are stored";
 }
 
@@ -223,7 +222,7 @@ std::optional<std::string> remark_on_turns(const Recording& recording, const Sca
   // Some recorders cut by packets, now before and now behind a whole turn.
   const double angle = sum / static_cast<double>(count);
   if (angle < 360.0 + kMinOverlap) return std::nullopt;
-  return "clouds go around by " + evaluation::format_number(angle, 0) +
+  return "clouds go around by " + text::fixed(angle, 0) +
          " deg, so that their ends overlap, measured a turn apart: each point needs a time "
          "(--deskew), or clouds should be single turns";
 }

@@ -5,8 +5,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "io/text.hpp"
 #include "run/settings/parameter_values.hpp"
 #include "run/settings/recording_settings.hpp"
 
@@ -15,8 +15,8 @@ namespace {
 
 /// "12 cm and 0.3 deg over 9 scans".
 std::string error_text(const Diagnosis& d) {
-  return evaluation::format_number(100.0 * d.translation_error, 0) + " cm and " +
-         evaluation::format_number(180.0 / M_PI * d.rotation_error, 1) + " deg " + span_text(d);
+  return text::fixed(100.0 * d.translation_error, 0) + " cm and " +
+         text::fixed(180.0 / M_PI * d.rotation_error, 1) + " deg " + span_text(d);
 }
 
 /// A setting as its flag has it; "false" for a flag that is left out. Empty for settings that no
@@ -97,8 +97,8 @@ std::string text_on_flaws(const PoseFlaws& flaws) {
     return " All orientations of the poses are equal: they have positions alone, or are frozen.";
   }
   if (flaws.step > 0.0) {
-    return " The coordinates of the poses are in steps of " +
-           evaluation::format_number(flaws.step, 2) + " m: write them with all digits.";
+    return " The coordinates of the poses are in steps of " + text::fixed(flaws.step, 2) +
+           " m: write them with all digits.";
   }
   return "";
 }

@@ -7,8 +7,8 @@
 #include <ostream>
 
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/evidence/free_space_config.hpp"
+#include "io/text.hpp"
 #include "poses/given_motion.hpp"
 #include "poses/landmarks.hpp"
 #include "run/recorded_scans.hpp"
@@ -75,8 +75,7 @@ std::string sentence(const ReturnError& error, const Recording& recording) {
   };
   return "the trajectory returns to " + names(error.first_earlier, error.last_earlier) + " in " +
          names(error.first_later, error.last_later) + " with an error of " +
-         evaluation::format_number(error.metres, 2) + " m and " +
-         evaluation::format_number(error.degrees, 1) + " deg";
+         text::fixed(error.metres, 2) + " m and " + text::fixed(error.degrees, 1) + " deg";
 }
 
 void write_closures(std::ostream& text, const std::vector<ReturnToPlace>& returns) {

@@ -10,8 +10,8 @@
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "io/text.hpp"
 #include "odd_scans.hpp"
 #include "pose_advice.hpp"
 #include "poses/sensor_agreement.hpp"
@@ -20,9 +20,7 @@
 namespace dynains::run {
 namespace {
 
-std::string fixed(double value, int digits, const char* unit = "") {
-  return evaluation::format_number(value, digits) + unit;
-}
+using text::fixed;
 
 void add_line(std::ostream& text, const std::string& what, const std::string& value) {
   text << std::left << std::setw(20) << what << value << '\n';

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/parameters.hpp"
+#include "io/text.hpp"
 #include "poses/given_motion.hpp"
 
 namespace dynains::run {
@@ -34,8 +34,8 @@ std::string text_of(const std::vector<PoseJump>& jumps, const Recording& recordi
                      (jumps.size() == 1 ? " time" : " times") + ", at scan ";
   for (std::size_t i = 0; i < std::min(kShown, jumps.size()); ++i) {
     text += (i > 0 ? ", " : "") + recording.name(jumps[i].scan) + " by " +
-            evaluation::format_number(jumps[i].translation, 2) + " m and " +
-            evaluation::format_number(jumps[i].rotation, 1) + " deg";
+            text::fixed(jumps[i].translation, 2) + " m and " + text::fixed(jumps[i].rotation, 1) +
+            " deg";
   }
   if (jumps.size() > kShown) text += " and " + std::to_string(jumps.size() - kShown) + " more";
   return text + "; scans are not compared across a large jump";
@@ -54,7 +54,7 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
     case Suspicion::kPoses:
       return since + "scans do not fit to each other under the poses (" + percent(worst.misfits) +
              " of the scans begin anew, residual " +
-             evaluation::format_number(static_cast<double>(worst.residual), 2) + " m" +
+             text::fixed(static_cast<double>(worst.residual), 2) + " m" +
              "): the poses are wrong, inexact or those of another body; see: dynains check";
     case Suspicion::kRays:
       break;

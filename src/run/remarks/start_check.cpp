@@ -11,8 +11,8 @@
 
 #include "cloud_remarks.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/median.hpp"
+#include "io/text.hpp"
 #include "pose_advice.hpp"
 #include "poses/landmarks.hpp"
 #include "poses/pose_fit.hpp"
@@ -54,7 +54,7 @@ void check_ranges(const Recording& recording, const ScanRange& range, const Remo
   const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
   const bool is_far = !unit_is_given && count_within(kMaxReturn) < 0.1 * count;
   if (judged >= 0.01 && !is_far) return;
-  const auto number = [](double value) { return evaluation::format_number(value, 1); };
+  const auto number = [](double value) { return text::fixed(value, 1); };
   throw ConfigError(
       recording.folder().string() + ": " + number(100.0 * judged) +
       " % of the points can be judged, those from " + number(config.min_range) +
