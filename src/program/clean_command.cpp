@@ -13,22 +13,22 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 #include "io/points/point_file_copy.hpp"
+#include "io/text.hpp"
 #include "parameter_flags.hpp"
 #include "poses/scan_registration.hpp"
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/labelled_sequence.hpp"
 #include "run/map_spacing.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
+#include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {
@@ -214,12 +214,12 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
   Progress progress(scans.size(), "scans", quiet);
   RecordedScan scan;
   PointBuffer standing;
+  const VerdictFiles files(out.path());
   std::size_t done = 0;
   for (const std::size_t i : scans) {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     recording.read_scan(i, scan);
-    const fs::path file = out.path() / "labels" / (recording.name(i) + ".label");
-    const std::vector<std::uint32_t> labels = read_run_labels(file, scan.size());
+    const std::vector<std::uint32_t> labels = files.labels(recording.name(i), scan.size());
     const Pose& T_world_sensor = recording.T_world_sensor(i);
     if (alignment.is_due(T_world_sensor)) {
       standing.clear();
@@ -291,7 +291,7 @@ void clean(CleanOptions& options) {
         "the distance of the map and the scans is not known: too few surfaces are in "
         "both; points of scans count where their poses put them");
   } else if (2.0 * alignment.farthest() > options.voxel) {
-    print_warning("the map lies up to " + evaluation::format_number(alignment.farthest(), 2) +
+    print_warning("the map lies up to " + text::fixed(alignment.farthest(), 2) +
                   " m from the scans, as if it was made with other poses; points of scans count "
                   "where they fit to it");
   }

@@ -60,10 +60,10 @@ void eval(const EvalOptions& options) {
   }
 
   if (!options.unfinished) check_are_finished(options);
-  std::vector<RunLabels> runs;
+  std::vector<VerdictFiles> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {
-    runs.push_back({folder, options.online ? "online" : "labels"});
+    runs.emplace_back(folder, options.online ? "online" : "labels");
     names.push_back(options.runs.size() > 1 ? folder : options.online ? "online" : "run");
   }
 

@@ -15,6 +15,7 @@
 #include "run/interrupt.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
+#include "run/verdict_files.hpp"
 #include "run/write_grid.hpp"
 #include "run/write_view.hpp"
 
@@ -47,7 +48,13 @@ PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
   if (scans.size() == 1) print_warning(kGridOfOneScan);
   std::optional<Progress> progress;
-  PlacedGrid made = grid_of_run(out.path(), recording, scans, options.config, options.keep_moving,
+  const VerdictFiles files(out.path());
+  VerdictArrays verdict;
+  const auto read = [&](std::size_t i, const RecordedScan& scan, std::vector<PointLabel>& labels) {
+    files.read(recording.name(i), scan.size()).unpack(scan, verdict);
+    std::swap(labels, verdict.labels);
+  };
+  PlacedGrid made = grid_of_run(read, recording, scans, options.config, options.keep_moving,
                                 [&](std::size_t done) {
                                   if (done == 0)
                                     progress.emplace(2 * scans.size(), "scans", options.quiet);

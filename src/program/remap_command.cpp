@@ -15,11 +15,11 @@
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/label_writer.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/recorded_scans.hpp"
 #include "run/run_plan.hpp"
 #include "run/session_request.hpp"
+#include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
 
 namespace dynains::program {
@@ -96,7 +96,7 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
                                const StaticMapAccumulator::Config& config, bool quiet,
                                SessionWriter* session) {
   StaticMapAccumulator map(config);
-  const LabelFiles files(folder / "labels", folder / "causes");
+  const VerdictFiles files(folder);
   RecordedScan scan;
   PointBuffer points;
   VerdictArrays arrays;
@@ -106,11 +106,11 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
     const std::size_t i = scans[k];
     original.read_scan(i, scan);
     copy_points(scan, points);
-    files.read(original.name(i), scan, arrays);
+    files.read(original.name(i), scan.size()).unpack(scan, arrays);
     const ScanVerdict verdict =
         arrays.verdict({i, original.time(i), orthonormalized(corrected.T_world_sensor(i))});
     const std::vector<std::uint8_t> keep =
-        static_points(points, arrays.labels, folder / "labels" / (original.name(i) + ".label"));
+        static_points(points, arrays.labels, files.file(original.name(i)));
     map.insert(points, keep, verdict.T_world_sensor);
     if (session != nullptr) {
       const auto labels =
@@ -158,7 +158,7 @@ class NewMap {
     } else {
       file_.emplace(path_, existing_by(options.force), inputs);
     }
-    writer_ = open_map(file_->path(), recording, range, RunOutputs());
+    writer_ = open_map(file_->path(), recording, range, false, "");
   }
 
   const fs::path& path() const { return path_; }

@@ -26,20 +26,20 @@ std::string CleanWriter::name(const Recording& recording, std::size_t i) {
                                                            : ".pcd");
 }
 
-void CleanWriter::write(std::size_t i, const RecordedScan& scan,
-                        Span<const PointLabel> labels) const {
-  const std::filesystem::path target = folder_ / name(recording_, i);
+void CleanWriter::write(const JudgedScan& judged) const {
+  const Span<const PointLabel> labels = judged.verdict.labels;
+  const std::filesystem::path target = folder_ / name(recording_, judged.index);
   const ScanFormat format = recording_.format();
   if (format == ScanFormat::kBin || format == ScanFormat::kPly || format == ScanFormat::kPcd) {
     std::vector<std::uint8_t> keep;
     for (const PointLabel label : labels) keep.push_back(is_kept(label) ? 1 : 0);
     AtomicFile file(target);
-    copy_points(recording_.file(i), {keep.data(), keep.size()}, file.stream());
+    copy_points(recording_.file(judged.index), {keep.data(), keep.size()}, file.stream());
     file.commit(AtomicFile::Sync::kLater);
     return;
   }
   const bool is_world = recording_.frame() == PointFrame::kWorld;
-  const Pose& T_world_sensor = recording_.T_world_sensor(i);
+  const Pose& T_world_sensor = recording_.T_world_sensor(judged.index);
   const Pose T_file_sensor =
       is_world ? T_world_sensor : Pose(Eigen::Translation3d(recording_.sensor_origin()));
   PointColumns columns = recording_.columns();
@@ -52,7 +52,7 @@ void CleanWriter::write(std::size_t i, const RecordedScan& scan,
                              : Pose::Identity());
   for (std::size_t k = 0; k < labels.size(); ++k) {
     if (!is_kept(labels[k])) continue;
-    FilePoint point = scan.point(k);
+    FilePoint point = judged.scan.point(k);
     point.position = T_file_sensor * point.position;
     writer.add(point);
   }

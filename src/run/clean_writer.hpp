@@ -7,6 +7,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "judged_scan.hpp"
 
 namespace dynains::run {
 
@@ -18,11 +19,11 @@ class CleanWriter {
   /// File name of scan i.
   static std::string name(const Recording& recording, std::size_t i);
 
-  /// Writes scan i of the recording: all finite points that are not dynamic, or with
+  /// Writes the scan: all finite points that are not dynamic, or with
   /// `drop_not_judged` all static ones, in their order and frame. Files of .bin, .pcd and .ply are
   /// copied without the other points, so that all columns stay as they are. Scans of other formats
   /// become .pcd with the columns of `scan`, m.
-  void write(std::size_t i, const RecordedScan& scan, Span<const PointLabel> labels) const;
+  void write(const JudgedScan& judged) const;
 
  private:
   bool is_kept(PointLabel label) const;

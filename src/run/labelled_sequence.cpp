@@ -4,25 +4,12 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/kitti.hpp"
-#include "dynains/io/point_bytes.hpp"
 
 namespace dynains::run {
 namespace fs = std::filesystem;
 
-std::vector<std::uint32_t> read_run_labels(const fs::path& file, std::size_t count) {
-  std::vector<std::uint32_t> labels = read_labels(file, count);
-  for (std::size_t p = 0; p < count; ++p) {
-    const std::uint32_t id = class_of(labels[p]);
-    if (id == kRunStatic || id == kRunMoving || id == kRunNotJudged) continue;
-    throw IoError(file.string() + ": point " + std::to_string(p) + " has class " +
-                  std::to_string(id) + "; expected 9 (static), 251 (moving) or 0 (not judged)");
-  }
-  return labels;
-}
-
 LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window,
-                                   std::vector<RunLabels> runs)
+                                   std::vector<VerdictFiles> runs)
     : sequence_(std::move(recording)), runs_(std::move(runs)) {
   const fs::path& folder = sequence_.folder();
   if (!sequence_.has_labels()) {
@@ -47,13 +34,13 @@ LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window
   if (!scans_.empty()) return;
   if (first < last) throw IoError((folder / "labels").string() + ": no label of any chosen scan");
   throw IoError(chosen ? folder.string() + ": no scan within the chosen window"
-                       : (runs_.front().folder / runs_.front().kind).string() +
-                             ": no labels for any scan of " + folder.string());
+                       : runs_.front().folder().string() + ": no labels for any scan of " +
+                             folder.string());
 }
 
 bool LabelledSequence::every_run_has(std::size_t index) const {
-  return std::all_of(runs_.begin(), runs_.end(), [&](const RunLabels& run) {
-    return fs::exists(run.folder / run.kind / (sequence_.name(index) + ".label"));
+  return std::all_of(runs_.begin(), runs_.end(), [&](const VerdictFiles& run) {
+    return fs::exists(run.file(sequence_.name(index)));
   });
 }
 
@@ -82,21 +69,14 @@ void LabelledSequence::load(std::size_t i, Scan& scan) const {
   sequence_.read_scan(index, scan.points);
   scan.truth = sequence_.read_labels(index);
   scan.in_map.assign(runs_.empty() ? 0 : scan.truth.size(), 0);
+  const std::string& name = sequence_.name(index);
   for (std::size_t run = 0; run < runs_.size(); ++run) {
-    load_run(run, sequence_.name(index), scan);
-  }
-  if (!runs_.empty() && runs_.front().kind == "labels") {
-    const fs::path causes = runs_.front().folder / "causes";
-    scan.causes = read_point_bytes(causes / (sequence_.name(index) + ".cause"), scan.truth.size());
-  }
-}
-
-void LabelledSequence::load_run(std::size_t run, const std::string& name, Scan& scan) const {
-  const fs::path file = runs_[run].folder / runs_[run].kind / (name + ".label");
-  const std::vector<std::uint32_t> labels = read_run_labels(file, scan.truth.size());
-  for (std::size_t p = 0; p < labels.size(); ++p) {
-    const unsigned kept = class_of(labels[p]) == kRunStatic ? 1U : 0U;
-    scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | kept << run);
+    PackedVerdict verdict = runs_[run].read(name, scan.truth.size());
+    for (std::size_t p = 0; p < verdict.labels.size(); ++p) {
+      const unsigned kept = class_of(verdict.labels[p]) == kRunStatic ? 1U : 0U;
+      scan.in_map[p] = static_cast<std::uint8_t>(scan.in_map[p] | kept << run);
+    }
+    if (run == 0) scan.causes = std::move(verdict.causes);
   }
 }
 

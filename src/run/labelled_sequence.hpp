@@ -4,32 +4,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/threads/background.hpp"
 #include "scan_range.hpp"
+#include "verdict_files.hpp"
 
 namespace dynains::run {
-
-/// Class ids that `dynains run` writes (SemanticKITTI-MOS).
-enum RunClass : std::uint32_t { kRunNotJudged = 0, kRunStatic = 9, kRunMoving = 251 };
-
-/// Labels that `dynains run` wrote for `count` points. Throws IoError for a file of another size or
-/// with labels of another program.
-std::vector<std::uint32_t> read_run_labels(const std::filesystem::path& file, std::size_t count);
-
-/// Class id of a label.
-constexpr std::uint32_t class_of(std::uint32_t label) { return label & 0xffffU; }
-
-/// Folder of one run and the subfolder of the labels to judge.
-struct RunLabels {
-  std::filesystem::path folder;  ///< OUT of `dynains run`
-  std::string kind = "labels";   ///< or "online"
-};
 
 /// Reads scan by scan, the next one in another thread; holds two scans at a time.
 class LabelledSequence {
@@ -37,7 +20,8 @@ class LabelledSequence {
   /// Takes a recording and chooses its scans with ground truth: those within `window`; without a
   /// window, from the first to the last scan that every run has labels for. Throws IoError if no
   /// scan is left.
-  LabelledSequence(Recording recording, const ScanWindow& window, std::vector<RunLabels> runs = {});
+  LabelledSequence(Recording recording, const ScanWindow& window,
+                   std::vector<VerdictFiles> runs = {});
   LabelledSequence(const LabelledSequence&) = delete;
   LabelledSequence& operator=(const LabelledSequence&) = delete;
 
@@ -62,10 +46,9 @@ class LabelledSequence {
 
   bool every_run_has(std::size_t index) const;
   void load(std::size_t i, Scan& scan) const;
-  void load_run(std::size_t run, const std::string& name, Scan& scan) const;
 
   Recording sequence_;
-  std::vector<RunLabels> runs_;
+  std::vector<VerdictFiles> runs_;
   std::vector<std::size_t> scans_;  // indices within sequence_
   std::size_t missing_truths_ = 0;
   Scan scan_;

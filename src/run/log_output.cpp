@@ -13,7 +13,6 @@
 #include "io/logs/cloud_edit.hpp"
 #include "io/logs/log_copy.hpp"
 #include "io/logs/log_scans.hpp"
-#include "labelled_sequence.hpp"
 
 namespace dynains::run {
 namespace {
@@ -28,19 +27,17 @@ Place place_of(const LogMessage& message) { return {message.part, message.block,
 /// Replaces clouds by the labels of a run.
 class CloudEditor {
  public:
-  /// `labels`: the folder of labels.
-  CloudEditor(const RunPlan& plan, fs::path labels)
-      : log_(*plan.sequence.log()), labels_(std::move(labels)), outputs_(plan.settings.outputs) {
+  CloudEditor(const RunPlan& plan, const PointStore& labels)
+      : log_(*plan.sequence.log()), labels_(labels), outputs_(plan.settings.outputs) {
     for (const LogMessage& message : log_.log().messages()) {
       if (log_.has_topic(message.topic)) parts_[place_of(message)];
     }
     unjudged_ = parts_.size();
     for (std::size_t i = plan.range.first; i <= plan.range.last; ++i) {
       const std::size_t scan = plan.sequence.file_index(i);
-      const std::size_t points = log_.point_count(scan);
       std::size_t begin = 0;
       for (const LogCloud& cloud : log_.clouds(scan)) {
-        parts_[place_of(cloud.message)] = {plan.sequence.name(i), begin, points};
+        parts_[place_of(cloud.message)] = {i - plan.range.first, begin};
         begin += cloud.points;
         --unjudged_;
       }
@@ -53,7 +50,7 @@ class CloudEditor {
                                         const SerialisedMessage& cloud) const {
     if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
     const auto part = parts_.find(place_of(message));
-    if (part == parts_.end() || (!outputs_.mark_log && part->second.scan.empty())) {
+    if (part == parts_.end() || (!outputs_.mark_log && !part->second.scan)) {
       return std::nullopt;
     }
     const std::string& type = log_.log().topics()[message.topic].type;
@@ -67,18 +64,17 @@ class CloudEditor {
  private:
   /// The points of a cloud in a scan.
   struct Part {
-    std::string scan;  ///< its name; empty: it has no labels
+    std::optional<std::size_t> scan;  ///< of the run; empty: without a verdict
     std::size_t begin = 0;
-    std::size_t scan_size = 0;
   };
 
   std::vector<std::uint8_t> classes_of(const Part& part, std::size_t points) const {
     std::vector<std::uint8_t> classes(points, static_cast<std::uint8_t>(kRunNotJudged));
-    if (part.scan.empty()) return classes;
-    const fs::path file = labels_ / (part.scan + ".label");
-    const std::vector<std::uint32_t> labels = read_run_labels(file, part.scan_size);
+    if (!part.scan) return classes;
+    std::vector<PointLabel> labels;
+    labels_.read(*part.scan, labels);
     for (std::size_t i = 0; i < points; ++i) {
-      classes[i] = static_cast<std::uint8_t>(class_of(labels.at(part.begin + i)));
+      classes[i] = static_cast<std::uint8_t>(mos_class(labels.at(part.begin + i)));
     }
     return classes;
   }
@@ -92,7 +88,7 @@ class CloudEditor {
   }
 
   const LogScans& log_;
-  fs::path labels_;
+  const PointStore& labels_;
   const RunOutputs& outputs_;
   std::map<Place, Part> parts_;  ///< of all clouds on the topics
   std::size_t unjudged_ = 0;
@@ -117,9 +113,9 @@ void check_log_output(const RunPlan& plan) {
   if (plan.sequence.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 
-std::optional<std::size_t> write_log(const RunPlan& plan, const fs::path& results,
+std::optional<std::size_t> write_log(const RunPlan& plan, const PointStore& labels,
                                      const fs::path& file) {
-  const CloudEditor editor(plan, results / "labels");
+  const CloudEditor editor(plan, labels);
   try {
     const auto log =
         open_log(plan.sequence.log()->log().path(), plan.sequence.options().accept_missing);

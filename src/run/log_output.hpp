@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "run_plan.hpp"
+#include "verdict_files.hpp"
 
 namespace dynains::run {
 
@@ -13,9 +14,10 @@ namespace dynains::run {
 /// MCAP.
 void check_log_output(const RunPlan& plan);
 
-/// Copies the log with the labels of the run in `results` to `file`. Returns the number of clouds
-/// on the topic that have none, which stay as they are; nothing after a signal. Throws IoError.
-std::optional<std::size_t> write_log(const RunPlan& plan, const std::filesystem::path& results,
+/// Copies the log with the final labels of the scans of the run, in their order, to `file`. Returns
+/// the number of clouds on the topic that have none, which stay as they are; nothing after a
+/// signal. Throws IoError.
+std::optional<std::size_t> write_log(const RunPlan& plan, const PointStore& labels,
                                      const std::filesystem::path& file);
 
 }  // namespace dynains::run

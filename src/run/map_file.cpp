@@ -57,19 +57,39 @@ class LasMapFile final : public MapFile {
   double intensity_scale_;
 };
 
-/// Attributes of point i of a scan with its verdict. `labels` of the recording may be empty.
-MapAttributes attributes_of(const RecordedScan& scan, const ScanVerdict& verdict,
-                            const std::vector<std::uint32_t>& labels, std::size_t i) {
+/// Attributes of point i of a scan.
+MapAttributes attributes_of(const JudgedScan& judged, std::size_t i) {
+  const RecordedScan& scan = judged.scan;
+  const ScanVerdict& verdict = judged.verdict;
   MapAttributes attributes;
   attributes.scan_time = verdict.time;
   if (!scan.time.empty()) attributes.time = scan.time[i];
   attributes.intensity = scan.xyzi[4 * i + 3];
   attributes.belief = verdict.beliefs[i];
-  if (!labels.empty()) attributes.label = labels[i];
+  if (!judged.truth.empty()) attributes.label = judged.truth[i];
   attributes.instance = verdict.instances[i];
   attributes.cause = verdict.causes[i];
   attributes.is_ground = verdict.labels[i] == PointLabel::kGround;
   return attributes;
+}
+
+/// Points lie around the poses; near the limit doubles cost little and lose nothing.
+bool is_far(const Recording& recording, const ScanRange& range) {
+  // No sensor reaches farther than 500 m.
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    const Eigen::Vector3d position = recording.T_world_sensor(i).translation();
+    if (position.cwiseAbs().maxCoeff() > kFloatCoordinateLimit - 500.0) return true;
+  }
+  return false;
+}
+
+/// The factor to 16 bits for the intensities of a scan: the full range for [0, 1] and for [0, 255],
+/// else 1.
+double las_intensity_scale(const RecordedScan& scan) {
+  float most = 0.0F;
+  for (std::size_t i = 0; i < scan.size(); ++i) most = std::max(most, scan.xyzi[4 * i + 3]);
+  if (!(most > 0.0F && most <= 255.0F)) return 1.0;
+  return std::numeric_limits<std::uint16_t>::max() / (most <= 1.0F ? 1.0 : 255.0);
 }
 
 }  // namespace
@@ -93,22 +113,43 @@ LasOptions las_options_near(const Eigen::Vector3d& position) {
   return options;
 }
 
-double las_intensity_scale(float most) {
-  if (!(most > 0.0F && most <= 255.0F)) return 1.0;
-  return std::numeric_limits<std::uint16_t>::max() / (most <= 1.0F ? 1.0 : 255.0);
+std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
+                                  const ScanRange& range, bool has_attributes,
+                                  const std::string& crs) {
+  MapFileOptions options;
+  options.columns.double_xyz = is_far(recording, range);
+  if (has_attributes) {
+    options.columns.intensity = recording.columns().intensity;
+    options.columns.time = recording.columns().time;
+    options.columns.label = recording.has_labels();
+  }
+  if (is_las(file)) {
+    options.las = las_options_near(recording.T_world_sensor(range.first).translation());
+    options.las.wkt = crs;
+    options.intensity_scale = las_intensity_scale(recording.read_scan(range.first));
+  }
+  return MapFile::open(file, options);
+}
+
+PointColumns moving_columns(const Recording& recording, const ScanRange& range) {
+  PointColumns columns = recording.columns();
+  columns.double_xyz = is_far(recording, range);
+  columns.intensity = true;
+  columns.label = true;
+  return columns;
 }
 
 MapAttributeTable::MapAttributeTable(double voxel, const Eigen::Vector3d& origin)
     : voxel_(voxel), origin_((origin / voxel).array().floor()) {}
 
-void MapAttributeTable::add(const RecordedScan& scan, const ScanVerdict& verdict,
-                            const std::vector<std::uint32_t>& labels) {
+void MapAttributeTable::add(const JudgedScan& judged) {
+  const ScanVerdict& verdict = judged.verdict;
   for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
     if (!is_static(verdict.labels[i])) continue;
-    const Eigen::Map<const Eigen::Vector3f> point(scan.xyzi.data() + 4 * i);
+    const Eigen::Map<const Eigen::Vector3f> point(judged.scan.xyzi.data() + 4 * i);
     const std::uint32_t voxel =
         voxels_.insert(key_of(verdict.T_world_sensor * point.cast<double>()));
-    if (voxel == attributes_.size()) attributes_.push_back(attributes_of(scan, verdict, labels, i));
+    if (voxel == attributes_.size()) attributes_.push_back(attributes_of(judged, i));
   }
 }
 

@@ -7,13 +7,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "dynains/io/las_file.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/io/recording.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "judged_scan.hpp"
+#include "scan_range.hpp"
 
 namespace dynains::run {
 
@@ -37,9 +39,8 @@ class MapAttributeTable {
   /// `voxel`: edge of the voxels of the map, m. `origin`: m, world frame, within 200 km of the map.
   MapAttributeTable(double voxel, const Eigen::Vector3d& origin);
 
-  /// Adds the points of a scan that the verdict keeps.
-  void add(const RecordedScan& scan, const ScanVerdict& verdict,
-           const std::vector<std::uint32_t>& labels);
+  /// Adds the points that the verdict keeps.
+  void add(const JudgedScan& judged);
 
   /// Attributes of a point of the map, world frame, by its voxel. Rounding can move a point over a
   /// border, so that a neighbouring voxel counts if its own one is empty.
@@ -81,8 +82,12 @@ class MapFile {
   virtual void commit() = 0;
 };
 
-/// The factor to 16 bits for intensities with this maximum: the full range for [0, 1] and for
-/// [0, 255], else 1.
-double las_intensity_scale(float most);
+/// Opens a file for the map of these scans. `crs`: see LasOptions::wkt. Throws IoError.
+std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
+                                  const ScanRange& range, bool has_attributes,
+                                  const std::string& crs);
+
+/// Columns of the file of moving points of these scans.
+PointColumns moving_columns(const Recording& recording, const ScanRange& range);
 
 }  // namespace dynains::run

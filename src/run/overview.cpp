@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "point_labels.hpp"
+#include "tally.hpp"
 
 namespace dynains::run {
 namespace {
@@ -154,7 +154,9 @@ Overview::Overview(const std::vector<Eigen::Vector3d>& path)
   rows_.resize(static_cast<std::size_t>(height_));
 }
 
-void Overview::add(const RecordedScan& scan, const ScanVerdict& verdict) {
+void Overview::add(const JudgedScan& judged) {
+  const RecordedScan& scan = judged.scan;
+  const ScanVerdict& verdict = judged.verdict;
   const Pose& T_world_sensor = verdict.T_world_sensor;
   const double sensor_height = T_world_sensor.translation().z();
   for (std::size_t i = 0; i < verdict.labels.size(); i += static_step_) {

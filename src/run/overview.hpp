@@ -7,8 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "dynains/io/recording.hpp"
-#include "dynains/verdict.hpp"
+#include "judged_scan.hpp"
 #include "picture.hpp"
 
 namespace dynains::run {
@@ -19,7 +18,7 @@ class Overview {
   explicit Overview(const std::vector<Eigen::Vector3d>& path);
 
   /// Adds all removed points of a scan, and some of its static points.
-  void add(const RecordedScan& scan, const ScanVerdict& verdict);
+  void add(const JudgedScan& judged);
 
   /// Three panels of one size, side by side or below each other: before (static points grey, moving
   /// ones blue), after (static points), removed (moving points green, the others

@@ -1,6 +1,7 @@
 #include "run.hpp"
 
 #include <cstdint>
+#include <deque>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -12,17 +13,18 @@
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/recording/second_pass.hpp"
 #include "estimate_poses.hpp"
 #include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
+#include "passes.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/run_doubts.hpp"
 #include "run/remarks/start_check.hpp"
 #include "run_plan.hpp"
 #include "run_report.hpp"
 #include "run_sequence.hpp"
+#include "verdict_files.hpp"
 #include "write_grid.hpp"
 #include "write_view.hpp"
 
@@ -31,18 +33,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSessionField = "/request/session";
-
-/// Tests the first verdicts, if there is a second pass, and makes all results of what is left.
-/// After a signal, the first verdicts stay.
-void finish_second_pass(const RunPlan& plan, RunResults& results, const RunListener& listener) {
-  SecondPass* const pass = results.second_pass();
-  if (pass == nullptr) return;
-  pass->test([] { return InterruptGuard::signal() == 0; });
-  results.revise(plan.settings.config.map,
-                 [&](std::size_t done) { listener.revision_progress(done, results.finished()); });
-}
-
 /// Threads of the remover: two, if the machine has two cores or the configuration says so.
 int remover_threads(const RunPlan& plan) {
   if (plan.settings.outputs.one_thread) return 1;
@@ -50,20 +40,18 @@ int remover_threads(const RunPlan& plan) {
 }
 
 /// Processes all scans, or those that come before a signal. Returns the times.
-RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& results) {
+RunTiming process(const RunPlan& plan, const RunListener& listener, Passes& passes,
+                  RunResults& results) {
   const std::size_t total = plan.range.size();
   DynaInsRemover::Config config = plan.settings.config;
-  if (results.second_pass() != nullptr) config.build_map = false;  // the second pass makes the map
+  config.build_map = config.build_map && passes.is_one();
   config.threads = remover_threads(plan);
   DynaInsRemover remover(config);
   listener.progress(0, total);
-  RunTiming timing =
-      run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
-        listener.progress(done, total);
-        return InterruptGuard::signal() == 0;
-      });
-  finish_second_pass(plan, results, listener);
-  return timing;
+  return run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
+    listener.progress(done, total);
+    return InterruptGuard::signal() == 0;
+  });
 }
 
 /// The listener, whose warnings are also added to `warnings`. Both must outlive the result.
@@ -80,12 +68,12 @@ RunListener with_memory(const RunListener& listener, std::vector<std::string>& w
 /// takes them for.
 void check_not_empty(const RunPlan& plan, const RunResults& results) {
   if (results.finished() < plan.range.size()) return;
-  const LabelCounts& labels = results.labels();
+  const Tally& labels = results.tally();
   const std::uint64_t kept = labels[PointLabel::kGround] + labels[PointLabel::kStatic];
   const bool is_empty = results.map_points() && *results.map_points() == 0;
   if (kept > 0 && !is_empty) return;
   throw IoError(plan.sequence.folder().string() + ": the map is empty: of " +
-                std::to_string(results.points()) + " points, " + std::to_string(kept) +
+                std::to_string(labels.points) + " points, " + std::to_string(kept) +
                 " are static, " + std::to_string(labels[PointLabel::kDynamic]) + " moving, " +
                 std::to_string(labels[PointLabel::kOutOfRange]) + " out of range and " +
                 std::to_string(labels[PointLabel::kInvalid]) +
@@ -96,7 +84,7 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
 /// ones are ground, and of odd scans.
 void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTiming& timing,
                    const RunListener& listener) {
-  const LabelCounts& labels = results.labels();
+  const Tally& labels = results.tally();
   const auto warn_above = [&](double share, std::uint64_t part, std::uint64_t whole,
                               const char* text) {
     if (static_cast<double>(part) > share * static_cast<double>(whole))
@@ -106,14 +94,14 @@ void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTimi
   const bool has_box = !plan.sequence.options().self_boxes.empty();
   const std::uint64_t lost = labels[PointLabel::kInvalid];
   warn_above(0.3, labels[PointLabel::kOutOfRange] + (has_box ? lost : 0),
-             results.points() - (has_box ? 0 : lost),
+             labels.points - (has_box ? 0 : lost),
              "are not judged: nearer than --min-range, farther than --max-range, deeper than "
              "--noise-depth, or in --self-box");
-  warn_above(0.5, results.unclustered(), labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
+  warn_above(0.5, labels.unclustered, labels[PointLabel::kStatic] + labels[PointLabel::kDynamic],
              "above the ground are in no cluster and not judged; see --cluster-range");
-  warn_above(0.5, results.below_movers(), labels[PointLabel::kDynamic],
+  warn_above(0.5, labels.below_movers, labels[PointLabel::kDynamic],
              "that are removed are ground below what moves; see --footprint");
-  std::vector<ScanCounts> counts = results.counts();
+  std::vector<ScanCounts> counts = labels.scans;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     counts[i].fits = timing.rows[i].pose_residual.has_value();
   }
@@ -123,37 +111,55 @@ void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTimi
   }
 }
 
-/// Outputs outside of the folder of results.
-struct OutsideOutputs {
+/// Files outside of the folder of results, which are put in place with it.
+class OutsideFiles {
+ public:
   /// Files of the results that `out` replaces are replaced, too.
-  OutsideOutputs(const RunPlan& plan, const OutputFolder& out) {
-    const fs::path& map_file = plan.settings.outputs.map;
-    if (plan.settings.outputs.has_outside_map()) {
-      map.emplace(map_file, out.owns(map_file), plan.inputs);
+  OutsideFiles(const RunPlan& plan, const OutputFolder& out) {
+    const auto add = [&](const fs::path& target) {
+      return files_.emplace_back(target, out.owns(target), plan.inputs).path();
+    };
+    const RunOutputs& outputs = plan.settings.outputs;
+    if (outputs.has_outside_map()) map = add(outputs.map);
+    if (!outputs.log.empty()) {
+      check_log_output(plan);
+      log = add(outputs.log);
     }
-    const fs::path& grid_file = plan.settings.outputs.grid;
-    if (!grid_file.empty()) {
-      const fs::path image = grid_image(grid_file);
-      grid.emplace(grid_file, out.owns(grid_file), plan.inputs);
-      picture.emplace(image, out.owns(image), plan.inputs);
-    }
-    const fs::path& log_file = plan.settings.outputs.log;
-    if (log_file.empty()) return;
-    check_log_output(plan);
-    log.emplace(log_file, out.owns(log_file), plan.inputs);
+    if (outputs.grid.empty()) return;
+    grid = add(outputs.grid);
+    image = add(grid_image(outputs.grid));
   }
 
-  std::optional<OutputFile> map, log, grid, picture;
+  /// Where to write them; empty: not asked for.
+  fs::path map, log, grid, image;
+
+  /// The contents, by the names of the targets.
+  nlohmann::ordered_json contents() const {
+    nlohmann::ordered_json json;
+    for (const OutputFile& file : files_) json[file.listed_target()] = content_of(file.path());
+    return json;
+  }
+  /// All bytes are on the disk before the first name changes.
+  void put_in_place(std::size_t first = 0) {
+    if (first < files_.size()) files_[first].put_in_place([&] { put_in_place(first + 1); });
+  }
+
+ private:
+  std::deque<OutputFile> files_;
 };
 
-/// Writes the log of the results in `folder` to `file`.
-void write_log(const fs::path& file, const RunPlan& plan, const fs::path& folder,
+/// Whether the run adds a session: the results that are replaced may have added it already.
+bool adds_session(const RunPlan& plan, const OutputFolder& out) {
+  if (plan.session.city.empty()) return false;
+  return !out.had("/request/session", plan.session.info.name) || !plan.session.is_fulfilled();
+}
+
+/// Writes the log with its clouds cleaned or marked, unless a signal comes.
+void write_log(const fs::path& file, const RunPlan& plan, const PointStore& labels,
                const RunListener& listener, RunOutcome& outcome) {
-  const std::optional<std::size_t> unjudged = write_log(plan, folder, file);
-  if (!unjudged) {
-    outcome.complete = false;
-    return;
-  }
+  const std::optional<std::size_t> unjudged = write_log(plan, labels, file);
+  outcome.complete = unjudged.has_value();
+  if (!unjudged) return;
   outcome.log = plan.settings.outputs.log;
   if (*unjudged == 0) return;
   listener.warn(outcome.log.string() + ": " + std::to_string(*unjudged) +
@@ -161,20 +167,21 @@ void write_log(const fs::path& file, const RunPlan& plan, const fs::path& folder
                 "--end; they keep all points");
 }
 
-/// Writes the grid of the results in `folder`, unless a signal comes.
-void write_grid(const RunPlan& plan, const fs::path& folder, const OutsideOutputs& outside,
+/// Writes the grid, unless a signal comes.
+void write_grid(const OutsideFiles& outside, const RunPlan& plan, const PointStore& labels,
                 const RunListener& listener, RunOutcome& outcome) {
   std::vector<std::size_t> scans(plan.range.size());
   std::iota(scans.begin(), scans.end(), plan.range.first);
   if (scans.size() == 1) listener.warn(kGridOfOneScan);
-  const PlacedGrid made =
-      grid_of_run(folder, plan.sequence, scans, plan.settings.outputs.grid_config, false,
-                  [](std::size_t) { return InterruptGuard::signal() == 0; });
-  if (InterruptGuard::signal() != 0) {
-    outcome.complete = false;
-    return;
-  }
-  grid::write_grid(outside.picture->path(), outside.grid->path(), made.grid, made.origin);
+  const PlacedGrid made = grid_of_run(
+      [&](std::size_t i, const RecordedScan&, std::vector<PointLabel>& of_scan) {
+        labels.read(i - plan.range.first, of_scan);
+      },
+      plan.sequence, scans, plan.settings.outputs.grid_config, false,
+      [](std::size_t) { return InterruptGuard::signal() == 0; });
+  outcome.complete = InterruptGuard::signal() == 0;
+  if (!outcome.complete) return;
+  grid::write_grid(outside.image, outside.grid, made.grid, made.origin);
   outcome.grid = made.summary();
 }
 
@@ -194,105 +201,91 @@ void check_before(const RunPlan& plan, const RunListener& listener) {
 
 /// Where the files are written that appear at the end.
 RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
-                           const OutsideOutputs& outside) {
+                           const OutsideFiles& outside) {
   RunOutputs outputs = plan.settings.outputs;
   outputs.folder = out.path();
   if (!outputs.map.empty()) {
-    outputs.map = outside.map ? outside.map->path() : out.path() / outputs.map.filename();
+    outputs.map = outside.map.empty() ? out.path() / outputs.map.filename() : outside.map;
   }
   return outputs;
 }
 
-/// Puts all outputs in place, or keeps what a signal has left.
-void publish(const RunPlan& plan, const RunOutputs& outputs, OutputFolder& out,
-             OutsideOutputs& outside, SessionWriter* session, RunOutcome& outcome) {
-  if (!outcome.complete) {
-    outcome.signal = InterruptGuard::signal();
-    outcome.outputs.folder = out.path();
-    return out.keep_unfinished(outcome.report);
-  }
-  if (outputs.write_page) {
-    outcome.page = plan.settings.outputs.folder / kViewPage;
-    write_page(outputs.folder / kViewPage, outputs.folder, plan.sequence, plan.range,
-               plan.settings.config.map.map_voxel, kDefaultViewPoints);
-  }
-  for (const auto* const file : {&outside.map, &outside.log, &outside.grid, &outside.picture}) {
-    if (*file) outcome.report["written"][(*file)->listed_target()] = content_of((*file)->path());
-  }
-  out.finish(outcome.report, [&] {
-    if (outside.map) outside.map->put_in_place();
-    if (outside.log) outside.log->put_in_place();
-    if (outside.grid) outside.picture->put_in_place([&] { outside.grid->put_in_place(); });
-    if (session != nullptr) session->commit();
-  });
-}
-
 /// Writes the results, from the first scan on, or until a signal comes.
 RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputFolder& out,
-                         OutsideOutputs& outside) {
+                         OutsideFiles& outside) {
   std::vector<std::string> warnings = plan.sequence.warnings();
   const RunListener listener = with_memory(caller, warnings);
   check_before(plan, listener);
+  RunOutcome outcome;
+  outcome.outputs = plan.settings.outputs;
   std::optional<SessionWriter> session;
-  std::optional<SessionAlignment> alignment;
-  // The results that are replaced may have added the session already.
-  const std::string& name = plan.session.info.name;
-  const bool has_session =
-      (out.earlier_have(kSessionField, name) || out.left_have(kSessionField, name)) &&
-      plan.session.is_fulfilled();
-  if (!plan.session.city.empty() && !has_session) {
+  if (adds_session(plan, out)) {
     const SessionRequest request = aligned(plan.session, plan.sequence, plan.range);
-    alignment = request.info.alignment;
+    outcome.alignment = request.info.alignment;
     session.emplace(City::open_or_make(request.city, request.grid), request.info);
   }
 
   const InterruptGuard interrupt(listener.second_signal);
   const RunOutputs outputs = partial_outputs(plan, out, outside);
-  RunResults results(plan.sequence, plan.range, outputs);
-  if (session) results.contribute_to(*session);
-  ByteStore store(outputs.folder);
-  Returns returns(store, plan.settings.config.evidence);
-  std::optional<SecondPass> second_pass;
-  // The first pass has compared all scans of a shorter recording.
-  if (plan.settings.passes > 1 && plan.range.size() > returns.compared()) {
-    SecondPassConfig config;
-    config.sensors = plan.settings.config.sensors;
-    config.static_policy = plan.settings.static_policy;
-    config.evidence = plan.settings.config.evidence;
-    results.wait_for(second_pass.emplace(store, config));
-  } else {
-    results.watch(returns);
+  Passes passes(plan, outputs.folder);
+  std::optional<Page> page;
+  PointStore labels(outputs.folder);  // final ones, for what reads the recording again
+  RunResults results(plan.sequence, plan.range, outputs, &passes);
+  if (session) {
+    results.add(
+        [&](const JudgedScan& judged) {
+          session->add(judged.points, judged.verdict.labels, judged.truth,
+                       judged.verdict.T_world_sensor, static_cast<std::uint32_t>(judged.index));
+        },
+        true);
   }
-  const RunTiming timing = process(plan, listener, results);
-  RunOutcome outcome;
-  outcome.outputs = plan.settings.outputs;
-  outcome.complete = results.is_complete();
-  outcome.alignment = alignment;
+  if (outputs.write_page) {
+    page.emplace(plan.sequence, plan.range, plan.settings.config.map.map_voxel);
+    results.add([&](const JudgedScan& judged) { page->add(judged); }, true);
+  }
+  if (!outside.log.empty() || !outside.grid.empty()) {
+    results.add([&](const JudgedScan& judged) { labels.add(judged.arrays.labels); });
+  }
+  const RunTiming timing = process(plan, listener, passes, results);
+  passes.finish(results,
+                [&](std::size_t done) { listener.revision_progress(done, results.finished()); });
+  outcome.complete = results.finished() == plan.range.size() && passes.is_complete();
+
   check_not_empty(plan, results);
   warn_of_scans(plan, results, timing, listener);
   RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
-  doubts.returns = return_errors(plan.sequence, plan.range.first,
-                                 second_pass ? second_pass->returns() : returns.found());
+  doubts.returns = return_errors(plan.sequence, plan.range.first, passes.returns());
   for (const std::string& text : sentences(doubts, plan.sequence)) listener.warn(text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kEstimatedPoses, plan.sequence);
-  if (outside.log && outcome.complete) {
-    write_log(outside.log->path(), plan, outputs.folder, listener, outcome);
+  if (!outside.log.empty() && outcome.complete) {
+    write_log(outside.log, plan, labels, listener, outcome);
   }
-  if (outside.grid && outcome.complete) {
-    write_grid(plan, outputs.folder, outside, listener, outcome);
+  if (!outside.grid.empty() && outcome.complete) {
+    write_grid(outside, plan, labels, listener, outcome);
   }
   nlohmann::ordered_json told = to_json(doubts, plan.sequence);
   told["warnings"] = warnings;
   outcome.report = make_report(plan, told, results, timing);
   if (!outcome.grid.is_null()) outcome.report["grid"] = outcome.grid;
-  if (second_pass) {
-    outcome.report["second_pass"] = {{"places", second_pass->place_count()},
-                                     {"removed_points", second_pass->revised().removed},
-                                     {"restored_points", second_pass->revised().restored}};
+  if (!passes.is_one()) outcome.report["second_pass"] = passes.report();
+  if (!outcome.complete) {
+    outcome.signal = InterruptGuard::signal();
+    outcome.outputs.folder = out.path();
+    out.keep_unfinished(outcome.report);
+    return outcome;
   }
-  publish(plan, outputs, out, outside, session ? &*session : nullptr, outcome);
+  if (page) {
+    outcome.page = plan.settings.outputs.folder / kViewPage;
+    page->write(outputs.folder / kViewPage);
+  }
+  const nlohmann::ordered_json written = outside.contents();
+  if (!written.is_null()) outcome.report["written"] = written;
+  out.finish(outcome.report, [&] {
+    outside.put_in_place();
+    if (session) session->commit();
+  });
   return outcome;
 }
 
@@ -302,7 +295,7 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
   const RunPlan plan = make_plan(settings, std::move(recording));
   OutputFolder out(plan.settings.outputs.folder, run_output_kind(), plan.listing, settings.force,
                    plan.inputs);
-  OutsideOutputs outside(plan, out);
+  OutsideFiles outside(plan, out);
   return write_results(plan, listener, out, outside);
 }
 

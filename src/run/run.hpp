@@ -11,7 +11,6 @@
 #include "dynains/city/session.hpp"
 #include "dynains/io/recording.hpp"
 #include "interrupt.hpp"
-#include "run_results.hpp"
 #include "run_settings.hpp"
 
 namespace dynains::run {

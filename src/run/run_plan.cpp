@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "clean_writer.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "dynains/io/point_file.hpp"
@@ -198,7 +199,37 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
   return request;
 }
 
+/// Files in the folder of a run over these scans.
+OutputListing listing_of(const RunOutputs& outputs, const Recording& recording,
+                         const ScanRange& range) {
+  OutputListing listing;
+  listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
+  if (!outputs.map.empty() && !outputs.has_outside_map())
+    listing.files.insert(listed_name(outputs.map_name()));
+  if (outputs.write_tracks) listing.files.insert(kTracksFile);
+  if (outputs.write_poses) listing.files.insert(kEstimatedPoses);
+  if (outputs.write_page) listing.files.insert(kViewPage);
+  listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
+  if (outputs.write_beliefs) listing.folders["beliefs"] = ".belief";
+  if (outputs.write_online) listing.folders["online"] = ".label";
+  if (outputs.write_clean) {
+    listing.folders["clean"] =
+        std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
+  }
+  for (std::size_t i = range.first; i <= range.last; ++i)
+    listing.scans.insert(listed_name(recording.name(i)));
+  return listing;
+}
+
 }  // namespace
+
+bool RunOutputs::has_outside_map() const {
+  return !map.empty() && map.parent_path() != whole_path(folder);
+}
+
+std::string RunOutputs::map_name() const {
+  return (has_outside_map() ? map : map.filename()).string();
+}
 
 ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
   const auto number = [&](std::size_t i) { return sequence.number(i); };
@@ -271,7 +302,7 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   }
   if (!outputs.grid.empty()) request["grid"] = outputs.grid.string();
   if (settings.static_policy == StaticPolicy::kLast) request["static"] = "last";
-  OutputListing listing = outputs.listing(sequence, range);
+  OutputListing listing = listing_of(outputs, sequence, range);
   InputFiles inputs(sequence, settings.config_file);
   inputs.add(settings.align_start);
   return {std::move(settings), std::move(sequence), range,

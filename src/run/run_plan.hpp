@@ -7,7 +7,6 @@
 #include "dynains/io/recording.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
-#include "run_results.hpp"
 #include "run_settings.hpp"
 #include "scan_range.hpp"
 #include "session_request.hpp"

@@ -71,7 +71,7 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_
                                    const RunResults& results, const RunTiming& timing) {
   const Recording& sequence = plan.sequence;
   const RunSettings& settings = plan.settings;
-  const LabelCounts& labels = results.labels();
+  const Tally& labels = results.tally();
   nlohmann::ordered_json report = begin_marker(run_output_kind());
   report["static_map"] = nullptr;
   if (results.map_points()) {
@@ -87,7 +87,7 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_
   report["scans"] = results.finished();
   report["scans_without_pose"] = sequence.missing_pose_count();
   report["log_ends_early"] = sequence.early_end().has_value();
-  report["points"] = results.points();
+  report["points"] = labels.points;
   for (std::size_t k = 0; k < sequence.sensors().size(); ++k) {
     report["sensors"].push_back(
         {{"pose", extrinsic_text(sequence.sensors()[k])}, {"points", timing.sensor_points[k]}});

@@ -8,6 +8,7 @@
 #include "dynains/poses/diagnosis.hpp"
 #include "run/output/output_folder.hpp"
 #include "run_plan.hpp"
+#include "run_results.hpp"
 #include "run_timing.hpp"
 
 namespace dynains::run {

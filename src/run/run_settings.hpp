@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -10,11 +12,51 @@
 #include "dynains/config.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/recording/static_policy.hpp"
+#include "grid/grid_maker.hpp"
+#include "map_file.hpp"
 #include "run/settings/parameter_values.hpp"
 #include "run/settings/recording_settings.hpp"
-#include "run_results.hpp"
+#include "scan_range.hpp"
 
 namespace dynains::run {
+
+/// The picture of a run, see Overview.
+inline constexpr const char* kOverviewPicture = "overview.png";
+inline constexpr const char* kTracksFile = "tracks.csv";
+inline constexpr const char* kEstimatedPoses = "poses.txt";
+/// The page of `dynains view` in the folder of results.
+inline constexpr const char* kViewPage = "view.html";
+
+/// The results of a run. A plan has them whole: in settings, an empty `map` is the file
+/// static_map.ply in the folder.
+struct RunOutputs {
+  std::filesystem::path folder;
+  std::filesystem::path map;  ///< by whole_path(); empty: no map
+  bool write_online = false;
+  bool write_clean = false;
+  bool drop_not_judged = false;  ///< from clean/
+  std::filesystem::path log;     ///< by whole_path(); empty: none
+  bool mark_log = false;         ///< adds labels to its clouds, which keep all points
+  std::filesystem::path grid;    ///< description, by whole_path(); empty: none
+  grid::Config grid_config;
+  bool write_poses = false;
+  bool write_page = false;  ///< of dynains view
+  bool write_beliefs = false;
+  bool write_tracks = false;    ///< of moving objects, RemoverConfig::objects
+  bool one_thread = false;      ///< the caller reads and writes
+  bool map_attributes = false;  ///< the map holds attributes of its points
+  std::string crs;              ///< of a LAS map, as WKT; empty: none
+  double map_voxel = 0.0;       ///< m, of attributes
+
+  std::launch thread() const { return one_thread ? std::launch::deferred : std::launch::async; }
+  /// Whether a result holds beliefs.
+  bool needs_beliefs() const { return write_beliefs || map_attributes; }
+  bool has_outside_map() const;
+  bool has_las_map() const { return is_las(map); }
+  /// The map relative to the folder if it lies there, so that the folder can be moved; else
+  /// absolute. Empty if there is none.
+  std::string map_name() const;
+};
 
 struct RunSettings {
   RunOutputs outputs;                   ///< as asked for

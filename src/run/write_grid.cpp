@@ -6,9 +6,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
-#include "dynains/recording/verdict_arrays.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "label_writer.hpp"
 #include "map_spacing.hpp"
 #include "run/output/output_folder.hpp"
 
@@ -23,18 +21,16 @@ Eigen::Vector3d place_near(const Eigen::Vector3d& position) { return position.ar
 /// The scans of a run with their verdicts, relative to a place near the first one.
 class JudgedScans {
  public:
-  JudgedScans(const fs::path& folder, const Recording& recording, bool keep_moving)
-      : recording_(recording),
-        files_(folder / "labels", folder / "causes"),
-        keep_moving_(keep_moving) {}
+  JudgedScans(const LabelReader& read_labels, const Recording& recording, bool keep_moving)
+      : recording_(recording), read_labels_(read_labels), keep_moving_(keep_moving) {}
 
   /// Calls `visit(position, label, sensor)` for the points of scan i that are judged.
   template <class Visit>
   void visit(std::size_t i, const Pose& T_place_sensor, Visit&& visit) {
     recording_.read_scan(i, scan_);
-    files_.read(recording_.name(i), scan_, verdict_);
+    read_labels_(i, scan_, labels_);
     for (std::size_t k = 0; k < scan_.size(); ++k) {
-      PointLabel label = verdict_.labels[k];
+      PointLabel label = labels_[k];
       if (label == PointLabel::kInvalid || label == PointLabel::kOutOfRange) continue;
       if (label == PointLabel::kDynamic && keep_moving_) label = PointLabel::kStatic;
       const std::size_t sensor = scan_.sensor.empty() ? 0 : scan_.sensor[k];
@@ -44,10 +40,10 @@ class JudgedScans {
 
  private:
   const Recording& recording_;
-  LabelFiles files_;
+  const LabelReader& read_labels_;
   bool keep_moving_;
   RecordedScan scan_;
-  VerdictArrays verdict_;
+  std::vector<PointLabel> labels_;
 };
 
 /// Distance between the points of surfaces, m: the edge of voxels that hold about one.
@@ -78,7 +74,7 @@ nlohmann::ordered_json PlacedGrid::summary() const {
           {"occupied", share(grid::CellState::kOccupied)}};
 }
 
-PlacedGrid grid_of_run(const fs::path& folder, const Recording& recording,
+PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recording,
                        const std::vector<std::size_t>& scans, const grid::Config& config,
                        bool keep_moving, const std::function<bool(std::size_t done)>& progress) {
   const Eigen::Vector3d place = place_near(recording.T_world_sensor(scans.front()).translation());
@@ -87,7 +83,7 @@ PlacedGrid grid_of_run(const fs::path& folder, const Recording& recording,
     T_place_sensor.translation() -= place;
     return T_place_sensor;
   };
-  JudgedScans judged(folder, recording, keep_moving);
+  JudgedScans judged(read_labels, recording, keep_moving);
   grid::Floors floors(recording.folder().string());
   std::size_t done = 0;
   progress(done);

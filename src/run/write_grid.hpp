@@ -30,11 +30,15 @@ struct PlacedGrid {
   nlohmann::ordered_json summary() const;
 };
 
-/// The grid of these scans by the final verdicts of their run in `folder`. All scans are read
+/// Reads the final labels of a scan of the recording, whose points are given.
+using LabelReader = std::function<void(std::size_t scan, const RecordedScan& points,
+                                       std::vector<PointLabel>& labels)>;
+
+/// The grid of these scans by the final labels of their run. All scans are read
 /// twice: first the ground, then what is on it. `keep_moving`: what moved counts as if it were
 /// static. Calls `progress` before the first scan and after each; it returns whether to go on.
 /// Throws IoError, ConfigError.
-PlacedGrid grid_of_run(const std::filesystem::path& folder, const Recording& recording,
+PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recording,
                        const std::vector<std::size_t>& scans, const grid::Config& config,
                        bool keep_moving, const std::function<bool(std::size_t done)>& progress);
 

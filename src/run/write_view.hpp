@@ -6,9 +6,13 @@
 #include <functional>
 #include <vector>
 
+#include "dynains/evaluation/truth.hpp"
 #include "dynains/io/recording.hpp"
+#include "judged_scan.hpp"
 #include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
+#include "viewer/thinning.hpp"
+#include "viewer/view_data.hpp"
 
 namespace dynains::run {
 
@@ -26,11 +30,29 @@ ResultFolder open_finished_run(const std::filesystem::path& folder);
 /// The scans of a run. Throws IoError if its recording lacks one.
 std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& recording);
 
-/// Writes the file `page` about the results in `folder` of a run over `range` of a recording.
-/// `map_voxel`: m. Throws IoError.
-void write_page(const std::filesystem::path& page, const std::filesystem::path& folder,
-                const Recording& recording, const ScanRange& range, double map_voxel,
-                std::size_t max_points);
+/// Collects at most `max_points` points of the scans of a run for its page: the first static point
+/// of each voxel, up to two thirds, and moving points.
+class Page {
+ public:
+  /// `range`: of the run. `map_voxel`: m. Throws ConfigError if there are too many scans.
+  Page(const Recording& recording, const ScanRange& range, double map_voxel,
+       std::size_t max_points = kDefaultViewPoints);
+
+  /// A scan with `packed` and `truth`.
+  void add(const JudgedScan& judged);
+  /// After the last scan. Throws IoError.
+  void write(const std::filesystem::path& file);
+
+ private:
+  viewer::ViewPoint describe(const JudgedScan& judged, std::size_t k) const;
+  void count(const viewer::ViewPoint& point);
+
+  const Recording& recording_;
+  std::size_t max_points_;
+  viewer::ThinnedPoints static_, moving_;
+  const evaluation::TruthClasses truth_;
+  viewer::ViewData data_;
+};
 
 /// Opens the recording of a run by its report.
 using OpenRecording = std::function<Recording(const ResultFolder& out)>;

@@ -101,9 +101,9 @@ TEST_CASE("Earlier results are replaced as a whole, if they may be") {
   CHECK_THAT(place.refusal(false), ContainsSubstring("holds earlier results"));
   {
     const auto out = place.begin();
-    CHECK(out->earlier_have("/command", "run"));
-    CHECK_FALSE(out->earlier_have("/command", "other"));
-    CHECK_FALSE(out->earlier_have("/static_map/file", "map.ply"));
+    CHECK(out->had("/command", "run"));
+    CHECK_FALSE(out->had("/command", "other"));
+    CHECK_FALSE(out->had("/static_map/file", "map.ply"));
     write_text(out->path() / "a.txt", "new");
     CHECK(read_text(place.out / "a.txt") == "old");
     out->finish(begin_marker(kKind));

@@ -8,7 +8,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "program/tiny_sequence.hpp"
-#include "run/label_writer.hpp"
+#include "run/judged_scan.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
@@ -134,10 +134,10 @@ TEST_CASE("Every scan gets its final labels, every dynamic point its place in th
 
   CHECK(results.finished() == 4);
   const std::size_t count = fixture.sequence->read_scan(1).size();
-  CHECK(results.points() == 4 * count);
-  CHECK(results.labels()[PointLabel::kDynamic] == 4);
-  CHECK(results.labels()[PointLabel::kInvalid] == 4);
-  CHECK(results.labels()[PointLabel::kStatic] == 4 * (count - 4));
+  CHECK(results.tally().points == 4 * count);
+  CHECK(results.tally()[PointLabel::kDynamic] == 4);
+  CHECK(results.tally()[PointLabel::kInvalid] == 4);
+  CHECK(results.tally()[PointLabel::kStatic] == 4 * (count - 4));
 
   CHECK_FALSE(fs::exists(fixture.folder / "out/labels/000000.label"));
   for (std::size_t i = 1; i <= 4; ++i) {

@@ -1,9 +1,11 @@
 #include "output_folder.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <map>
 #include <system_error>
@@ -60,6 +62,55 @@ void move_rest(const Folder& from, const Folder& to) {
 }
 
 }  // namespace
+
+std::string listed_name(const std::string& name) {
+  std::string text;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte > 0x1F && byte < 0x7F && c != '%') {
+      text += c;
+      continue;
+    }
+    std::array<char, 4> code{};
+    std::snprintf(code.data(), code.size(), "%%%02X", static_cast<unsigned>(byte));
+    text += code.data();
+  }
+  return text;
+}
+
+bool OutputListing::contains(const std::string& folder, const std::string& name) const {
+  const std::string listed = listed_name(name);
+  if (folder.empty()) return files.count(listed) > 0;
+  const auto found = folders.find(listed_name(folder));
+  if (found == folders.end()) return false;
+  const std::string& extension = found->second;
+  const std::size_t stem = listed.size() - std::min(listed.size(), extension.size());
+  return listed.compare(stem, listed.npos, extension) == 0 &&
+         scans.count(listed.substr(0, stem)) > 0;
+}
+
+nlohmann::ordered_json OutputListing::to_json() const {
+  return {{"files", files}, {"folders", folders}, {"scans", scans}};
+}
+
+OutputListing read_listing(const std::filesystem::path& file, const nlohmann::ordered_json& marker,
+                           const std::string& command) {
+  const auto has = [&](const char* field, const std::string& value) {
+    return marker.is_object() && marker.contains(field) && marker[field] == value;
+  };
+  if (!has("program", "dynains") || !has("command", command)) {
+    throw IoError(file.string() + ": was not written by dynains " + command +
+                  "; choose another folder");
+  }
+  try {
+    const auto& outputs = marker.at("outputs");
+    return {outputs.at("files"), outputs.at("folders"), outputs.at("scans")};
+  } catch (const nlohmann::json::exception&) {
+    throw IoError(file.string() +
+                  ": /outputs: expected the names of files, folders and scans; remove the results "
+                  "yourself, or choose another folder");
+  }
+}
 
 Folder::Rename check_output(const Folder& folder, const std::string& name, Existing existing,
                             const InputFiles& inputs) {
@@ -321,13 +372,10 @@ OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
   partial_.emplace(place, kind, listing, inputs);
 }
 
-bool OutputFolder::earlier_have(const char* field, const std::string& text) const {
-  return earlier_ && has(earlier_->marker(), Json::json_pointer(field), text);
-}
-
-bool OutputFolder::left_have(const char* field, const std::string& text) const {
-  return has(partial_->left(), kComplete, true) &&
-         has(partial_->left(), Json::json_pointer(field), text);
+bool OutputFolder::had(const char* field, const std::string& text) const {
+  const Json::json_pointer where(field);
+  return (earlier_ && has(earlier_->marker(), where, text)) ||
+         (has(partial_->left(), kComplete, true) && has(partial_->left(), where, text));
 }
 
 Existing OutputFolder::owns(const fs::path& path) const {

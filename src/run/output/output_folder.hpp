@@ -8,17 +8,39 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
+#include <set>
 #include <string>
 
 #include "input_files.hpp"
 #include "io/folder.hpp"
 #include "json_file.hpp"
-#include "output_listing.hpp"
 
 namespace dynains::run {
+
+/// The name in printable ASCII: other bytes, and `%`, become `%XX`. Names need not be UTF-8.
+std::string listed_name(const std::string& name);
+
+/// Files below a folder of results; the marker is not among them. All names by listed_name().
+struct OutputListing {
+  std::set<std::string> files;                 ///< directly in the folder
+  std::map<std::string, std::string> folders;  ///< folder -> extension of its files
+  std::set<std::string> scans;                 ///< names of the files in folders, no extension
+
+  /// Whether `folder`/`name` is listed; an empty `folder` is the folder of results itself.
+  bool contains(const std::string& folder, const std::string& name) const;
+
+  /// `{"files": [...], "folders": {...}, "scans": [...]}`.
+  nlohmann::ordered_json to_json() const;
+};
+
+/// The field `outputs` of a marker. Throws IoError unless the marker is one of `dynains COMMAND`.
+/// `file` is the marker's path. The names are for comparisons with entries of the folder only.
+OutputListing read_listing(const std::filesystem::path& file, const nlohmann::ordered_json& marker,
+                           const std::string& command);
 
 /// Absolute, links followed as far as there are any, and nothing behind the last name: two paths
 /// are of one place if these are equal, whether it is there yet or not.
@@ -149,10 +171,9 @@ class OutputFolder {
 
   /// The folder to write into.
   const std::filesystem::path& path() const { return partial_->path(); }
-  /// Whether the results that will be replaced have this text in `field` of their marker.
-  bool earlier_have(const char* field, const std::string& text) const;
-  /// Whether complete results have, which a killed command has left beside the target.
-  bool left_have(const char* field, const std::string& text) const;
+  /// Whether the results that will be replaced, or complete ones that a killed command has left
+  /// beside the target, have this text in `field` of their marker.
+  bool had(const char* field, const std::string& text) const;
   /// kOurs if any of those results have written the file `path`, as it is now: their markers have
   /// its content_of() in the field `written`, by its listed_target().
   Existing owns(const std::filesystem::path& path) const;
