@@ -129,6 +129,13 @@ std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
   return checked(best, register_near(b.surfaces(), a.points(), T_b_a, way), best->way->deviation);
 }
 
+/// Whether two motions are distant, and differ along `direction` alone.
+bool differ_along(const Eigen::Vector3d& direction, const Pose& T, const Pose& other) {
+  constexpr double kAside = 0.1;  // ratio
+  const Eigen::Vector3d way = T.translation() - other.translation();
+  return way.norm() > kDistinct && direction.cross(way).norm() < kAside * way.norm();
+}
+
 /// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the
 /// `given` one: planes also meet that move with the sensor, as traffic, rails and the rings of
 /// beams do.
@@ -144,8 +151,9 @@ std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainS
   if (!forth) return std::nullopt;
   const bool is_open = forth->is_ambiguous || forth->uncertainty > kOpen;
   auto found = is_open ? complete(a, b, *forth, given, farthest) : std::nullopt;
-  // Samples of smooth walls keep their place beside the sensor: no motion is no finding there.
-  if (!found && !(is_open && is_exact(forth->T_a_b, Pose::Identity()))) {
+  // Samples of smooth walls keep their place beside the sensor: an open direction that landmarks do
+  // not determine says nothing about another motion along it.
+  if (!found && !(is_open && differ_along(forth->uncertain[0], forth->T_a_b, given))) {
     found = checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
   }
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };

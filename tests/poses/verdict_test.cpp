@@ -258,7 +258,7 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
 
 TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with few beams ahead") {
   const simulation::Config empty_road =
-      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 62);
+      drive_of(simulation::Scene::kHighway, simulation::Sensor::kLivox, 24, 61);
   for (const simulation::Config& config : {short_world(21057), empty_road}) {
     const Drive drive(config);
     const Diagnosis right = diagnose(Recording(drive.path()));
