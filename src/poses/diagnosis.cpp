@@ -326,19 +326,17 @@ struct Evidence {
     return known;
   }
   /// The misfit (m) of a reading, by registered motions. Infinite if it explains no more than no
-  /// motion, too few of the motions, or no more than a drift of the given poses (which can undo a
-  /// mirrored turn), if its unit or scale explains no more than turns alone, or if landmarks meet
-  /// better under the given poses.
+  /// motion, or too few of the motions, if a mirror explains no more than a drift of the given
+  /// poses, its unit or scale no more than turns alone, or if landmarks meet better under the given
+  /// poses.
   double misfit_of(const Reading& reading) const {
     const BodyMotion motion = motion_under(recording, reading);
     const Evidence known = where_known(motion);
     const double error = error_at_points(known.motions, motion);
-    const BodyMotion drifting = with_drift(given_motion(recording), known.motions);
     const bool is_explained =
         2 * known.motions.size() > motions.size() &&
         error < std::min(kRough, 0.5 * error_at_points(known.motions, no_motion)) &&
-        is_much_smaller(error, error_at_points(known.motions, drifting)) &&
-        !miss_motion(known.motions, motion) &&
+        !miss_motion(known.motions, motion) && (!mirrors(reading) || beats_drift(known, error)) &&
         (!changes_ways(reading) ||
          is_much_smaller(error, error_at_points(known.motions, turns_of(motion))));
     const bool is_as_good = agreement_under(motion, known.pairs).gap <= known.as_given.gap;
@@ -346,6 +344,13 @@ struct Evidence {
   }
 
  private:
+  bool mirrors(const Reading& reading) const {
+    return reading.convention.left_handed != recording.convention().left_handed;
+  }
+  static bool beats_drift(const Evidence& known, double error) {
+    const BodyMotion drifting = with_drift(given_motion(known.recording), known.motions);
+    return is_much_smaller(error, error_at_points(known.motions, drifting));
+  }
   bool changes_ways(const Reading& reading) const {
     const PoseConvention& given = recording.convention();
     return reading.convention.unit != given.unit || reading.convention.scale != given.scale;

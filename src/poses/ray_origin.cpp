@@ -136,6 +136,15 @@ Rays refine(const Points& points, Rays rays) {
   return rays;
 }
 
+/// Median distance of the elevations of points from their median, rad.
+double spread_of(const Points& points, const Rays& rays) {
+  std::vector<double> elevations;
+  for (const Eigen::Vector3d& p : points) elevations.push_back(rays.elevation(p));
+  const double middle = median(elevations);
+  for (double& elevation : elevations) elevation = std::abs(elevation - middle);
+  return median(std::move(elevations));
+}
+
 /// The origin of the beams in a scan, m, if it is certain and not that of the scan.
 std::optional<Eigen::Vector3d> other_origin_of(const RecordedScan& scan) {
   constexpr double kRight = 0.9;     // share of beams of a right origin
@@ -158,6 +167,8 @@ std::optional<Eigen::Vector3d> other_origin_of(const RecordedScan& scan) {
     if (share > kRight) break;
   }
   if (share < kRight || 1.0 - share > 0.5 * (1.0 - as_given)) return std::nullopt;
+  // From within a plane, all of its points seem to be of one beam.
+  if (spread_of(points, best) < 10.0 * kSharp) return std::nullopt;
   return best.origin;
 }
 

@@ -141,7 +141,7 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   CHECK(count_lines(timing) == 13);
 }
 
-TEST_CASE("--objects writes a row of tracks.csv for each object of each scan") {
+TEST_CASE("The flag --objects writes a row of tracks.csv for each object of each scan") {
   const Fixture fixture(40);
   succeed(fixture.run({"--objects", "true", "--lookahead-scans", "5"}));
   const std::string tracks = read_text(fixture.out + "/tracks.csv");
