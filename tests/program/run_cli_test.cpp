@@ -129,11 +129,11 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
 
   const std::string page = read_text(std::string(DYNAINS_DOCS) + "/results.md");
   for (const auto& [field, value] : report.items())
-    CHECK_THAT(page, ContainsSubstring('`' + field + '`'));
+    CHECK_THAT(page,
+               ContainsSubstring('"' + field + "\": ") || ContainsSubstring('`' + field + '`'));
   for (const auto& entry : fs::directory_iterator(fixture.out)) {
-    const bool is_folder = entry.is_directory();
-    CHECK_THAT(page, ContainsSubstring('`' + entry.path().filename().string() +
-                                       (is_folder ? "/NAME" : "`")));
+    const std::string name = entry.path().filename().string();
+    CHECK_THAT(page, ContainsSubstring("\n" + name + (entry.is_directory() ? "/NAME" : " ")));
   }
 
   const std::string timing = read_text(fixture.out + "/timing.csv");
