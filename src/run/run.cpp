@@ -40,7 +40,7 @@ int remover_threads(const RunPlan& plan) {
 }
 
 /// Processes all scans, or those that come before a signal. Returns the times.
-RunTiming process(const RunPlan& plan, const RunListener& listener, Passes& passes,
+RunTiming process(const RunPlan& plan, const RunListener& listener, const Passes& passes,
                   RunResults& results) {
   const std::size_t total = plan.range.size();
   DynaInsRemover::Config config = plan.settings.config;
