@@ -11,7 +11,6 @@
 #include "text.hpp"
 
 namespace dynains {
-namespace {}  // namespace
 
 ByteReader::ByteReader(const std::filesystem::path& path) : path_(path), file_(open_input(path)) {
   std::error_code error;

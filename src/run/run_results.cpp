@@ -69,7 +69,10 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   if (!outputs.map.empty()) {
     map_ = open_map(outputs.map, recording, range, outputs.map_attributes, outputs.crs);
   }
-  if (map_ && passes != nullptr && !passes->is_one()) revised_map_.emplace(passes->map_config());
+  if (map_ && passes != nullptr && !passes->is_one()) {
+    revised_map_.emplace(passes->map_config());
+    add([this](const JudgedScan& judged) { add_to_revised_map(judged); });
+  }
   if (outputs.map_attributes) {
     map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
     add([this](const JudgedScan& judged) { map_attributes_->add(judged); }, true);
@@ -90,6 +93,14 @@ void RunResults::write_moving(const JudgedScan& judged) {
     point.label = judged.packed.labels[i];
     dynamic_points_.add(point);
   });
+}
+
+void RunResults::add_to_revised_map(const JudgedScan& judged) {
+  const Span<const PointLabel> labels = judged.verdict.labels;
+  keep_.resize(labels.size());
+  std::transform(labels.begin(), labels.end(), keep_.begin(),
+                 [](PointLabel label) { return std::uint8_t{is_static(label)}; });
+  revised_map_->insert(judged.points, keep_, judged.verdict.T_world_sensor);
 }
 
 void RunResults::take_newest(const FrameResult& frame) {
@@ -137,12 +148,6 @@ void RunResults::hand_out() {
   if (needs_truth_) judged_.truth = recording_.read_labels(judged_.index);
   tally_.add(judged_.verdict);
   for (const Sink& sink : sinks_) sink(judged_);
-  if (!revised_map_) return;
-  const Span<const PointLabel> labels = judged_.verdict.labels;
-  keep_.resize(labels.size());
-  std::transform(labels.begin(), labels.end(), keep_.begin(),
-                 [](PointLabel label) { return std::uint8_t{is_static(label)}; });
-  revised_map_->insert(judged_.points, keep_, judged_.verdict.T_world_sensor);
 }
 
 void RunResults::finish() { writing_.wait(); }

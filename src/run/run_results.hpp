@@ -67,6 +67,7 @@ class RunResults {
  private:
   void hand_out();
   void write_moving(const JudgedScan& judged);
+  void add_to_revised_map(const JudgedScan& judged);
 
   const Recording& recording_;
   ScanRange range_;

@@ -110,7 +110,7 @@ std::vector<std::size_t> thin_scans(const std::vector<ScanCounts>& counts) {
   for (std::size_t i = 0; i < std::min(kBefore, counts.size()); ++i) {
     before.push_back(static_cast<double>(counts[i].points));
   }
-  // At the begin, the larger half of the first scans.
+  // At the beginning, the larger half of the first scans.
   std::sort(before.begin(), before.end());
   before.erase(before.begin(), before.begin() + std::ptrdiff_t(before.size() / 2));
   std::vector<std::size_t> thin;
@@ -140,10 +140,12 @@ std::vector<std::string> remarks_on_odd_scans(const Recording& recording, std::s
                       ": far fewer points than the scans before, as if cut off");
   }
   std::vector<std::size_t> misplaced;
-  if (compares_all) misplaced = misplaced_scans(recording);
-  for (const std::size_t i : compares_all ? std::set<std::size_t>() : suspects(counts)) {
-    const auto found = misplaced_in(recording, first + i, first + i);
-    misplaced.insert(misplaced.end(), found.begin(), found.end());
+  if (compares_all) {
+    misplaced = misplaced_scans(recording);
+  } else {
+    for (const std::size_t i : suspects(counts)) {
+      if (!misplaced_in(recording, first + i, first + i).empty()) misplaced.push_back(first + i);
+    }
   }
   if (!misplaced.empty()) {
     remarks.push_back(text_of(misplaced, 0, recording) +
