@@ -115,8 +115,7 @@ class RemoverNode {
   std::vector<ros::Publisher> advertise(const std::string& name) {
     std::vector<ros::Publisher> result;
     for (std::size_t i = 0; i < topics_.size(); ++i) {
-      const std::string number = i == 0 ? "" : '_' + std::to_string(i + 1);
-      result.push_back(parameters_.node.advertise<Cloud>(name + number, kQueue));
+      result.push_back(parameters_.node.advertise<Cloud>(numbered(name, i), kQueue));
     }
     return result;
   }

@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <sstream>
@@ -101,6 +102,11 @@ void set_parameters(RemoverConfig& config, Declare&& declare) {
       detail::set_number(parameter, detail::decimal_value(parameter.value), declare);
     }
   });
+}
+
+/// The topic `name` of the results for a topic of clouds: NAME, NAME_2, NAME_3 and so on.
+inline std::string numbered(const std::string& name, std::size_t topic) {
+  return topic == 0 ? name : name + '_' + std::to_string(topic + 1);
 }
 
 /// The names between the commas of a list.

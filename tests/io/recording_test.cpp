@@ -49,6 +49,19 @@ bool tells(const Recording& recording, const std::string& note) {
   return std::find(notes.begin(), notes.end(), note) != notes.end();
 }
 
+/// Times (s) of scans whose files have these names, without poses.
+std::vector<double> recorded_times(const std::vector<std::string>& names) {
+  const TemporaryFolder folder;
+  for (const std::string& name : names)
+    write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
+  RecordingOptions options;
+  options.without_poses = true;
+  const Recording recording(folder.path(), options);
+  std::vector<double> times;
+  for (std::size_t i = 0; i < recording.size(); ++i) times.push_back(recording.time(i));
+  return times;
+}
+
 }  // namespace
 
 TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame") {
@@ -556,21 +569,12 @@ TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
 }
 
 TEST_CASE("Digits behind the point of a name are decimals, or nanoseconds without leading zeros") {
-  const auto times = [](const std::vector<std::string>& names) {
-    const TemporaryFolder folder;
-    for (const std::string& name : names)
-      write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
-    RecordingOptions options;
-    options.without_poses = true;
-    const Recording recording(folder.path(), options);
-    REQUIRE(recording.size() == 2);
-    return std::pair(recording.time(0), recording.time(1));
-  };
   constexpr double kSecond = 1700000000.0;
   const auto check = [&](const std::vector<std::string>& names, double first, double second) {
-    const auto [a, b] = times(names);
-    CHECK(a - kSecond == Approx(first).margin(1e-6));
-    CHECK(b - kSecond == Approx(second).margin(1e-6));
+    const std::vector<double> times = recorded_times(names);
+    REQUIRE(times.size() == 2);
+    CHECK(times[0] - kSecond == Approx(first).margin(1e-6));
+    CHECK(times[1] - kSecond == Approx(second).margin(1e-6));
   };
   check({"1700000000.11149430", "1700000000.111494300"}, 0.01114943, 0.1114943);
   check({"1700000000.011149430", "1700000000.111494300"}, 0.01114943, 0.1114943);
@@ -581,15 +585,9 @@ TEST_CASE("Digits behind the point of a name are decimals, or nanoseconds withou
 TEST_CASE("Parts of a second in names are read so that scans follow each other evenly") {
   using Names = std::vector<std::string>;
   const auto times = [](const Names& names) {
-    const TemporaryFolder folder;
-    for (const std::string& name : names)
-      write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
-    RecordingOptions options;
-    options.without_poses = true;
-    const Recording recording(folder.path(), options);
     std::vector<long> milliseconds;
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      milliseconds.push_back(std::lround(1e3 * (recording.time(i) - 1700000000.0)));
+    for (const double time : recorded_times(names)) {
+      milliseconds.push_back(std::lround(1e3 * (time - 1700000000.0)));
     }
     return milliseconds;
   };

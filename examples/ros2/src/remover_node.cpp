@@ -153,9 +153,8 @@ class RemoverNode::Work {
     const auto options = overridable<rclcpp::PublisherOptions>();
     const rclcpp::SensorDataQoS sensor;
     for (std::size_t i = 0; i < topics_.size(); ++i) {
-      const std::string number = i == 0 ? "" : '_' + std::to_string(i + 1);
-      static_.push_back(node.create_publisher<Cloud>("static" + number, sensor, options));
-      dynamic_.push_back(node.create_publisher<Cloud>("dynamic" + number, sensor, options));
+      static_.push_back(node.create_publisher<Cloud>(numbered("static", i), sensor, options));
+      dynamic_.push_back(node.create_publisher<Cloud>(numbered("dynamic", i), sensor, options));
     }
     residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
     objects_ = node.create_publisher<Markers>("~/objects", sensor, options);
