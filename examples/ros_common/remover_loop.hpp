@@ -24,7 +24,7 @@ namespace dynains_ros {
 
 /// The result for one frame.
 struct Cleaned {
-  /// Of its points, cloud by cloud; empty: it is not judged.
+  /// Labels of the points of all clouds, one cloud after the other; empty if not judged.
   dynains::Span<const dynains::PointLabel> labels;
   std::optional<dynains::Pose> T_odom_sensor;  ///< by the own odometry, if it has track
   const dynains::FrameResult& frame;

@@ -87,7 +87,7 @@ class SensorRig {
     }
     return result;
   }
-  /// Of the clouds of the first topic.
+  /// Frame of the clouds of the first topic.
   const std::string& frame_id() const { return frame_id_; }
 
   /// The points of the frame that place() took last, cloud by cloud. Throws dynains::CloudError.

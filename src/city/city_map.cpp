@@ -61,8 +61,8 @@ class Candidates {
         passed += history_.own_beams_passed(session, i) ? 1.0F : 0.0F;
       }
     }
-    // 40 cm high, hit by three references of its session in the mean, hardly passed, and with few
-    // blocks beside what stands in both states.
+    // An object is at least 40 cm high, three references of its session hit it in the mean, beams
+    // pass 5 % of its points at most, and at most 70 % of its blocks touch unchanged objects.
     return members.size() >= 8 && box.sizes().z() > 0.4F && hits >= 3.0F * points &&
            passed <= 0.05F * points && contacts <= 0.7F * static_cast<float>(members.size());
   }

@@ -187,7 +187,7 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
   constexpr std::size_t kMaxCount[] = {3000, 60000};  // points, near and all
   Fit fit;
   for (const bool is_first : {true, false}) {
-    const double radius = is_first ? 60.0 : std::numeric_limits<double>::infinity();
+    const double radius = is_first ? 60.0 : std::numeric_limits<double>::infinity();  // m
     std::vector<Eigen::Vector3f> near;
     for (const Eigen::Vector3d& point : points_) {
       const Eigen::Vector3d p = T_city_start * point - centre;

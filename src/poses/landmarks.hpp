@@ -35,8 +35,8 @@ class Landmarks {
   std::size_t size() const { return points().size(); }
   const std::vector<Eigen::Vector3d>& points() const;
   /// Agreement of `other` with this scan under the pose `T_this_other`, at about 1200 points. It is
-  /// symmetric except for occlusion. `with_surfaces`: points agree with surfaces between points,
-  /// too, so that smooth walls do not tell where beams hit them.
+  /// symmetric except for occlusion. `with_surfaces`: a point on a surface between points agrees
+  /// as well, so that on smooth walls the pattern of the beams does not count.
   Agreement compare(const Landmarks& other, const Pose& T_this_other,
                     bool with_surfaces = false) const;
   /// Surfaces through the points; the first call builds them.

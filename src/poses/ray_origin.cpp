@@ -51,8 +51,8 @@ struct Neighbours {
   Eigen::Vector3d first, second;  // m
 };
 
-/// The nearest of the points up to a step of azimuth farther, for about 4,000 of `points`. It is of
-/// the same beam, whatever origin is assumed, unless rings are denser than the points on them.
+/// For about 4,000 of `points`, the nearest point within the next step of azimuth. Both are of the
+/// same beam, also under a wrong origin, unless rings lie closer than the points on a ring.
 std::vector<Neighbours> neighbours(const Points& points, const Rays& rays) {
   constexpr std::size_t kCount = 4000;
   constexpr double kNear = 1.2 * kRadians;  // of azimuth, more than the step of any sensor

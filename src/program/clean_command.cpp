@@ -200,7 +200,7 @@ fs::path target_of(const CleanOptions& options) {
   return target;
 }
 
-/// The edge of voxels that hold about one point of the map, m; at least `least`.
+/// The edge of voxels that hold about one point of the map, m: from `least` to 2 m.
 double voxel_of(const std::vector<Eigen::Vector3d>& map, double least) {
   return edge_by_spacing(map.size(), least, 2.0,
                          [&](double edge) { return MapVotes(map, edge).voxel_count(); });

@@ -24,7 +24,9 @@ bool ReturnToPlace::fits() const { return is_known() && movement <= kMaxMovement
 
 bool ReturnToPlace::is_wrong() const { return inliers < kMinInliers || movement > kMaxMovement; }
 
-bool ReturnToPlace::is_known() const { return inliers >= kMinInliers && deviation <= 0.1; }
+bool ReturnToPlace::is_known() const {
+  return inliers >= kMinInliers && deviation <= 0.1;  // m
+}
 
 // Puts the points that stand into kept_, and into the store.
 void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {

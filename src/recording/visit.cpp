@@ -16,7 +16,7 @@ constexpr float kBelief = 0.95F;  // of points that the second pass removes
 Visit::Visit(ByteStore& store, const SecondPassConfig& config)
     : config_(config), store_(store), places_(store, config.memory) {
   for (std::size_t i = 0; i < config.sensors.size(); ++i) {
-    references_.emplace_back(5, config.evidence.lateral_margin);
+    references_.emplace_back(/*max_step=*/5, config.evidence.lateral_margin);
   }
 }
 
@@ -140,7 +140,7 @@ bool Visit::restore(std::size_t i, bool stands, const Eigen::Vector3d& point,
   if (cause == Cause::kUnderInstance) return false;
   const auto is_ground = [&] {
     const std::optional<double> rise = places_.rise(point);
-    return rise && *rise <= 0.02 && places_.is_level(point);
+    return rise && *rise <= 0.02 && places_.is_level(point);  // m
   };
   if (stands) {
     verdict.labels[i] = PointLabel::kStatic;

@@ -17,7 +17,8 @@ namespace dynains::run {
 struct RunPlan;
 class RunResults;
 
-/// What becomes of the verdicts of the stream. Functions throw IoError.
+/// Keeps the verdicts of the stream for a second pass, or takes them as final. Functions throw
+/// IoError.
 class Passes {
  public:
   /// Two, if `plan` asks for them and the recording is longer than what the first one compares. The
@@ -37,7 +38,7 @@ class Passes {
   const std::vector<ReturnToPlace>& returns() const {
     return second_ ? second_->returns() : returns_.found();
   }
-  /// Of the map that two passes make.
+  /// Configuration of the map that two passes build.
   const StaticMapAccumulator::Config& map_config() const;
   /// The field "second_pass" of the report; null for one pass.
   nlohmann::ordered_json report() const;

@@ -22,7 +22,7 @@ class VerdictFiles {
                         bool has_beliefs = false)
       : run_(std::move(run)), kind_(std::move(kind)), has_beliefs_(has_beliefs) {}
 
-  /// Of the labels.
+  /// Folder of the label files.
   std::filesystem::path folder() const { return run_ / kind_; }
   /// The labels of the scan with this name.
   std::filesystem::path file(const std::string& name) const { return folder() / (name + ".label"); }

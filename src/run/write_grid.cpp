@@ -46,7 +46,8 @@ class JudgedScans {
   std::vector<PointLabel> labels_;
 };
 
-/// Distance between the points of surfaces, m: the edge of voxels that hold about one.
+/// Distance between the points of surfaces, from 0.02 to 0.5 m: the edge of voxels that hold about
+/// one.
 double spacing_of(const std::vector<Eigen::Vector3d>& points) {
   return edge_by_spacing(points.size(), 0.02, 0.5, [&](double edge) {
     VoxelHashTable<> voxels;

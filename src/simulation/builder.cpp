@@ -484,7 +484,7 @@ void Builder::stroll(const Strollers& strollers) {
             std::clamp(lateral + drift * u + beside, -strollers.outer, strollers.outer);
         const double along = std::clamp(s + run * u - behind, 0.5, street().centre.length() - 0.5);
         goals.push_back(street().centre.beside(along, l).position);
-        // Who walks on pavements does not step on any street.
+        // People on pavements stay off all streets.
         is_clear = is_clear && (strollers.inner <= street().half_width ||
                                 world_.terrain.distance_to_street(goals.back()) > 0.2);
       }

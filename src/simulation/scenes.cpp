@@ -7,7 +7,7 @@
 namespace dynains::simulation {
 namespace {
 
-/// What covers a place or stands at its edges.
+/// Roof of a place, or barriers at its edges.
 enum class Cover {
   kNone,
   kCrowns,  ///< bridges, and avenues whose crowns meet

@@ -47,7 +47,7 @@ struct World {
 
 /// The scene at its start time.
 World build_scene(const Config& config);
-/// The same, on the day of the configuration.
+/// The scene with the changes up to the day of the configuration.
 World build_world(const Config& config);
 
 }  // namespace dynains::simulation

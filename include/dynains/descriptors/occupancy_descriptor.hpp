@@ -238,7 +238,7 @@ class OccupancyDescriptor {
       }
     });
     const float height = highest - z_min_;
-    return height > 1.0F ? static_cast<float>(config_.ignored_low) * height : 0.0F;
+    return height > 1.0F ? static_cast<float>(config_.ignored_low) * height : 0.0F;  // m
   }
 
   // Calls `work` with the ranges of points that the grid spans.

@@ -37,7 +37,7 @@ class TruthClasses {
   /// Dynamic: SemanticKITTI's moving classes, 252 to 259, and 251 of its benchmark of
   /// moving object segmentation.
   TruthClasses() : TruthClasses(Unlabeled::kIgnore) {}
-  /// The same classes; `unlabeled` decides on points of the classes 0 and 1.
+  /// As above. `unlabeled`: what points of the classes 0 and 1 count as.
   explicit TruthClasses(Unlabeled unlabeled);
 
   /// `dynamic_classes`: ids and closed ranges separated by commas, for example "252-257,259".

@@ -176,8 +176,8 @@ class ImageTest {
 
   /// Bits of the samples (m) that a beam passes near enough, of those in `cell`. The largest
   /// lateral distance is the error of poses and points, and the width of a beam at its range. A
-  /// beam that passes before a sample, towards the viewpoint, by more than a part of this distance
-  /// crosses space that the beam of the sample itself found free: it tells nothing.
+  /// beam that passes between a sample and the viewpoint, farther from the sample than a part of
+  /// this distance, is no evidence: the beam that measured the sample crossed that space as well.
   unsigned is_near(const Float& x, const Float& y, const Float& z, const std::int32_t* cell) const {
     static constexpr PackConstant kReach(0.05F), kReachSlope(0.004F);  // m, m/m
     static constexpr PackConstant kBefore(0.25F), kOne(1.0F);

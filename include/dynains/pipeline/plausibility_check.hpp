@@ -19,7 +19,7 @@ class ScanRate {
   TimeDoubt add(double interval, double max_gap) {
     constexpr std::size_t kEnough = 3;  // intervals; a pause is one
     slow_ = interval > max_gap ? slow_ + 1 : 0;
-    fast_ = interval < 1e-3 ? fast_ + 1 : 0;
+    fast_ = interval < 1e-3 ? fast_ + 1 : 0;  // s
     if (slow_ >= kEnough) return TimeDoubt::kTooSlow;
     return fast_ >= kEnough ? TimeDoubt::kTooFast : TimeDoubt::kNone;
   }

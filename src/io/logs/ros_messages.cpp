@@ -190,7 +190,7 @@ Concatenation read_concatenation(const SerialisedMessage& message) {
   result.time = read_header(in).time;
   in.take(2, "a success and a strategy");
   in.take(in.length(1, "a configuration"), "a configuration");
-  result.parts.resize(in.length(25, "sources"));
+  result.parts.resize(in.length(25, "sources"));  // bytes of the smallest one
   for (Concatenation::Part& part : result.parts) {
     part.frame = read_header(in).frame;
     in.string("a topic");
@@ -205,7 +205,7 @@ std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMes
   MessageReader in(message);
   std::vector<StampedPose> poses;
   if (is_transform_type(type)) {
-    const std::uint32_t count = in.length(72, "transforms");
+    const std::uint32_t count = in.length(72, "transforms");  // bytes of the smallest one
     for (std::uint32_t i = 0; i < count; ++i) poses.push_back(read_transform(in));
   } else if (type == "geometry_msgs/TransformStamped") {
     poses.push_back(read_transform(in));
