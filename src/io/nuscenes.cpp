@@ -86,6 +86,8 @@ void read_table(const fs::path& table, Take&& take) {
     const Json rest = Json::parse(file, take_row);  // without the rows
   } catch (const Json::parse_error& error) {
     fail_at_byte(table, error.byte, "expected JSON, an array of objects");
+  } catch (const Json::out_of_range&) {  // without its place
+    fail(table, "expected numbers within the range of double");
   }
 }
 

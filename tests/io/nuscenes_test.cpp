@@ -95,6 +95,8 @@ TEST_CASE("nuScenes: malformed tables and sweeps are refused with file and place
        "row 0: expected 3 numbers \"translation\""},
       {"scene", "[{\"token\": \"n1\"}]", "row 0: expected a text \"name\""},
       {"sample", "{", "expected JSON"},
+      {"ego_pose", "[{\"token\": \"e1\", \"translation\": [1e999, 2, 3]}]",
+       "ego_pose.json: expected numbers within the range of double"},
   };
   for (const Case& wrong : cases) {
     CAPTURE(wrong.table, wrong.content);
