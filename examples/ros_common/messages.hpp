@@ -99,6 +99,23 @@ Message residual_message(const dynains::PoseResidual& residual, const Header& he
   return message;
 }
 
+/// The middle of an object, with x along its length. `T_fixed_world`: of the objects.
+inline dynains::Pose box_pose(const dynains::MovingObject& object,
+                              const dynains::Pose& T_fixed_world) {
+  dynains::Pose T_world_object = dynains::Pose::Identity();
+  T_world_object.translation() = object.centre;
+  T_world_object.linear().topLeftCorner<2, 2>() = Eigen::Rotation2Dd(object.yaw).toRotationMatrix();
+  return T_fixed_world * T_world_object;
+}
+
+/// Sets the geometry_msgs/Vector3 of the edges of a box, m.
+template <class Vector>
+void set_size(const dynains::MovingObject& object, Vector& size) {
+  size.x = object.length;
+  size.y = object.width;
+  size.z = object.height;
+}
+
 /// Boxes of moving objects as a visualization_msgs/MarkerArray, which replaces the one before.
 /// `T_fixed_world`: of the objects, in the frame `header.frame_id`.
 template <class Message, class Header>
@@ -110,21 +127,32 @@ Message objects_message(dynains::Span<const dynains::MovingObject> objects,
   for (auto& marker : message.markers) marker.header = header;
   message.markers[0].action = kDeleteAll;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    const dynains::MovingObject& object = objects[i];
     auto& marker = message.markers[1 + i];
     marker.ns = "objects";
-    marker.id = static_cast<std::int32_t>(object.id);
+    marker.id = static_cast<std::int32_t>(objects[i].id);
     marker.type = kCube;
-    dynains::Pose T_world_object = dynains::Pose::Identity();
-    T_world_object.translation() = object.centre;
-    T_world_object.linear().topLeftCorner<2, 2>() =
-        Eigen::Rotation2Dd(object.yaw).toRotationMatrix();
-    set_pose(T_fixed_world * T_world_object, marker.pose);
-    marker.scale.x = object.length;
-    marker.scale.y = object.width;
-    marker.scale.z = object.height;
+    set_pose(box_pose(objects[i], T_fixed_world), marker.pose);
+    set_size(objects[i], marker.scale);
     marker.color.r = 1.0F;
     marker.color.a = 0.5F;
+  }
+  return message;
+}
+
+/// Boxes of moving objects as a vision_msgs/Detection3DArray, with their ids and no hypotheses.
+/// `T_fixed_world`: of the objects, in the frame `header.frame_id`.
+template <class Message, class Header>
+Message detections_message(dynains::Span<const dynains::MovingObject> objects,
+                           const dynains::Pose& T_fixed_world, const Header& header) {
+  Message message;
+  message.header = header;
+  for (const dynains::MovingObject& object : objects) {
+    message.detections.emplace_back();
+    auto& detection = message.detections.back();
+    detection.header = header;
+    detection.id = std::to_string(object.id);
+    set_pose(box_pose(object, T_fixed_world), detection.bbox.center);
+    set_size(object, detection.bbox.size);
   }
   return message;
 }

@@ -41,6 +41,19 @@ struct LookAlikeMarkers {
   std::vector<LookAlikeMarker> markers;
 };
 
+struct LookAlikeDetection {
+  decltype(LookAlike::header) header;
+  struct {
+    decltype(LookAlikePose().pose.pose) center;
+    decltype(LookAlikeMarker::scale) size;
+  } bbox;
+  std::string id;
+};
+struct LookAlikeDetections {
+  decltype(LookAlike::header) header;
+  std::vector<LookAlikeDetection> detections;
+};
+
 TEST_CASE("a map becomes a message with its points") {
   dynains::PointBuffer points;
   points.push_back(1.0F, 2.0F, 3.0F);
@@ -112,6 +125,19 @@ TEST_CASE("objects become boxes in the fixed frame that replace the last ones") 
   CHECK(marker.scale.x == 4.0);
   CHECK(marker.scale.y == 1.8);
   CHECK(objects_message<LookAlikeMarkers>({}, T_fixed_world, header).markers.size() == 1);
+
+  const auto detections = detections_message<LookAlikeDetections>(
+      dynains::Span<const dynains::MovingObject>(&object, 1), T_fixed_world, header);
+  CHECK(detections.header.frame_id == "map");
+  REQUIRE(detections.detections.size() == 1);
+  const auto& detection = detections.detections[0];
+  CHECK(detection.header.frame_id == "map");
+  CHECK(detection.id == "7");
+  CHECK(detection.bbox.center.position.y == marker.pose.position.y);
+  CHECK(detection.bbox.center.orientation.z == marker.pose.orientation.z);
+  CHECK(detection.bbox.size.x == 4.0);
+  CHECK(detection.bbox.size.y == 1.8);
+  CHECK(detection.bbox.size.z == 1.5);
 }
 
 }  // namespace

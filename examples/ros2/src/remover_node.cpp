@@ -14,6 +14,7 @@
 #include <chrono>
 #include <cstdint>
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
+#include <functional>
 #include <geometry_msgs/msg/pose_with_covariance_stamped.hpp>
 #include <geometry_msgs/msg/transform_stamped.hpp>
 #include <memory>
@@ -25,6 +26,10 @@
 #include <utility>
 #include <vector>
 #include <visualization_msgs/msg/marker_array.hpp>
+
+#if __has_include(<vision_msgs/msg/detection3_d_array.hpp>)
+#include <vision_msgs/msg/detection3_d_array.hpp>
+#endif
 
 #include "dynains/adapters/point_cloud2.hpp"
 #include "ros_common/find_pose.hpp"
@@ -41,6 +46,7 @@ using Residual = geometry_msgs::msg::PoseWithCovarianceStamped;
 using Diagnostics = diagnostic_msgs::msg::DiagnosticArray;
 using Odometry = nav_msgs::msg::Odometry;
 using Markers = visualization_msgs::msg::MarkerArray;
+using Header = decltype(Cloud::header);
 using Transform = geometry_msgs::msg::TransformStamped;
 using Loop = RemoverLoop<Cloud::ConstSharedPtr>;
 using JoinedClouds = Frame<Cloud::ConstSharedPtr>;
@@ -157,7 +163,10 @@ class RemoverNode::Work {
       dynamic_.push_back(node.create_publisher<Cloud>(numbered("dynamic", i), sensor, options));
     }
     residual_ = node.create_publisher<Residual>("~/residual", sensor, options);
-    objects_ = node.create_publisher<Markers>("~/objects", sensor, options);
+    offer_objects("~/objects", objects_message<Markers, Header>);
+#if __has_include(<vision_msgs/msg/detection3_d_array.hpp>)
+    offer_objects("~/detections", detections_message<vision_msgs::msg::Detection3DArray, Header>);
+#endif
     auto map_options = options;
     map_options.use_intra_process_comm = rclcpp::IntraProcessSetting::Disable;
     if (has_odom_) {
@@ -233,7 +242,7 @@ class RemoverNode::Work {
       residual_->publish(std::make_unique<Residual>(
           residual_message<Residual>(*cleaned.frame.pose_residual, header)));
     }
-    if (is_judged && has_readers(*objects_)) publish_objects(cleaned, header);
+    if (is_judged) publish_objects(cleaned, header);
     if (!has_odom_ || !cleaned.T_odom_sensor) return;
     auto odom = std::make_unique<Odometry>();
     odom->header = header;
@@ -245,7 +254,19 @@ class RemoverNode::Work {
         transform_message<Transform>(*cleaned.T_odom_sensor, fixed_frame_, header));
   }
 
-  template <class Header>
+  using Objects = dynains::Span<const dynains::MovingObject>;
+  template <class Message>
+  void offer_objects(const char* topic,
+                     Message (*make)(Objects, const dynains::Pose&, const Header&)) {
+    const auto publisher = node_.create_publisher<Message>(topic, rclcpp::SensorDataQoS(),
+                                                           overridable<rclcpp::PublisherOptions>());
+    objects_.push_back([publisher, make](Objects objects, const dynains::Pose& T_fixed_world,
+                                         const Header& header) {
+      if (!has_readers(*publisher)) return;
+      publisher->publish(std::make_unique<Message>(make(objects, T_fixed_world, header)));
+    });
+  }
+
   void publish_objects(const Cleaned& cleaned, Header header) {
     const dynains::ScanVerdict& verdict = cleaned.frame.newest();
     dynains::Pose T_fixed_world = dynains::Pose::Identity();
@@ -253,8 +274,7 @@ class RemoverNode::Work {
       T_fixed_world = *cleaned.T_odom_sensor * verdict.T_world_sensor.inverse();
     }
     header.frame_id = fixed_frame_;
-    objects_->publish(std::make_unique<Markers>(
-        objects_message<Markers>(verdict.objects, T_fixed_world, header)));
+    for (const auto& list : objects_) list(verdict.objects, T_fixed_world, header);
   }
 
   static bool has_readers(const rclcpp::PublisherBase& publisher) {
@@ -297,7 +317,8 @@ class RemoverNode::Work {
   std::vector<rclcpp::Publisher<Cloud>::SharedPtr> static_, dynamic_;  // by topic
   rclcpp::Publisher<Cloud>::SharedPtr map_;
   rclcpp::Publisher<Residual>::SharedPtr residual_;
-  rclcpp::Publisher<Markers>::SharedPtr objects_;
+  // By type of message.
+  std::vector<std::function<void(Objects, const dynains::Pose&, const Header&)>> objects_;
   rclcpp::Publisher<Odometry>::SharedPtr odom_;
   std::optional<tf2_ros::TransformBroadcaster> broadcaster_;
   rclcpp::Publisher<Diagnostics>::SharedPtr diagnostics_;

@@ -96,6 +96,21 @@ struct DiagnosticArray {
 };
 }  // namespace diagnostic_msgs::msg
 
+namespace vision_msgs::msg {
+struct Detection3D {
+  std_msgs::msg::Header header;
+  struct {
+    geometry_msgs::msg::Pose center;
+    geometry_msgs::msg::Vector3 size;
+  } bbox;
+  std::string id;
+};
+struct Detection3DArray {
+  std_msgs::msg::Header header;
+  std::vector<Detection3D> detections;
+};
+}  // namespace vision_msgs::msg
+
 namespace visualization_msgs::msg {
 struct Marker {
   std_msgs::msg::Header header;
