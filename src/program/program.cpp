@@ -117,6 +117,9 @@ int Program::run(int argc, char** argv) {
     flush_output();
   } catch (const CLI::Success& success) {
     return print_help(success);
+  } catch (const CLI::ExtrasError&) {  // whose own text has them in reverse order
+    return fail(kExitUsage, "not known here: " + CLI::detail::join(remaining(true), " ") +
+                                " (see " + get_name() + " --help-all)");
   } catch (const CLI::ParseError& error) {
     return fail(kExitUsage, error.what() + std::string(" (see ") + get_name() + " --help)");
   } catch (const ConfigError& error) {

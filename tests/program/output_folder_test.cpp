@@ -126,7 +126,7 @@ TEST_CASE("A folder that holds anything but results is refused, and stays as it 
   SECTION("no results") {
     file = place.out / "a.txt";
     write_text(file, "mine");
-    expected = "no earlier results (no report.json)";
+    expected = "no results of dynains run (no report.json)";
   }
   SECTION("a link that leads nowhere") {
     fs::create_symlink("none", place.out);

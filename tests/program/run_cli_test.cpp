@@ -318,7 +318,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
   const std::vector<Case> cases = {
       {{"--tau-s", "7"}, "--tau-s = 7: expected FLOAT in [0, 1]"},
       {{"--votes", "9", "--window", "4"}, "votes = 9 must be at most window = 4"},
-      {{"--tau-x", "1"}, "--tau-x"},
+      {{"--tau-x", "1"}, "not known here: --tau-x 1 "},
       {{"--config", config}, "run.cfg:3: tau-x: unknown parameter, see dynains config"},
       {{"--preset", "best"}, "best not in"},
       {{"--start", "12"}, "--start and --end leave no scan of 000000 to 000011"},

@@ -180,8 +180,8 @@ ResultFolder::ResultFolder(Folder folder, const OutputKind& kind)
   }
   for (const std::string& name : folder_.names()) {
     if (target_of_temporary(name) == kind.marker) continue;
-    throw IoError(path().string() + ": is not empty and holds no earlier results (no " +
-                  kind.marker + "); choose another folder");
+    throw IoError(path().string() + ": is not empty and holds no results of dynains " +
+                  kind.command + " (no " + kind.marker + "); choose another folder");
   }
 }
 
