@@ -35,7 +35,7 @@ void PointProtocol::add(const LabelledScan& scan) {
       truth = config_.truth(label);
       counts = truth == Truth::kIgnored ? nullptr : &by_label_[label];
     }
-    if (counts == nullptr || !gate.passes(scan.xyz + i * scan.stride)) continue;
+    if (counts == nullptr || !gate.passes(scan, i)) continue;
     ++counts->points;
     const unsigned in_map = scan.in_map.empty() ? 0U : scan.in_map[i];
     for (std::size_t e = 0; e < estimates_; ++e) counts->kept[e] += in_map >> e & 1U;

@@ -11,6 +11,7 @@ namespace fs = std::filesystem;
 LabelledSequence::LabelledSequence(Recording recording, const ScanWindow& window,
                                    std::vector<VerdictFiles> runs)
     : sequence_(std::move(recording)), runs_(std::move(runs)) {
+  for (const Pose& sensor : sequence_.sensors()) origins_.emplace_back(sensor.translation());
   const fs::path& folder = sequence_.folder();
   if (!sequence_.has_labels()) {
     throw IoError(
@@ -57,6 +58,7 @@ bool LabelledSequence::read(std::size_t i, evaluation::LabelledScan& scan) {
   scan.xyz = scan_.points.xyzi.data();
   scan.stride = 4;
   scan.sensors = scan_.points.sensor.empty() ? nullptr : scan_.points.sensor.data();
+  scan.origins = origins_;
   scan.T_world_sensor = sequence_.T_world_sensor(index);
   scan.truth = scan_.truth;
   scan.in_map = scan_.in_map;

@@ -2,6 +2,7 @@
 // the evaluation wants it.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -49,7 +50,8 @@ class LabelledSequence {
 
   Recording sequence_;
   std::vector<VerdictFiles> runs_;
-  std::vector<std::size_t> scans_;  // indices within sequence_
+  std::vector<Eigen::Vector3d> origins_;  // of several sensors, see LabelledScan
+  std::vector<std::size_t> scans_;        // indices within sequence_
   std::size_t missing_truths_ = 0;
   Scan scan_;
   Scan next_;  // belongs to the reading thread until reading_.wait()

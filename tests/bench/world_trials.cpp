@@ -182,7 +182,7 @@ void run_trials(const Options& options) {
       if (!mounts.empty()) configs[s].sensors = mounts;
       judge(scans, configs[s], static_cast<unsigned>(s), in_map);
     }
-    const evaluation::Evaluation result = test::evaluate(scans, in_map, settings);
+    const evaluation::Evaluation result = test::evaluate(scans, in_map, settings, mounts);
     for (std::size_t s = 0; s < settings.size(); ++s) {
       const Scores scores = scores_of(result.rows[2 + s]);
       print_row(settings.size() == 1 ? name_of(world) : name_of(world) + ": " + settings[s],

@@ -75,6 +75,22 @@ TEST_CASE("Ranges are planar and inclusive, and are measured in the sensor frame
   CHECK(run({scan}, settings(0.01, 2.7, 50), 1).score(0).static_total == 2);
 }
 
+TEST_CASE("Ranges are those from the sensor of a point") {
+  OwnedScan scan;
+  scan.add(5.0F, 0.0F, 0.0F, kRoad, 1);   // too near its sensor
+  scan.add(1.0F, 0.0F, 0.0F, kRoad, 1);   // in
+  scan.add(51.0F, 0.0F, 0.0F, kRoad, 1);  // in
+  const std::vector<std::uint8_t> sensors = {1, 1, 1};
+  const std::vector<Eigen::Vector3d> origins = {{0.0, 0.0, 0.0}, {4.0, 0.0, 1.0}};
+  VoxelProtocol protocol(settings(0.01, 2.7, 50), 1);
+  LabelledScan view = scan.view();
+  view.sensors = sensors.data();
+  view.origins = origins;
+  protocol.add(view);
+  protocol.resolve(view);
+  CHECK(protocol.score(0).static_total == 2);
+}
+
 TEST_CASE("Streaming gives the score of the simple reference implementation", "[reference]") {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const auto scans = mixed_scans(seed, 6, 900);

@@ -55,15 +55,21 @@ inline evaluation::EvaluationConfig within_50_m() {
   return config;
 }
 
-/// Bit k of `in_map` tells the static points of estimate k, which has name k.
+/// Bit k of `in_map` tells the static points of estimate k, which has name k. `mounts`: those of
+/// the simulator.
 inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedScan>& scans,
                                        const StaticPoints& in_map,
                                        const std::vector<std::string>& names,
+                                       const std::vector<Pose>& mounts = {},
                                        const evaluation::EvaluationConfig& config = within_50_m()) {
+  std::vector<Eigen::Vector3d> origins;
+  for (const Pose& mount : mounts) origins.emplace_back(mount.translation());
   const auto source = [&](std::size_t i, evaluation::LabelledScan& scan) {
     if (i == scans.size()) return false;
     scan.xyz = scans[i].xyzi.data();
     scan.stride = 4;
+    scan.sensors = scans[i].sensors.empty() ? nullptr : scans[i].sensors.data();
+    scan.origins = origins;
     scan.T_world_sensor = scans[i].T_world_sensor;
     scan.truth = scans[i].labels;
     scan.in_map = in_map[i];

@@ -25,7 +25,10 @@ enum Row : std::size_t {
 struct LabelledScan {
   const float* xyz = nullptr;             ///< x y z of each point, m, sensor frame
   std::size_t stride = 3;                 ///< floats per point, at least 3
-  const std::uint8_t* sensors = nullptr;  ///< of each point; null: all are of one
+  const std::uint8_t* sensors = nullptr;  ///< of each point; null: all are of the first
+  /// By sensor: where its beams begin, m, in the frame of the points, from which ranges are
+  /// measured. Empty: at the origin.
+  Span<const Eigen::Vector3d> origins;
   Pose T_world_sensor = Pose::Identity();
   Span<const std::uint32_t> truth;  ///< SemanticKITTI labels
   /// Bit e is set if the map of estimate e contains the point. Empty if no map contains a point.

@@ -26,7 +26,7 @@ template <class Visit>
 void for_each_point(const LabelledScan& scan, const VoxelGrid& grid, const RangeGate& gate,
                     Visit&& visit) {
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    if (!gate.passes(scan.xyz + i * scan.stride)) continue;
+    if (!gate.passes(scan, i)) continue;
     const Eigen::Vector3d p_world = world_point(scan.T_world_sensor, scan.point(i));
     const VoxelKey key = grid.key(p_world);
     if (key != kNoKey) visit(i, p_world, key);
