@@ -1,9 +1,12 @@
 #include <filesystem>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
+#include "run/write_grid.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains::test;
@@ -48,4 +51,36 @@ TEST_CASE("a grid of what has none is refused by one line") {
   CHECK(!fs::exists(map));
   const Outcome one = succeed(start({"run", seq, "--out", out, "--grid", map, "--end", "0"}));
   CHECK_THAT(one.err, ContainsSubstring("warning: the grid is of one scan"));
+}
+
+TEST_CASE("beams of a grid begin at the sensor of their point") {
+  // The first sensor, high above, sees two patches of ground; the second one a point of the far
+  // patch, past what lies between.
+  const TemporaryFolder folder;
+  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "sensors.txt", "1 0 0 2 0 1 0 2 0 0 1 30\n1 0 0 2 0 1 0 3 0 0 1 0.8\n");
+  std::ostringstream points("x,y,z\n", std::ios::ate);
+  std::string sensors;
+  for (int i = 0; i < 1600; ++i) {
+    for (const double x : {0.0, 12.0})
+      points << x + 0.1 * (i % 40) << ',' << 0.1 * (i / 40) << ",0\n";
+    sensors.append(2, '\0');
+  }
+  points << "14,3,0\n";
+  write_text(folder / "a1.csv", points.str());
+  write_text(folder / "sensor/a1.id", sensors + '\1');
+
+  const auto call_ground = [](std::size_t, const dynains::RecordedScan& scan,
+                              std::vector<dynains::PointLabel>& labels) {
+    labels.assign(scan.size(), dynains::PointLabel::kGround);
+  };
+  const dynains::run::PlacedGrid placed =
+      dynains::run::grid_of_run(call_ground, dynains::Recording(folder.path()), {0}, {}, false,
+                                [](std::size_t) { return true; });
+  const auto state_at = [&](double x, double y) {
+    const dynains::grid::Columns& columns = placed.grid.columns;
+    return placed.grid.cells.at(columns.index(columns.along(0, x), columns.along(1, y)));
+  };
+  CHECK(state_at(8.01, 3.01) == dynains::grid::CellState::kFree);
+  CHECK(state_at(8.01, 3.01 * 8.01 / 14.0) == dynains::grid::CellState::kUnknown);  // from the body
 }
