@@ -305,6 +305,43 @@ TEST_CASE("Topics are found if there is only one, and listed otherwise") {
   CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with poses, or a file of poses"));
   write_text(log, mcap_file({kOdometry}, {{0, 1, three_odometries("base")[0]}}, {}));
   CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with clouds; found /odom"));
+  const LogChannel packets = {"/packets", "velodyne_msgs/msg/VelodyneScan"};
+  write_text(log, mcap_file({packets}, {{0, 1, "no matter"}}, {}));
+  CHECK_THAT(log_error(log),
+             ContainsSubstring("found /packets") &&
+                 ContainsSubstring("packets of a sensor are not read: play the log through the ROS "
+                                   "driver of the sensor"));
+}
+
+TEST_CASE("Robots of one log whose frames have equal names keep their own transforms") {
+  const TemporaryFolder folder;
+  const fs::path log = folder / "two.mcap";
+  const Pose T_of_other = pose_at(0, 0.3);
+  const auto write = [&](const std::string& points) {
+    std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+    messages.push_back({4, nanoseconds(1.0), transform(1.0, "base", "lidar", T_of_other)});
+    for (int i = 0; i < 4; ++i) {
+      const double time = 1.01 + 0.1 * i;
+      messages.push_back({3, nanoseconds(time), transform(time, "odom", "base", pose_at(-i, 1))});
+    }
+    write_text(log, mcap_file({{points, kPoints.type},
+                               {"/one/tf", kTf.type},
+                               {"/one/tf_static", kTf.type},
+                               {"/two/tf", kTf.type},
+                               {"/two/tf_static", kTf.type}},
+                              messages, {}));
+  };
+  write("/one/points");
+  check_drive(log);
+  write("/two/points");
+  CHECK(Recording(log).T_world_sensor(1).linear().isApprox((pose_at(-1, 1) * T_of_other).linear(),
+                                                           0.1));
+  write("/points");
+  CHECK_THAT(log_error(log), ContainsSubstring("found different ones of frame ") &&
+                                 ContainsSubstring(" by namespaces /one and /two"));
+  RecordingOptions options;
+  options.pose_topic = "/one/tf";
+  CHECK(Recording(log, options).T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
 }
 
 TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame") {

@@ -39,6 +39,15 @@ Topics filter(const Topics& topics, Condition&& is_wanted) {
   return result;
 }
 
+/// Whether messages hold what a sensor sent, as a driver records it.
+bool has_packets(const std::string& type) {
+  constexpr const char* kNames[] = {"Packet", "VelodyneScan", "PandarScan", "rslidarScan",
+                                    "UdpFrame"};
+  return std::any_of(std::begin(kNames), std::end(kNames), [&](const char* name) {
+    return type.find(name, type.rfind('/') + 1) != std::string::npos;
+  });
+}
+
 bool has(const Topics& topics, const std::string& name) {
   return std::any_of(topics.begin(), topics.end(),
                      [&](const LogTopic& topic) { return topic.name == name; });
@@ -50,6 +59,22 @@ std::uint32_t index_of(const Topics& topics, const LogTopic& chosen) {
     return topic.name == chosen.name && topic.type == chosen.type;
   });
   return static_cast<std::uint32_t>(found - topics.begin());
+}
+
+/// "/robot1" of "/robot1/tf", "" of "/tf".
+std::string namespace_of(const std::string& topic) {
+  const std::size_t end = topic.rfind('/');
+  return end == std::string::npos ? std::string() : topic.substr(0, end);
+}
+
+/// The transforms of a topic. Those nearest to clouds are of the namespace of `pose_topic`, if it
+/// is given, else of the innermost one that the topic of the clouds lies in.
+TransformSource source_of(const std::string& topic, const std::string& cloud_topic,
+                          const std::string& pose_topic) {
+  const std::string name = namespace_of(topic);
+  const bool holds_clouds = name.empty() || cloud_topic.rfind(name + '/', 0) == 0;
+  const bool is_chosen = !pose_topic.empty() && name == namespace_of(pose_topic);
+  return {name, is_chosen ? std::string::npos : holds_clouds ? name.size() + 1 : 0};
 }
 
 LogTopic named(const Topics& topics, const std::string& name) {
@@ -90,7 +115,12 @@ LogScans::LogScans(const std::filesystem::path& path, const RecordingOptions& op
 void LogScans::choose_cloud_topics() {
   const Topics clouds = filter(log_->topics(), is_cloud_type);
   if (clouds.empty()) {
-    const std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
+    std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
+    if (!filter(log_->topics(), has_packets).empty()) {
+      end +=
+          "; packets of a sensor are not read: play the log through the ROS driver of the "
+          "sensor, and record sensor_msgs/PointCloud2";
+    }
     fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()) + end);
   }
   std::vector<std::string> wanted = text::names_in(options_.cloud_topic);
@@ -184,9 +214,11 @@ void LogScans::take_cloud(const LogMessage& message, Source& source) {
 void LogScans::take_poses(const LogMessage& message) {
   const LogTopic& topic = log_->topics()[message.topic];
   const bool is_static = topic.name.find("static") != std::string::npos;
+  const std::string& clouds = log_->topics()[sources_.front().topic].name;
+  const TransformSource source = source_of(topic.name, clouds, options_.pose_topic);
   for (const StampedPose& pose : read_poses(topic.type, load(message))) {
     if (message.topic != pose_topic_) {
-      transforms_.add(pose, is_static);
+      transforms_.add(pose, is_static, source);
       continue;
     }
     if (poses_.poses.empty()) {
@@ -331,6 +363,8 @@ void LogScans::find_clocks() {
 void LogScans::place_scans() {
   posed_frame_ = cloud_frame_;
   if (!pose_topic_) choose_frames();
+  pose_topic_ ? refuse_conflict(pose_child_, cloud_frame_)
+              : refuse_conflict(pose_frame_, posed_frame_);
   is_in_world_ = pose_topic_ && cloud_frame_ == pose_frame_ && cloud_frame_ != pose_child_;
   if (pose_topic_ && !is_in_world_) describe_extrinsic();
   if (transforms_.left_out() > 0) {
@@ -369,7 +403,15 @@ void LogScans::fail_without_poses() const {
                          "cloud at t");
 }
 
+void LogScans::refuse_conflict(const std::string& target, const std::string& source) const {
+  const std::optional<std::string> conflict = transforms_.conflict(target, source);
+  if (!conflict) return;
+  fail(log_->path(), "expected transforms of one robot, found different ones of " + *conflict +
+                         "; --pose-topic names a topic in the right one");
+}
+
 Pose LogScans::T_cloud_frame(const std::string& frame) const {
+  refuse_conflict(cloud_frame_, frame);
   const auto T_cloud_frame = transforms_.find(cloud_frame_, frame, times_.front());
   if (T_cloud_frame) return *T_cloud_frame;
   fail(log_->path(), "expected a transform from frame " + cloud_frame_ +

@@ -105,6 +105,7 @@ class LogScans {
   void choose_frames();
   std::string body_frame() const;
   void fail_without_poses() const;
+  void refuse_conflict(const std::string& target, const std::string& source) const;
   void describe_extrinsic();
   std::optional<Pose> pose_at(double time) const;
   SerialisedMessage load(const LogMessage& message);

@@ -53,8 +53,17 @@ void sort_by_time(Trajectory& trajectory) {
   trajectory = std::move(sorted);
 }
 
-void TransformTree::add(const StampedPose& pose, bool is_static) {
-  Edge& edge = edges_.try_emplace(pose.child, Edge{pose.frame, is_static, {}}).first->second;
+void TransformTree::add(const StampedPose& pose, bool is_static, const TransformSource& source) {
+  const Edge first{pose.frame, is_static, {}, source, {}};
+  Edge& edge = edges_.try_emplace(pose.child, first).first->second;
+  if (edge.source.nearness > source.nearness) return;
+  if (edge.source.nearness < source.nearness) edge = first;
+  if (edge.source.name_space != source.name_space) {
+    const bool are_equal = edge.is_static && is_static && edge.parent == pose.frame &&
+                           edge.poses.poses.front().isApprox(pose.T_frame_child, 1e-6);
+    if (!are_equal) edge.rival = source.name_space;
+    return;
+  }
   if (edge.parent != pose.frame || (edge.is_static && !is_static)) {
     ++left_out_;
     return;
@@ -159,6 +168,22 @@ std::optional<Pose> TransformTree::find(const std::string& target, const std::st
     ++above_target;
   }
   return above_target->T_frame_source.inverse() * above_source->T_frame_source;
+}
+
+std::optional<std::string> TransformTree::conflict(const std::string& target,
+                                                   const std::string& source) const {
+  const std::vector<std::string> ways[] = {frames_above(target), frames_above(source)};
+  for (const std::size_t i : {0, 1}) {
+    for (const std::string& frame : ways[i]) {
+      const std::vector<std::string>& other = ways[1 - i];
+      const auto edge = edges_.find(frame);
+      const bool is_between = std::find(other.begin(), other.end(), frame) == other.end();
+      if (!is_between || edge == edges_.end() || edge->second.rival.empty()) continue;
+      return "frame " + frame + " by namespaces " + edge->second.source.name_space + " and " +
+             edge->second.rival;
+    }
+  }
+  return std::nullopt;
 }
 
 std::vector<double> TransformTree::times() const {

@@ -19,6 +19,13 @@ void append(double time, const Pose& pose, Trajectory& trajectory);
 /// Orders poses by time. Of several poses of one time, the first one stays.
 void sort_by_time(Trajectory& trajectory);
 
+/// Where transforms come from. Robots in one log may name their frames alike, each with transforms
+/// below a namespace of its own.
+struct TransformSource {
+  std::string name_space;    ///< "/robot1" of "/robot1/tf", "" of "/tf"
+  std::size_t nearness = 0;  ///< to the clouds; of a frame, those of the nearest namespace count
+};
+
 /// Each frame has one parent. An edge is static, or a trajectory that is interpolated.
 class TransformTree {
  public:
@@ -31,7 +38,7 @@ class TransformTree {
 
   /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
   /// that gives a frame a second parent is left out and counted.
-  void add(const StampedPose& pose, bool is_static);
+  void add(const StampedPose& pose, bool is_static, const TransformSource& source = {});
   std::size_t left_out() const { return left_out_; }
 
   /// Orders the poses of each edge by time, for the members below.
@@ -51,6 +58,9 @@ class TransformTree {
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
   /// if a moving edge on the way has no pose at that time.
   std::optional<Pose> find(const std::string& target, const std::string& source, double time) const;
+  /// A frame between both, and two namespaces that are equally near and place it differently: which
+  /// of them find() takes is chance.
+  std::optional<std::string> conflict(const std::string& target, const std::string& source) const;
   /// Times of all moving transforms, s, strictly increasing.
   std::vector<double> times() const;
   /// Names of all frames that have a parent.
@@ -61,6 +71,8 @@ class TransformTree {
     std::string parent;
     bool is_static = false;
     Trajectory poses;  ///< one pose without time if static
+    TransformSource source;
+    std::string rival;  ///< another namespace, as near, whose transforms of this frame differ
   };
   /// A frame above another one, and the transform to it.
   struct Step {
