@@ -198,6 +198,14 @@ TEST_CASE("PCD: ascii, with a field to skip and a viewpoint") {
   CHECK(image.isApprox(Eigen::Vector3d(0.0, 2.0, 3.0)));
 }
 
+TEST_CASE("PCD: POINTS counts if WIDTH is 0") {
+  const PointFile file = read("a.pcd",
+                              "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 0\nHEIGHT 1\nPOINTS 2\n"
+                              "DATA ascii\n1 2 3\n4 5 6\n");
+  REQUIRE(file.positions.size() == 2);
+  CHECK(file.positions[1] == Eigen::Vector3d(4.0, 5.0, 6.0));
+}
+
 TEST_CASE("PCD: binary and compressed files hold equal points") {
   const std::string header =
       "VERSION 0.7\nFIELDS x _ y z timestamp\nSIZE 4 1 4 4 8\nTYPE F U F F F\nCOUNT 1 3 1 1 1\n"

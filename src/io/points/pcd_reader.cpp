@@ -173,8 +173,9 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
   if (!header.has_width && !header.has_points) {
     reader.fail_on_line("expected WIDTH or POINTS before DATA");
   }
-  if (!header.has_width) return;
   const std::uint64_t product = header.width * header.height;
+  // Some programs write POINTS alone, others also WIDTH 0.
+  if (header.has_points && product == 0) return;
   const bool overflows = header.height != 0 && product / header.height != header.width;
   if (overflows || (header.has_points && header.points != product)) {
     reader.fail_on_line("expected POINTS to be WIDTH * HEIGHT");
