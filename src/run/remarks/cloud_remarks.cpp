@@ -245,11 +245,7 @@ std::optional<std::string> remark_on_tilt(const Recording& recording, const Scan
     if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
   }
   const auto up = common_normal(recording, range);
-  if (!up) {
-    return "no ground in sight below the sensor, so that height and tilt are not known; if it is "
-           "tilted by more than 45 deg: --mounting-pitch, --mounting-roll; if clouds are in the "
-           "frame of a body: --sensor-origin";
-  }
+  if (!up) return std::nullopt;  // as in a lift
   const auto degrees = [](double radians) {
     return std::to_string(std::lround(180.0 / M_PI * radians));
   };
