@@ -93,8 +93,9 @@ void list_scans(RecordingContents& r) {
                             " and " + file.filename().string());
   }
 
-  const bool is_usual = r.options.bin_layout.columns == 4 && !r.options.bin_layout.is_double;
-  if (r.format == ScanFormat::kBin && is_usual) check_bin_content(files.front());
+  if (r.format == ScanFormat::kBin && is_usual(r.options.bin_layout)) {
+    check_bin_content(files.front());
+  }
   for (const fs::path& file : files) {
     r.scans.emplace_back();
     r.scans.back().file = file;
@@ -269,6 +270,26 @@ void warn_of_lost_scans(RecordingContents& r) {
                        text::to_text(std::round(longest / period)) + " times the usual one");
 }
 
+/// Leaves out scans whose files are too short for their points.
+void leave_out_broken(RecordingContents& r, const ScanReader& reader) {
+  std::string first;
+  const auto is_broken = [&](const ScanEntry& scan) {
+    try {
+      reader.point_count(scan);
+      return false;
+    } catch (const IoError& error) {
+      if (first.empty()) first = error.what();
+      return true;
+    }
+  };
+  const std::size_t all = r.scans.size();
+  r.scans.erase(std::remove_if(r.scans.begin(), r.scans.end(), is_broken), r.scans.end());
+  if (first.empty()) return;
+  if (r.scans.empty()) throw IoError(first);
+  r.warnings.push_back(std::to_string(all - r.scans.size()) + " of " + std::to_string(all) +
+                       " scan files are broken and left out: " + first);
+}
+
 /// Finds the format, and takes scans, times and poses.
 std::unique_ptr<ScanReader> open_scans(RecordingContents& r) {
   const auto tables = is_folder(r.folder) ? nuscenes_tables(r.folder) : std::nullopt;
@@ -317,6 +338,7 @@ OpenedRecording open_recording(const fs::path& path, const RecordingOptions& opt
   r.folder = path;
   r.options = options;
   std::unique_ptr<ScanReader> reader = open_scans(r);
+  if (options.accept_missing) leave_out_broken(r, *reader);
   find_columns(r, *reader);
   refuse_idle(options, r.format, r.columns);
   find_sensors(r);

@@ -39,9 +39,9 @@ class BinReader final : public ScanReader {
     points.ring.clear();
     points.time.clear();
     points.sensor.clear();
-    const bool is_usual = layout_.columns == 4 && !layout_.is_double;
-    is_usual ? read_scan(scan.file, points.xyzi)
-             : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
+    is_usual(layout_)
+        ? read_scan(scan.file, points.xyzi)
+        : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
     transform(T_target_file, points);
   }
   std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {

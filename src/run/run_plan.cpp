@@ -14,6 +14,7 @@
 #include "io/fingerprint.hpp"
 #include "io/points/finite_points.hpp"
 #include "recorded_scans.hpp"
+#include "remarks/odd_scans.hpp"
 #include "write_grid.hpp"
 
 namespace dynains::run {
@@ -73,8 +74,8 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
 
 /// So that a broken file or pose is noticed before anything is written.
 void check_scans(const Recording& sequence, const ScanRange& range) {
+  count_points(sequence, range);
   for (std::size_t i = range.first; i <= range.last; ++i) {
-    sequence.point_count(i);
     naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
   }
 }

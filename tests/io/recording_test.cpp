@@ -491,14 +491,45 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   }
   write_text(file, alternating);
   CHECK(Recording(folder.path()).read_scan(0).size() == 600);
+  // As of HeLiPR: float32 x y z intensity, uint32 time, three uint16.
+  std::string mixed;
+  const std::string floats = raw_scan<float>(4, 320);
+  for (std::size_t i = 0; i < 320; ++i) mixed += floats.substr(16 * i, 16) + "0123456789";
+  for (const std::size_t points : {std::size_t{320}, std::size_t{319}}) {
+    write_text(file, mixed.substr(0, 26 * points));
+    CHECK_THAT(error_of(folder.path()), ContainsSubstring("--bin-columns 4:26 reads it"));
+    RecordingOptions options;
+    options.bin_layout = parse_bin_layout("4:26");
+    const RecordedScan scan = Recording(folder.path(), options).read_scan(0);
+    REQUIRE(scan.size() == points);
+    CHECK(scan.xyzi[4 * 101] == 5.05F);
+    CHECK(scan.xyzi[4 * 101 + 3] == 7.0F);
+  }
   write_text(file, raw_scan<float>(5, 21));
   CHECK_THAT(message_of<IoError>([&] { Recording(folder.path()).point_count(0); }),
              ContainsSubstring("truncated at byte 420: expected a multiple of 16 bytes") &&
                  ContainsSubstring("21 points of 5 columns of float32 by --bin-columns 5"));
-  for (const char* wrong : {"", "d", "2", "65", "4.5", "4f"}) {
+  for (const char* wrong : {"", "d", "2", "65", "4.5", "4f", "4:15", "4:"}) {
     CHECK_THAT(message_of<ConfigError>([&] { parse_bin_layout(wrong); }),
                ContainsSubstring(": expected 3 to 64"));
   }
+}
+
+TEST_CASE("Files of scans that are cut off are left out on demand") {
+  const TemporaryFolder folder;
+  for (const char* name : {"1.pcd", "2.pcd", "3.pcd"}) {
+    write_text(folder / name, pcd({-0.5, 0, 0}, std::string("10") + name[0] + " 0 0 1 0 0 0"));
+  }
+  fs::resize_file(folder / "2.pcd", fs::file_size(folder / "2.pcd") - 90);
+  CHECK_THAT(error_of(folder.path()), ContainsSubstring("2.pcd"));
+  RecordingOptions options;
+  options.accept_missing = true;
+  const Recording recording(folder.path(), options);
+  REQUIRE(recording.size() == 2);
+  CHECK(recording.T_world_sensor(1).translation().x() == 103.0);
+  CHECK_THAT(
+      recording.warnings().at(0),
+      StartsWith("1 of 3 scan files are broken and left out: ") && ContainsSubstring("2.pcd"));
 }
 
 TEST_CASE("Points in the boxes of the own vehicle count as beams without a return") {

@@ -32,9 +32,10 @@ constexpr std::array<const char*, 3> value_names(PointFrame) { return {"auto", "
 struct BinLayout {
   int columns = 4;         ///< values of a point, [3, 64]
   bool is_double = false;  ///< float64 instead of float32
+  int bytes = 0;           ///< of a point, if others follow its columns; 0: those of the columns
 };
 
-/// "4" for columns of float32, "4d" for float64. Throws ConfigError.
+/// "4" for columns of float32, "4d" for float64, "4:26" for points of 26 bytes. Throws ConfigError.
 BinLayout parse_bin_layout(const std::string& text);
 
 /// "x y z x y z": two opposite corners of a box, m; further boxes follow. Blanks, commas and
@@ -76,7 +77,7 @@ struct RecordingOptions {
   /// measured until then, and de-skewed by the new poses unless `is_compensated`.
   bool without_poses = false;
   bool is_compensated = false;  ///< points have times, but the recorder has de-skewed them
-  bool accept_missing = false;  ///< for logs: whether parts may be missing
+  bool accept_missing = false;  ///< parts of a log may be missing, files of scans cut off
   std::vector<std::filesystem::path> sources;  ///< files that these options were read from
 };
 

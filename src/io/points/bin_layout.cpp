@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -32,14 +33,16 @@ double value_at(const std::vector<std::uint8_t>& bytes, const BinLayout& layout,
   return static_cast<double>(value);
 }
 
-/// Ratio of points whose coordinates are as those of a sensor, in m, cm or mm.
+/// Ratio of points whose coordinates, and the next column of mixed ones, are as those of a sensor,
+/// in m, cm or mm.
 double plausible_share(const std::vector<std::uint8_t>& bytes, const BinLayout& layout) {
+  const int columns = layout.bytes > 0 ? layout.columns : 3;
   const std::size_t count = bytes.size() / point_size(layout);
   std::size_t plausible = 0;
   for (std::size_t i = 0; i < count; ++i) {
     bool is_plausible = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double size = std::abs(value_at(bytes, layout, i, axis));
+    for (int axis = 0; axis < columns; ++axis) {
+      const double size = std::abs(value_at(bytes, layout, i, static_cast<std::size_t>(axis)));
       is_plausible = is_plausible && !(size > 1e6) && !(size > 0.0 && size < 1e-6);
     }
     plausible += is_plausible ? 1 : 0;
@@ -74,23 +77,54 @@ double spread_of_columns(const std::vector<std::uint8_t>& bytes, const BinLayout
 }
 
 std::string option_of(const BinLayout& layout) {
-  return "--bin-columns " + std::to_string(layout.columns) + (layout.is_double ? "d" : "");
+  return "--bin-columns " + std::to_string(layout.columns) + (layout.is_double ? "d" : "") +
+         (layout.bytes > 0 ? ':' + std::to_string(layout.bytes) : "");
+}
+
+/// Points of float32 before other bytes, if nearly all of them are plausible as such. No other size
+/// of a point, unless a multiple of 4, puts the bytes of floats into place.
+std::optional<BinLayout> mixed_layout(const std::vector<std::uint8_t>& bytes, std::uint64_t size) {
+  constexpr int kMaxBytes = 64;
+  for (const int columns : {4, 3}) {
+    for (int of_point = 4 * columns + 1; of_point < kMaxBytes; ++of_point) {
+      const BinLayout layout{columns, false, of_point};
+      const bool fits = of_point % 4 != 0 && size % point_size(layout) == 0;
+      if (fits && plausible_share(bytes, layout) > 0.9) return layout;
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
 BinLayout parse_bin_layout(const std::string& text) {
-  const bool is_double = !text.empty() && text.back() == 'd';
-  const std::string_view digits(text.data(), text.size() - (is_double ? 1 : 0));
-  const auto columns = text::parse_number(digits);
-  if (columns && *columns >= 3.0 && *columns <= 64.0 && *columns == std::floor(*columns)) {
-    return {static_cast<int>(*columns), is_double};
-  }
-  throw ConfigError("--bin-columns " + text + ": expected 3 to 64, with a d for float64");
+  const std::size_t colon = text.find(':');
+  std::string_view digits = std::string_view(text).substr(0, colon);
+  BinLayout layout;
+  layout.is_double = !digits.empty() && digits.back() == 'd';
+  if (layout.is_double) digits.remove_suffix(1);
+  const auto read = [](std::string_view token, std::size_t least, std::size_t most, int& value) {
+    const auto number = text::parse_number(token);
+    const bool is_valid = number && *number >= static_cast<double>(least) &&
+                          *number <= static_cast<double>(most) && *number == std::floor(*number);
+    if (is_valid) value = static_cast<int>(*number);
+    return is_valid;
+  };
+  const bool has_columns = read(digits, 3, 64, layout.columns);
+  const bool has_bytes =
+      colon == std::string::npos ||
+      read(std::string_view(text).substr(colon + 1), point_size(layout), 1024, layout.bytes);
+  if (has_columns && has_bytes) return layout;
+  throw ConfigError("--bin-columns " + text +
+                    ": expected 3 to 64, with a d for float64, and :BYTES if other bytes follow");
 }
 
 std::string to_text(const BinLayout& layout) {
   const std::string type = layout.is_double ? "float64" : "float32";
+  if (layout.bytes > 0) {
+    return std::to_string(layout.bytes) + " bytes that begin with " +
+           to_text(BinLayout{layout.columns, layout.is_double});
+  }
   if (layout.columns == 3) return type + " x y z";
   if (layout.columns == 4) return type + " x y z intensity";
   return std::to_string(layout.columns) + " columns of " + type;
@@ -132,15 +166,20 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
 
 void check_bin_content(const std::filesystem::path& file) {
   const BinLayout usual;
-  const BinLayout doubles{4, true};
   RawFile raw(file);
   // A multiple of the size of every point.
   const auto bytes = raw.read(0, std::min<std::uint64_t>(raw.size(), 240 * 1024), "points");
   if (bytes.size() < 100 * point_size(usual)) return;
-  if (plausible_share(bytes, usual) < 0.9 && plausible_share(bytes, {3, true}) > 0.9) {
-    fail(file, "does not hold float32 x y z intensity, but float64: the first number is " +
-                   std::to_string(value_at(bytes, doubles, 0, 0)) +
-                   "; --bin-columns 3d (x y z) or 4d (x y z intensity) reads it");
+  if (plausible_share(bytes, usual) < 0.9) {
+    const std::string text = "does not hold float32 x y z intensity, but ";
+    if (plausible_share(bytes, {3, true}) > 0.9) {
+      fail(file, text + "float64: the first number is " +
+                     std::to_string(value_at(bytes, {3, true}, 0, 0)) +
+                     "; --bin-columns 3d (x y z) or 4d (x y z intensity) reads it");
+    }
+    if (const auto mixed = mixed_layout(bytes, raw.size())) {
+      fail(file, text + "points of " + to_text(*mixed) + ": " + option_of(*mixed) + " reads it");
+    }
   }
   // Spreads of few values differ by chance.
   const std::size_t values = bytes.size() / value_size(usual);

@@ -15,7 +15,12 @@ inline std::size_t value_size(const BinLayout& layout) {
   return layout.is_double ? sizeof(double) : sizeof(float);
 }
 inline std::size_t point_size(const BinLayout& layout) {
-  return static_cast<std::size_t>(layout.columns) * value_size(layout);
+  const std::size_t columns = static_cast<std::size_t>(layout.columns) * value_size(layout);
+  return layout.bytes > 0 ? static_cast<std::size_t>(layout.bytes) : columns;
+}
+/// Whether scans are float32 x y z intensity.
+inline bool is_usual(const BinLayout& layout) {
+  return layout.columns == 4 && !layout.is_double && layout.bytes == 0;
 }
 
 /// "float32 x y z intensity", "5 columns of float32".
@@ -32,8 +37,9 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
                      std::vector<float>& xyzi, std::vector<std::uint16_t>* ring = nullptr);
 
 /// Throws IoError if the content of the file does not look like float32 x y z intensity, and for
-/// another layout: numbers are as points have them only as float64, or values of one column are
-/// clearly more alike with another number of columns. The order of points does not matter.
+/// another layout: numbers are as points have them only as float64 or in points of another size, or
+/// values of one column are clearly more alike with another number of columns. The order of points
+/// does not matter.
 void check_bin_content(const std::filesystem::path& file);
 
 }  // namespace dynains

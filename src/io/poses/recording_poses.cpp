@@ -102,7 +102,12 @@ void read_viewpoints(RecordingContents& r) {
   Trajectory viewpoints;
   viewpoints.order = QuaternionOrder::kWxyz;
   for (const ScanEntry& scan : r.scans) {
-    viewpoints.poses.push_back(read_point_file_header(scan.file).viewpoint);
+    viewpoints.poses.push_back(Pose::Identity());
+    try {
+      viewpoints.poses.back() = read_point_file_header(scan.file).viewpoint;
+    } catch (const IoError&) {
+      if (!r.options.accept_missing) throw;
+    }
     r.has_viewpoints = r.has_viewpoints || !is_identity(viewpoints.poses.back());
   }
   if (r.has_viewpoints) r.trajectory = std::move(viewpoints);

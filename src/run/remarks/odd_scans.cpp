@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "dynains/errors.hpp"
 #include "dynains/median.hpp"
 #include "poses/given_motion.hpp"
 #include "poses/in_two_threads.hpp"
@@ -102,6 +103,22 @@ std::vector<std::size_t> misplaced_scans(const Recording& recording) {
 }
 
 }  // namespace
+
+std::vector<ScanCounts> count_points(const Recording& recording, const ScanRange& range) {
+  std::vector<ScanCounts> counts;
+  std::string first;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    try {
+      counts.push_back({recording.point_count(i), 0});
+    } catch (const IoError& error) {
+      if (first.empty()) first = error.what();
+    }
+  }
+  const std::size_t others = range.size() - counts.size() - (first.empty() ? 0 : 1);
+  if (others > 0) first += "; " + std::to_string(others) + " more scan files are broken";
+  if (!first.empty()) throw IoError(first + "; --accept-missing leaves them out");
+  return counts;
+}
 
 std::vector<std::size_t> thin_scans(const std::vector<ScanCounts>& counts) {
   constexpr std::size_t kBefore = 9;  // scans that are not thin

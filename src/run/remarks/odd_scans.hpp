@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "run/scan_range.hpp"
 
 namespace dynains::run {
 
@@ -19,6 +20,10 @@ struct ScanCounts {
     return points == 0 ? 0.0 : static_cast<double>(moving) / static_cast<double>(points);
   }
 };
+
+/// The numbers of points of the scans in `range`, from the sizes of their files, which shows those
+/// that were cut off. Throws IoError of the first, with the number of the others.
+std::vector<ScanCounts> count_points(const Recording& recording, const ScanRange& range);
 
 /// Scans with less than 60 % of the points of the scans before, less the factor by which these
 /// vary: the pattern of some sensors does not repeat, and near obstacles take many points.

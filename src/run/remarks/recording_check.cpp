@@ -9,7 +9,6 @@
 
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
-#include "dynains/errors.hpp"
 #include "dynains/io/extrinsic.hpp"
 #include "io/text.hpp"
 #include "odd_scans.hpp"
@@ -95,25 +94,6 @@ void add_findings_in_scans(const Recording& recording, const Diagnosis& d,
   if (remark) text << "note: " << *remark << '\n';
 }
 
-/// The diagnosis reads a sample; this looks at every file, for scans that were cut off. Throws
-/// IoError of the first and counts the others.
-std::vector<ScanCounts> check_files(const Recording& recording) {
-  std::vector<ScanCounts> counts;
-  std::string first;
-  std::size_t broken = 0;
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    try {
-      counts.push_back({recording.point_count(i), 0});
-    } catch (const IoError& error) {
-      if (broken == 0) first = error.what();
-      ++broken;
-    }
-  }
-  if (broken == 0) return counts;
-  if (broken > 1) first += "; " + std::to_string(broken - 1) + " more scan files are broken";
-  throw IoError(first);
-}
-
 std::string describe(const Recording& recording, const Diagnosis& d,
                      const std::vector<ScanCounts>& counts) {
   std::ostringstream text;
@@ -151,7 +131,8 @@ std::string describe(const Recording& recording, const Diagnosis& d,
 }  // namespace
 
 RecordingCheck check_recording(const Recording& recording) {
-  const std::vector<ScanCounts> counts = check_files(recording);
+  std::vector<ScanCounts> counts;
+  if (recording.size() > 0) counts = count_points(recording, whole_of(recording));
   RecordingCheck check;
   check.diagnosis = diagnose(recording);
   const bool sound = check.diagnosis.sound();

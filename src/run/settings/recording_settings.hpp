@@ -81,15 +81,17 @@ void RecordingSettings::visit(Self& self, Visitor&& visitor) {
                         "times from 0 to 1 in scans of 0.1 s [auto: by their span]"});
   visitor(TextParameter{"point_units", o.point_unit, &read_length_unit, "m|cm|mm",
                         "unit of the coordinates of points [m]"});
-  visitor(TextParameter{"bin_columns", o.bin_layout, &parse_bin_layout, "N or Nd",
+  visitor(TextParameter{"bin_columns", o.bin_layout, &parse_bin_layout, "N[d][:BYTES]",
                         "columns of .bin scans: x y z, intensity, others; float32, or float64 by a "
-                        "d, such as 3d [4]"});
+                        "d, such as 3d; 4:26 if points have 26 bytes [4]"});
   visitor(TextParameter{"self_box", o.self_boxes, &parse_self_boxes, "\"X Y Z X Y Z\"",
                         "box around a part of the own vehicle, whose points are left out: two "
                         "opposite corners in m, frame of the lidar; further boxes follow in the "
                         "same text"});
-  visitor(Parameter{"accept_missing", o.accept_missing, Bounds(), "",
-                    "read a log although parts of it are missing"});
+  visitor(
+      Parameter{"accept_missing", o.accept_missing, Bounds(), "",
+                "read a log although parts of it are missing, and leave out files of scans that "
+                "are cut off"});
   visitor(TextParameter{
       "extrinsic", c.T_body_sensor, &read_extrinsic, "POSE",
       "pose of the lidar in the body whose poses are given (IMU, base_link, antenna): \"x y z qx "
