@@ -1,32 +1,10 @@
 #include "cell_surfaces.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 namespace dynains {
-namespace {
-
-/// Whether a plane is the trace of one beam: on persons, in foliage or on a rough wall its points
-/// lie in a plane that contains the beam, and in a map they are no longer along it than its noise.
-/// Such a plane moves with the sensor. One scan needs distant ground, a map has seen it nearer.
-bool is_trace_of_beam(const Eigen::Vector3d& beam, const Eigen::Vector3d& normal,
-                      const Eigen::Matrix3d& covariance, bool in_map) {
-  constexpr double kDistance = 0.5;                // m, of the plane from the sensor, in one scan
-  constexpr double kEdgeOn = 0.04, kNearly = 0.1;  // sines of the angle between beam and plane
-  constexpr double kGrazing = 0.3;                 // the same; less steep planes are long
-  constexpr double kMinLength = 0.2;               // m, standard deviation along the beam
-  const double across = normal.dot(beam);
-  const double sine = std::abs(across) / beam.norm();
-  if (!in_map) return std::abs(across) < kDistance && sine < kEdgeOn;
-  if (sine < kNearly || sine >= kGrazing) return sine < kNearly;
-  const Eigen::Vector3d along = (beam - across * normal).normalized();
-  return along.dot(covariance * along) < kMinLength * kMinLength;
-}
-
-}  // namespace
-
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
   if (!adds(taken_, voxel_at(point, scale_ * kApart))) return;
@@ -41,9 +19,7 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point) {
     }
     Cell& cell = at.cells[number];
     const Eigen::Vector3d relative = point - cell.origin;
-    cell.count += 1.0;
-    cell.sum += relative;
-    cell.squares += relative * relative.transpose();
+    cell.sums.add(relative.x(), relative.y(), relative.z(), 1.0);
     cell.is_fitted = false;
   }
 }
@@ -80,10 +56,13 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
   constexpr double kUpright = 0.5;  // most sine of the tilt of what is upright
   CellSurface surface;
-  if (cell.count < kMin) return surface;
-  const Eigen::Vector3d mean = cell.sum / cell.count;
+  const detail::PlaneMoments& sums = cell.sums;
+  if (sums.count < kMin) return surface;
+  const Eigen::Vector3d mean = Eigen::Vector3d(sums.x, sums.y, sums.z) / sums.count;
   surface.mean = cell.origin + mean;
-  const Eigen::Matrix3d covariance = cell.squares / cell.count - mean * mean.transpose();
+  Eigen::Matrix3d covariance;
+  covariance << sums.xx, sums.xy, sums.xz, sums.xy, sums.yy, sums.yz, sums.xz, sums.yz, sums.zz;
+  covariance = (covariance / sums.count - mean * mean.transpose()).eval();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   const Eigen::Vector3d extent = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const Eigen::Matrix3d& axes = solver.eigenvectors();
@@ -94,7 +73,9 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
-    if (is_trace_of_beam(surface.mean - sensor_, axes.col(0), covariance, with_clutter_))
+    const Eigen::Vector3d beam = surface.mean - sensor_;
+    if (detail::is_trace_of_beam({beam[0], beam[1], beam[2]}, {axes(0, 0), axes(1, 0), axes(2, 0)},
+                                 sums))
       return surface;
     surface.direction_count = 1;
     surface.is_upright = std::abs(axes(2, 0)) < kUpright;
@@ -103,34 +84,6 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     surface.variance = extent[1] * extent[1];
   }
   return surface;
-}
-
-Pose stepped(const Pose& T, const Vector6& step, double lever) {
-  const Eigen::Vector3d turn = step.tail<3>() / lever;
-  Pose result = T;
-  result.translation() += step.head<3>();
-  result.linear() =
-      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix() * T.linear();
-  return orthonormalized(result);
-}
-
-NormalEquations::Solution NormalEquations::solve() const {
-  // The singular vectors of a symmetric matrix are its eigenvectors. Eigen's eigenvalue solver is
-  // not used, because it aligns its matrices.
-  const Eigen::JacobiSVD<Matrix6> solver(hessian_, Eigen::ComputeFullU);
-  Solution solution;
-  for (Eigen::Index k = 0; k < 6; ++k) {
-    const Vector6 direction = solver.matrixU().col(k);
-    const double value = std::max(solver.singularValues()[k], 1e-6);
-    const Eigen::Vector3d way = direction.head<3>();
-    solution.covariance += way * way.transpose() / value;
-    if (value < least_) {
-      ++solution.free_directions;
-    } else {
-      solution.step -= direction * (direction.dot(gradient_) / value);
-    }
-  }
-  return solution;
 }
 
 }  // namespace dynains

@@ -1,4 +1,4 @@
-// Planes, upright poles and clutter in the cells of grids, and the fit of points to them.
+// Planes, upright poles and clutter in the cells of grids.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -7,14 +7,11 @@
 #include <vector>
 
 #include "dynains/pose.hpp"
+#include "dynains/sensor/plane_fit.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 #include "given_motion.hpp"
 
 namespace dynains {
-
-// Not aligned, since the alignment of the types of Eigen depends on flags.
-using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
-using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 
 /// Edges of the cells (m) by level, from coarse to fine.
 inline constexpr std::size_t kCellLevels = 3;
@@ -80,9 +77,7 @@ class SurfaceGrid {
   struct Cell {
     VoxelKey key;
     Eigen::Vector3d origin;  // m; sums are relative to it
-    double count = 0.0;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    detail::PlaneMoments sums = {};
     mutable bool is_fitted = false;
     mutable CellSurface surface = {};
   };
@@ -98,54 +93,6 @@ class SurfaceGrid {
   Eigen::Vector3d sensor_ = Eigen::Vector3d::Zero();  // m, at the newest scan
   std::array<Level, kCellLevels> levels_;
   VoxelHashTable<> taken_;
-};
-
-/// Rotates `T` by a rotation vector (rad times `lever`) about its own origin, along the axes of the
-/// outer frame, and translates it (m).
-Pose stepped(const Pose& T, const Vector6& step, double lever = kLever);
-
-/// Normal equations of a step that moves points to surfaces: translation (m) and rotation (rad
-/// times `lever`), as of stepped().
-class NormalEquations {
- public:
-  explicit NormalEquations(const SurfaceGrid& grid)
-      : least_(grid.min_determined()), lever_(grid.lever()) {}
-
-  /// Adds the point `p` (m) of a scan at the pose `T`. `scale`: m, distance at which its weight is
-  /// a fourth. Returns the weight (Geman-McClure), (0, 1].
-  double add(const Pose& T, const Eigen::Vector3d& p, const CellSurface& surface, double scale) {
-    const Eigen::Vector3d arm = T.linear() * p;
-    const Eigen::Vector3d point = arm + T.translation();
-    const double squared = surface.squared_distance(point) + surface.variance;
-    const double root = 1.0 / (1.0 + squared / (scale * scale));
-    const double weight = root * root;
-    for (std::size_t k = 0; k < surface.direction_count; ++k) {
-      const Eigen::Vector3d& n = surface.directions[k];
-      Vector6 J;
-      J << n, arm.cross(n) / lever_;
-      add(J, n.dot(point - surface.mean), weight);
-    }
-    return weight;
-  }
-  /// Adds a point that is `distance` (m) from its place, with the derivative of this distance.
-  void add(const Vector6& jacobian, double distance, double weight) {
-    for (Eigen::Index i = 0; i < 6; ++i) hessian_.col(i) += (weight * jacobian[i]) * jacobian;
-    gradient_ += (weight * distance) * jacobian;
-  }
-
-  struct Solution {
-    Vector6 step = Vector6::Zero();  ///< 0 along directions that too little determines
-    int free_directions = 0;         ///< their number
-    /// Covariance of the translation (m^2), if the distance of each point has a deviation of 1 m.
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  };
-  Solution solve() const;
-
- private:
-  Matrix6 hessian_ = Matrix6::Zero();
-  Vector6 gradient_ = Vector6::Zero();
-  double least_;
-  double lever_;
 };
 
 }  // namespace dynains

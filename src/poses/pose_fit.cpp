@@ -1,6 +1,5 @@
 #include "pose_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -178,25 +177,31 @@ Pose refine(const std::vector<BothMotions>& motions, Pose T_body_sensor) {
   constexpr double kPrior = 0.02;  // m per m of the lever arm
   constexpr double kStep = 1e-6;
   for (int k = 0; k < 25; ++k) {
-    Matrix6 H = 1e-6 * Matrix6::Identity();
-    H.diagonal().head<3>().array() += kPrior * kPrior;
-    Vector6 g = Vector6::Zero();
-    g.head<3>() = kPrior * kPrior * T_body_sensor.translation();
+    detail::NormalEquations<6> equations;
+    for (std::size_t i = 0; i < 3; ++i) {
+      equations.attract(i, -T_body_sensor(static_cast<int>(i), 3), kPrior * kPrior);
+      equations.attract(3 + i, 0.0, kPrior * kPrior);
+    }
     for (const BothMotions& m : motions) {
       const Vector6 r = residual(m.body, m.sensor, T_body_sensor);
       Matrix6 J;
-      for (Eigen::Index j = 0; j < 6; ++j) {
-        const Pose T = stepped(T_body_sensor, kStep * Vector6::Unit(j));
-        J.col(j) = (residual(m.body, m.sensor, T) - r) / kStep;
+      for (std::size_t j = 0; j < 6; ++j) {
+        detail::PoseStep step = {};
+        step[j] = kStep;
+        J.col(static_cast<Eigen::Index>(j)) =
+            (residual(m.body, m.sensor, detail::moved(T_body_sensor, step)) - r) / kStep;
       }
       const double weight = 1.0 / (1.0 + r.squaredNorm() / (kScale * kScale));
-      H += weight * J.transpose() * J;
-      g += weight * J.transpose() * r;
+      for (Eigen::Index i = 0; i < 6; ++i) {
+        equations.add({J(i, 0), J(i, 1), J(i, 2), J(i, 3), J(i, 4), J(i, 5)}, r[i], weight);
+      }
     }
-    const Vector6 change = -Eigen::LDLT<Matrix6>(H).solve(g);
-    if (!change.allFinite()) break;
-    T_body_sensor = stepped(T_body_sensor, change);
-    if (change.norm() < 1e-7) break;
+    const detail::PoseStep step = equations.solve();
+    const Pose T_next = orthonormalized(detail::moved(T_body_sensor, step));
+    if (!T_next.matrix().allFinite()) break;
+    const double change = extent_of(T_body_sensor.inverse() * T_next);
+    T_body_sensor = T_next;
+    if (change < 1e-7) break;
   }
   return T_body_sensor;
 }
@@ -400,11 +405,12 @@ BodyMotion with_drift(const BodyMotion& body, const std::vector<RegisteredMotion
       turns[axis].push_back(r[static_cast<Eigen::Index>(3 + axis)] / scans(motion));
     }
   }
-  Vector6 drift = Vector6::Zero();
-  drift.tail<3>() << median(turns[0]), median(turns[1]), median(turns[2]);
+  detail::PoseStep drift = {};
+  for (std::size_t axis = 0; axis < 3; ++axis) drift[3 + axis] = median(turns[axis]) / kLever;
+  const Pose T_drift = detail::moved(Pose::Identity(), drift);
   return [=](const RegisteredMotion& motion) {
     auto T = body(motion);
-    if (T) *T = *T * stepped(Pose::Identity(), scans(motion) * drift);
+    if (T) *T = *T * detail::scaled_motion(T_drift, scans(motion));
     return T;
   };
 }

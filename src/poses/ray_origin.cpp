@@ -1,6 +1,5 @@
 #include "ray_origin.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
+#include "dynains/registration/normal_equations.hpp"
 #include "given_motion.hpp"
 #include "in_two_threads.hpp"
 #include "io/points/finite_points.hpp"
@@ -21,6 +21,7 @@ constexpr double kRadians = M_PI / 180.0;
 constexpr double kSharp = 0.02 * kRadians;  // rad, spread of the elevations of one beam
 
 using Points = std::vector<Eigen::Vector3d>;
+using RayEquations = detail::NormalEquations<5>;
 
 /// Beams that turn about an axis through their origin.
 struct Rays {
@@ -34,16 +35,15 @@ struct Rays {
     return std::asin(std::clamp(axis.dot(q) / q.norm(), -1.0, 1.0));
   }
   /// Derivative of the elevation with respect to the origin and the turns of the axis.
-  Eigen::Matrix<double, 5, 1> derivative(const Eigen::Vector3d& p) const {
+  RayEquations::Vector derivative(const Eigen::Vector3d& p) const {
     const Eigen::Vector3d q = p - origin;
     const double range = q.norm();
     const Eigen::Vector3d ray = q / range;
     const double sine = axis.dot(ray);
     const double cosine = std::sqrt(std::max(1e-6, 1.0 - sine * sine));
-    Eigen::Matrix<double, 5, 1> result;
-    result << (sine * ray - axis) / (range * cosine), side().dot(ray) / cosine,
-        front().dot(ray) / cosine;
-    return result;
+    const Eigen::Vector3d by_origin = (sine * ray - axis) / (range * cosine);
+    return {by_origin[0], by_origin[1], by_origin[2], side().dot(ray) / cosine,
+            front().dot(ray) / cosine};
   }
 };
 
@@ -112,25 +112,24 @@ Rays refine(const Points& points, Rays rays) {
   for (const double degrees : {0.1, 0.1, 0.05, 0.05, 0.03, 0.03}) {
     const std::vector<Neighbours> pairs = neighbours(points, rays);
     for (int k = 0; k < 2; ++k) {
-      Eigen::Matrix<double, 5, 5> hessian = Eigen::Matrix<double, 5, 5>::Zero();
-      Eigen::Matrix<double, 5, 1> gradient = Eigen::Matrix<double, 5, 1>::Zero();
+      RayEquations equations;
       for (const Neighbours& pair : pairs) {
         const double change = rays.elevation(pair.second) - rays.elevation(pair.first);
-        const Eigen::Matrix<double, 5, 1> J =
-            rays.derivative(pair.second) - rays.derivative(pair.first);
-        const double weight = weight_of(change, degrees * kRadians);
-        hessian += weight * J * J.transpose();
-        gradient += weight * change * J;
+        const RayEquations::Vector first = rays.derivative(pair.first);
+        RayEquations::Vector J = rays.derivative(pair.second);
+        for (std::size_t i = 0; i < J.size(); ++i) J[i] -= first[i];
+        equations.add(J, change, weight_of(change, degrees * kRadians));
       }
       // Keeps what the points do not determine.
       const double some = 1e-9 * static_cast<double>(pairs.size());
-      hessian.diagonal() += some * Eigen::Matrix<double, 5, 1>(1.0, 1.0, 1.0, 100.0, 100.0);
-      Eigen::Matrix<double, 5, 1> step = -hessian.ldlt().solve(gradient);
-      if (!step.allFinite()) return rays;
-      step *= std::min(1.0, kMaxStep / step.head<3>().norm());
+      for (std::size_t i = 0; i < 5; ++i) equations.attract(i, 0.0, some * (i < 3 ? 1.0 : 100.0));
+      const RayEquations::Vector step = equations.solve();
+      const Eigen::Vector3d way(step[0], step[1], step[2]);
+      const double ratio = std::min(1.0, kMaxStep / way.norm());
       const Eigen::Vector3d tilt = step[3] * rays.side() + step[4] * rays.front();
-      rays.origin += step.head<3>();
-      rays.axis = (rays.axis + tilt).normalized();
+      if (!way.allFinite() || !tilt.allFinite()) return rays;
+      rays.origin += ratio * way;
+      rays.axis = (rays.axis + ratio * tilt).normalized();
     }
   }
   return rays;

@@ -10,8 +10,13 @@
 #include "cell_surfaces.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/registration/normal_equations.hpp"
 
 namespace dynains {
+
+// Not aligned, since the alignment of the types of Eigen depends on flags.
+using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
+using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 
 /// One scan as a reference and as a source of a registration.
 class RegistrationScan {
@@ -48,8 +53,20 @@ struct KnownTranslation {
   Eigen::Vector3d direction;  ///< unit vector, frame of a
   double place;               ///< m, along direction
   double deviation;           ///< m
+};
 
-  void add_to(NormalEquations& equations, const Pose& T_a_b) const;
+/// Points `b` that meet the surfaces `a`, m.
+struct Overlap {
+  const SurfaceGrid* a;
+  const std::vector<Eigen::Vector3d>* b;
+};
+
+/// Gauss-Newton steps until they are short.
+struct FitStage {
+  std::size_t level;  ///< of the surfaces
+  double scale;       ///< m, see detail::robust_weight()
+  int max_steps;
+  std::size_t stride = 1;  ///< every `stride`-th point counts
 };
 
 struct Registration {
@@ -63,6 +80,10 @@ struct Registration {
   bool is_ambiguous = false;
   std::optional<KnownTranslation> way = {};  ///< as given
 };
+
+/// The motion near `T_a_b` by which the points of all overlaps, at least one, fit to the surfaces.
+Pose refined(const std::vector<Overlap>& overlaps, Pose T_a_b, const FitStage& by,
+             const std::optional<KnownTranslation>& way = {});
 
 /// Mean weight of those of the points `b` (m) that meet planes or poles of `a`, [0, 1].
 double fit_of(const SurfaceGrid& a, const std::vector<Eigen::Vector3d>& b, const Pose& T_a_b);

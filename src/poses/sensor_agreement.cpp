@@ -74,24 +74,11 @@ std::vector<Comparison> compare(const Recording& recording, std::size_t i,
 /// Motion of the sensor, in the frame of the clouds, by which its points fit to the surfaces of the
 /// others in all scans.
 Pose register_to_others(const std::vector<Comparison>& scans) {
-  struct Step {
-    std::size_t level;
-    double scale;  // m, of weights
-    int count;
-  };
+  std::vector<Overlap> overlaps;
+  for (const Comparison& scan : scans) overlaps.push_back({&scan.others, &scan.points});
   Pose T = Pose::Identity();
-  for (const Step& step : {Step{1, 0.2, 8}, Step{2, 0.1, 12}, Step{2, 0.05, 8}}) {
-    for (int k = 0; k < step.count; ++k) {
-      NormalEquations equations(scans.front().others);
-      for (const Comparison& scan : scans) {
-        for (const Eigen::Vector3d& p : scan.points) {
-          const CellSurface* const surface = scan.others.find(step.level, T * p);
-          if (surface == nullptr || surface->variance > 0.0) continue;
-          equations.add(T, p, *surface, step.scale);
-        }
-      }
-      T = stepped(T, equations.solve().step);
-    }
+  for (const FitStage& stage : {FitStage{1, 0.2, 8}, FitStage{2, 0.1, 12}, FitStage{2, 0.05, 8}}) {
+    T = refined(overlaps, T, stage);
   }
   return T;
 }

@@ -252,8 +252,8 @@ TEST_CASE("A plane that contains the beam through it is no surface") {
   const auto sign = GENERATE(1.0, -1.0);
   CHECK_FALSE(has_surface(10.5, 0.035 * sign));
   CHECK(has_surface(10.5, 0.045 * sign));
-  CHECK_FALSE(has_surface(20.5, 0.45 / 20.5 * sign));
-  CHECK(has_surface(20.5, 0.55 / 20.5 * sign));  // ground far away
+  CHECK_FALSE(has_surface(20.5, 0.035 * sign));
+  CHECK(has_surface(20.5, 0.045 * sign));
 }
 
 TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with few beams ahead") {

@@ -13,6 +13,7 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/registration/motion_stage.hpp"
+#include "dynains/registration/normal_equations.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 
 namespace dynains::detail {
@@ -76,138 +77,6 @@ class AlignmentPoints {
   std::vector<std::uint32_t> instance_of_;  // by point
   std::vector<Eigen::AlignedBox3d> boxes_;  // by instance, around its selected points
 };
-
-/// A vector and a square matrix. Plain loops, because Eigen's results depend on the instruction
-/// set.
-template <std::size_t kSize>
-using VectorOf = std::array<double, kSize>;
-template <std::size_t kSize>
-using MatrixOf = std::array<VectorOf<kSize>, kSize>;
-
-/// Solution x of m x = right for a positive definite matrix, by Cholesky decomposition (L D L^T).
-/// Only the lower triangle of `m` is read.
-template <std::size_t kSize>
-VectorOf<kSize> solve_symmetric(MatrixOf<kSize> m, VectorOf<kSize> right) {
-  for (std::size_t j = 0; j < kSize; ++j) {
-    for (std::size_t i = j + 1; i < kSize; ++i) {
-      const double factor = m[i][j] / m[j][j];
-      for (std::size_t k = j + 1; k <= i; ++k) m[i][k] -= factor * m[k][j];
-      right[i] -= factor * right[j];
-    }
-  }
-  for (std::size_t i = kSize; i-- > 0;) {
-    for (std::size_t k = i + 1; k < kSize; ++k) right[i] -= m[k][i] * right[k];
-    right[i] /= m[i][i];
-  }
-  return right;
-}
-
-/// Weighted squares of distances (m) that are linear in the unknowns.
-template <std::size_t kSize>
-class NormalEquations {
- public:
-  using Vector = VectorOf<kSize>;
-  using Matrix = MatrixOf<kSize>;
-
-  /// Adds one distance (m) with its derivatives and its weight.
-  void add(const Vector& derivatives, double distance, double weight) {
-    for (std::size_t i = 0; i < kSize; ++i) {
-      const double weighted = weight * derivatives[i];
-      for (std::size_t j = 0; j <= i; ++j) matrix_[i][j] += weighted * derivatives[j];
-      right_[i] -= weighted * distance;
-    }
-    squares_ += weight * distance * distance;
-    weights_ += weight;
-  }
-
-  /// Adds the squared deviation of unknown number `i` from a value. It does not count in change()
-  /// and variance().
-  void attract(std::size_t i, double value, double weight) {
-    attraction_[i] = weight;
-    right_[i] += weight * value;
-  }
-
-  NormalEquations& operator-=(const NormalEquations& other) {
-    for (std::size_t i = 0; i < kSize; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) matrix_[i][j] -= other.matrix_[i][j];
-      right_[i] -= other.right_[i];
-    }
-    squares_ -= other.squares_;
-    weights_ -= other.weights_;
-    return *this;
-  }
-
-  /// Sums of the products of derivatives (lower triangle), and the right side.
-  const Matrix& matrix() const { return matrix_; }
-  const Vector& right() const { return right_; }
-
-  /// Mean square of the distances, m^2.
-  double variance() const { return squares_ / std::max(weights_, kMinWeight); }
-
-  /// Root mean square of the change of the distances by a step of the first unknowns, m.
-  template <std::size_t kSteps>
-  double change(const VectorOf<kSteps>& step) const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < kSteps; ++i) {
-      for (std::size_t j = 0; j < i; ++j) sum += 2.0 * matrix_[i][j] * step[i] * step[j];
-      sum += matrix_[i][i] * step[i] * step[i];
-    }
-    return std::sqrt(std::max(sum, 0.0) / std::max(weights_, kMinWeight));
-  }
-
-  /// Solution. Each unknown must have an attraction.
-  Vector solve() const { return solve_symmetric<kSize>(with_attractions(), right_); }
-
-  /// Inverse of the matrix of the equations, with attractions.
-  Matrix inverse() const {
-    const Matrix all = with_attractions();
-    Matrix inverse = {};
-    for (std::size_t i = 0; i < kSize; ++i) {
-      inverse[i][i] = 1.0;
-      inverse[i] = solve_symmetric<kSize>(all, inverse[i]);
-    }
-    return inverse;
-  }
-
- private:
-  static constexpr double kMinWeight = 1e-12;  // against division by zero
-
-  Matrix with_attractions() const {
-    Matrix all = matrix_;
-    for (std::size_t i = 0; i < kSize; ++i) all[i][i] += attraction_[i];
-    return all;
-  }
-
-  Matrix matrix_ = {};  // lower triangle
-  Vector right_ = {};
-  Vector attraction_ = {};
-  double squares_ = 0.0;
-  double weights_ = 0.0;
-};
-
-/// Translation (m) and rotation (rad) about the sensor, along the axes of the map.
-using PoseStep = VectorOf<6>;
-using PoseCovariance = MatrixOf<6>;
-
-/// Rotates `T` by a small rotation vector (rad) about its own origin, along the axes of the outer
-/// frame, and translates it.
-inline Pose moved(const Pose& T, const PoseStep& step) {
-  const double w[3] = {step[3] / 2.0, step[4] / 2.0, step[5] / 2.0};
-  const double scale = 1.0 / std::sqrt(1.0 + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  const double a = scale, b = scale * w[0], c = scale * w[1], d = scale * w[2];
-  const double R[3][3] = {
-      {1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)},
-      {2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)},
-      {2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)}};
-  Pose result = T;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      result(i, j) = R[i][0] * T(0, j) + R[i][1] * T(1, j) + R[i][2] * T(2, j);
-    }
-    result(i, 3) = T(i, 3) + step[static_cast<std::size_t>(i)];
-  }
-  return result;
-}
 
 /// Result of an alignment.
 struct Alignment {
@@ -350,21 +219,20 @@ class PlaneAligner {
     for (const Match& match : matches_) ++match.plane->matches;
   }
 
-  // Calls `add(match, derivatives, weight)` for each match. `scale` (m): larger distances have
-  // little weight (Geman and McClure 1987). The points of one plane share its error, so that all of
-  // them weigh at most as much as kMaxCount points.
+  // Calls `add(match, derivatives, weight)` for each match. `scale`: m, of robust_weight(). The
+  // points of one plane share its error, so that all of them weigh at most as much as kMaxCount
+  // points.
   template <class Add>
   void weigh_matches(double scale, Add&& add) const {
     constexpr double kMaxCount = 8.0;
     for (const Match& match : matches_) {
       const double(&n)[3] = match.plane->normal;
       const double(&arm)[3] = match.arm;
-      const double loss = scale * scale / (scale * scale + match.distance * match.distance);
       const double share = kMaxCount / (kMaxCount + static_cast<double>(match.plane->matches));
       add(match,
           Vector{n[0], n[1], n[2], arm[1] * n[2] - arm[2] * n[1], arm[2] * n[0] - arm[0] * n[2],
                  arm[0] * n[1] - arm[1] * n[0], match.errors[0], match.errors[1], match.errors[2]},
-          loss * loss * share);
+          robust_weight(match.distance * match.distance, scale) * share);
     }
   }
 

@@ -149,10 +149,6 @@ class VoxelPlanes {
   static constexpr double kMinPoints = 12.0;
   static constexpr double kMaxThickness = 0.06;  // standard deviation along the normal / edge
 
-  static constexpr double kGrazing = 0.3;    // sine of the angle between beam and plane
-  static constexpr double kEdgeOn = 0.04;    // the same, of a plane that contains the beam
-  static constexpr double kMinLength = 0.2;  // m, standard deviation along the beam
-
   // The points of a voxel, relative to its centre.
   struct Moments {
     PlaneMoments sums;
@@ -228,25 +224,11 @@ class VoxelPlanes {
             plane.normal[axis] * static_cast<double>(moments.errors[k][axis]) / moments.sums.count;
       }
     }
-    plane.is_flat = thickness_squared <= kMaxThickness * kMaxThickness * edge_ * edge_ &&
-                    !is_trace_of_beam(plane, moments.sums);
-    return plane;
-  }
-
-  // The points of one beam in foliage or on a rough wall spread over a plane that contains the
-  // beam, and so does the noise of its ranges. Such a plane moves with the sensor. A surface at a
-  // small angle to the beams is longer along them than the noise.
-  bool is_trace_of_beam(const Plane& plane, const PlaneMoments& points) const {
     double beam[3];
     for (std::size_t k = 0; k < 3; ++k) beam[k] = plane.mean[k] - sensor_[k];
-    const double range = std::sqrt(beam[0] * beam[0] + beam[1] * beam[1] + beam[2] * beam[2]);
-    const double(&n)[3] = plane.normal;
-    const double across = beam[0] * n[0] + beam[1] * n[1] + beam[2] * n[2];
-    if (std::abs(across) >= kGrazing * range) return false;
-    if (std::abs(across) < kEdgeOn * range) return true;
-    const double length = std::sqrt(range * range - across * across);
-    for (std::size_t k = 0; k < 3; ++k) beam[k] = (beam[k] - across * n[k]) / length;
-    return variance_along(points, beam) < kMinLength * kMinLength;
+    plane.is_flat = thickness_squared <= kMaxThickness * kMaxThickness * edge_ * edge_ &&
+                    !is_trace_of_beam(beam, plane.normal, moments.sums);
+    return plane;
   }
 
   // Keeps the voxels that have received a point in the last scans, at most half of the maximum.

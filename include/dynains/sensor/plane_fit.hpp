@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 namespace dynains::detail {
 
@@ -41,6 +42,25 @@ inline double variance_along(const PlaneMoments& m, const double (&u)[3]) {
                          2.0 * (u[0] * u[1] * m.xy + u[0] * u[2] * m.xz + u[1] * u[2] * m.yz)) /
                         m.count;
   return square - mean * mean;
+}
+
+/// Whether a plane with the unit normal `n` is the trace of a beam: the points of one beam in
+/// foliage, on persons or on a rough wall spread over a plane that contains the beam, and so does
+/// the noise of its ranges. Such a plane moves with the sensor. A surface at a small angle to the
+/// beams is longer along them than the noise. `beam`: from the sensor to the points, m.
+inline bool is_trace_of_beam(const double (&beam)[3], const double (&n)[3],
+                             const PlaneMoments& points) {
+  constexpr double kGrazing = 0.3;    // sine of the angle between beam and plane
+  constexpr double kEdgeOn = 0.04;    // the same, of a plane that contains the beam
+  constexpr double kMinLength = 0.2;  // m, standard deviation along the beam
+  const double range = std::sqrt(beam[0] * beam[0] + beam[1] * beam[1] + beam[2] * beam[2]);
+  const double across = beam[0] * n[0] + beam[1] * n[1] + beam[2] * n[2];
+  if (std::abs(across) >= kGrazing * range) return false;
+  if (std::abs(across) < kEdgeOn * range) return true;
+  const double length = std::sqrt(range * range - across * across);
+  double along[3];
+  for (std::size_t k = 0; k < 3; ++k) along[k] = (beam[k] - across * n[k]) / length;
+  return variance_along(points, along) < kMinLength * kMinLength;
 }
 
 /// Plane through a mean point with an upward unit normal, in the frame of the moments.
