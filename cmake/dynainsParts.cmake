@@ -97,4 +97,4 @@ dynains_part(tests DYNAINS_BUILD_TESTS "tests" Catch2=catch2)
 dynains_part(examples DYNAINS_BUILD_EXAMPLES "examples")
 
 # Folders of src/ and include/dynains/ that form one compiled component each.
-set(dynains_component_folders io poses odometry recording city evaluation)
+set(dynains_component_folders io surfaces poses odometry recording city evaluation)

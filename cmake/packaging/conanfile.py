@@ -19,10 +19,11 @@ PARTS = ("PROGRAM", "PYTHON", "EXAMPLES", "TESTS")
 COMPONENTS = {
     "remover": (),
     "io": (),
-    "poses": ("io",),
+    "surfaces": (),
+    "poses": ("io", "surfaces"),
     "recording": (),
-    "odometry": ("remover", "poses"),
-    "city": ("io", "poses", "recording"),
+    "odometry": ("remover", "surfaces"),
+    "city": ("io", "surfaces", "recording"),
     "evaluation": (),
 }
 
@@ -92,5 +93,5 @@ class DynainsConan(ConanFile):
             component.libs = ["dynains_" + name]
             component.requires = ["core", *links]
         # Headers alone, in source files alone.
-        self.cpp_info.components["poses"].requires.append("nanoflann::nanoflann")
+        self.cpp_info.components["surfaces"].requires.append("nanoflann::nanoflann")
         self.cpp_info.components["evaluation"].requires.append("nlohmann_json::nlohmann_json")

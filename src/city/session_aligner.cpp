@@ -8,9 +8,9 @@
 #include <string>
 
 #include "dynains/errors.hpp"
+#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
 #include "io/text.hpp"
-#include "poses/given_motion.hpp"
-#include "poses/scan_registration.hpp"
 
 namespace dynains {
 namespace {

@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/trajectory.hpp"
-#include "poses/scan_registration.hpp"
-#include "poses/way_search.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/surfaces/way_search.hpp"
 #include "scan_preparation.hpp"
 
 namespace dynains {
@@ -68,12 +67,12 @@ class Odometry::Loop {
     const double stamp = 1.0 - scan_.mean_offset() / period;  // 0: last scan, 1: this one
     if (first_ && is_taken) {
       const double first_stamp = -first_->mean_offset() / period;
-      const Pose T_world_start = extrapolate(Pose::Identity(), T_last_newest, first_stamp);
+      const Pose T_world_start = detail::scaled_motion(T_last_newest, first_stamp);
       T_result_world_ = T_result_world_ * T_world_start.inverse();
     }
     if (scan_count_ > 0) {
       result.T_world_sensor =
-          T_result_world_ * T_world_last_ * extrapolate(Pose::Identity(), T_last_newest, stamp);
+          T_result_world_ * T_world_last_ * detail::scaled_motion(T_last_newest, stamp);
     } else if (T_odometry_sensor) {
       T_result_world_ = result.T_world_sensor = *T_odometry_sensor;
     }
@@ -101,7 +100,7 @@ class Odometry::Loop {
     if (T_odometry_sensor && scan_count_ > 0)
       return T_odometry_last_.inverse() * *T_odometry_sensor;
     if (period_ <= 0.0) return Pose::Identity();
-    return extrapolate(Pose::Identity(), T_last_newest_, period / period_);
+    return detail::scaled_motion(T_last_newest_, period / period_);
   }
 
   bool are_scans_missing(double period) const { return period_ > 0.0 && period > 1.5 * period_; }
@@ -110,7 +109,7 @@ class Odometry::Loop {
   bool is_predictable(double period) const { return !first_ && !are_scans_missing(period); }
 
   bool is_after_gap(double period) const {
-    return period > kMaxPoseGap && are_scans_missing(period);
+    return period > kMaxPeriod && are_scans_missing(period);
   }
 
   /// Whether the newest scan fits to the map as registrations of other places hardly do. How well

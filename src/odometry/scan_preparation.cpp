@@ -7,11 +7,10 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
-#include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
-#include "poses/cell_surfaces.hpp"
-#include "poses/scan_registration.hpp"
-#include "poses/way_search.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
+#include "dynains/surfaces/way_search.hpp"
 
 namespace dynains::odometry {
 namespace {
@@ -82,7 +81,7 @@ void ScanPreparation::deskew(const Pose& motion, double period) {
   std::vector<Pose> T_mean_point(kSteps + 1);
   for (std::size_t k = 0; k <= kSteps; ++k) {
     const double time = static_cast<double>(k) * kStep - 2.0 * kMaxOffset;
-    T_mean_point[k] = extrapolate(Pose::Identity(), motion, time / period);
+    T_mean_point[k] = detail::scaled_motion(motion, time / period);
   }
   for (std::size_t i = 0; i < offsets_.size(); ++i) {
     if (!is_timed(i)) continue;

@@ -9,8 +9,8 @@
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/surfaces/landmarks.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "poses/landmarks.hpp"
 
 namespace dynains::odometry {
 

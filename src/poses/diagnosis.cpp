@@ -8,17 +8,18 @@
 #include <utility>
 #include <vector>
 
-#include "cell_surfaces.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
-#include "given_motion.hpp"
-#include "in_two_threads.hpp"
-#include "landmarks.hpp"
+#include "dynains/poses/ray_origin.hpp"
+#include "dynains/surfaces/landmarks.hpp"
+#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
+#include "dynains/threads/in_two_threads.hpp"
+#include "io/points/finite_points.hpp"
 #include "openings.hpp"
 #include "pose_fit.hpp"
-#include "ray_origin.hpp"
 #include "readings.hpp"
-#include "scan_registration.hpp"
 
 namespace dynains {
 namespace {

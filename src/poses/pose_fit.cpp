@@ -6,11 +6,13 @@
 #include <utility>
 
 #include "dynains/median.hpp"
-#include "given_motion.hpp"
-#include "in_two_threads.hpp"
-#include "landmarks.hpp"
-#include "scan_registration.hpp"
-#include "way_search.hpp"
+#include "dynains/poses/diagnosis.hpp"
+#include "dynains/surfaces/landmarks.hpp"
+#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/surfaces/way_search.hpp"
+#include "dynains/threads/in_two_threads.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains {
 namespace {

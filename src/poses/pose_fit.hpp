@@ -36,11 +36,6 @@ std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);
 
-/// Whether the given poses are exact and determined at up to three places: scans between
-/// which they move by 2 m meet within kExact, forth and back, from the given motion. A fraction of
-/// the work of register_motions(); false says nothing. Throws IoError.
-bool are_poses_exact(const Recording& recording);
-
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
 

@@ -1,4 +1,4 @@
-#include "ray_origin.hpp"
+#include "dynains/poses/ray_origin.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "cell_surfaces.hpp"
 #include "dynains/median.hpp"
+#include "dynains/poses/diagnosis.hpp"
 #include "dynains/registration/normal_equations.hpp"
-#include "given_motion.hpp"
-#include "in_two_threads.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
+#include "dynains/threads/in_two_threads.hpp"
 #include "io/points/finite_points.hpp"
 
 namespace dynains {

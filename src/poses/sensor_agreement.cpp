@@ -1,11 +1,11 @@
-#include "sensor_agreement.hpp"
+#include "dynains/poses/sensor_agreement.hpp"
 
 #include <algorithm>
 #include <cstddef>
 
-#include "cell_surfaces.hpp"
-#include "given_motion.hpp"
-#include "scan_registration.hpp"
+#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
 
 namespace dynains {
 namespace {

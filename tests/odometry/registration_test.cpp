@@ -3,8 +3,8 @@
 #include <random>
 #include <vector>
 
+#include "dynains/surfaces/scan_registration.hpp"
 #include "odometry/scan_preparation.hpp"
-#include "poses/scan_registration.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::odometry {

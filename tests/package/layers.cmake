@@ -12,7 +12,7 @@ set(layers
   "^config\\.hpp$"
   "^pipeline/"
   "^(compiled_remover|dyna_ins_remover|own_stages)\\.hpp$"
-  "^(adapters|io|evaluation)/"
+  "^(adapters|io|evaluation|surfaces)/"
   "^(poses|odometry)/"
   "^city/")
 # Classes of stages. They meet in the pipeline alone: a stage includes no other stage.

@@ -1,5 +1,5 @@
 // Sensors of a rig agree under their exact poses; a wrong pose of one is reported.
-#include "poses/sensor_agreement.hpp"
+#include "dynains/poses/sensor_agreement.hpp"
 
 #include <Eigen/Geometry>
 #include <filesystem>

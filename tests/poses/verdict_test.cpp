@@ -10,9 +10,9 @@
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "poses/in_two_threads.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
+#include "dynains/threads/in_two_threads.hpp"
 #include "poses/pose_fit.hpp"
-#include "poses/scan_registration.hpp"
 #include "simulation/config.hpp"
 #include "support/box_room.hpp"
 #include "support/catch.hpp"

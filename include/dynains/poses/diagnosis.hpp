@@ -8,15 +8,9 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/sensor/mounting.hpp"
+#include "dynains/surfaces/landmarks.hpp"
 
 namespace dynains {
-
-/// Agreement of two scans above the ground.
-struct Agreement {
-  double share = 0.0;  ///< ratio of points with a surface of the other scan within 0.3 m, [0, 1]
-  double gap = 1.0;    ///< mean distance to the surfaces of the other scan, m, at most 1
-  std::size_t points = 0;  ///< number of compared points
-};
 
 enum class PoseVerdict {
   kAgree,      ///< scans agree under the given poses
@@ -70,6 +64,16 @@ struct Diagnosis {
            verdict == PoseVerdict::kNoMotion;
   }
 };
+
+/// Pose of scan k in the sensor frame of scan i, as given.
+inline Pose motion_between(const Recording& recording, std::size_t i, std::size_t k) {
+  return recording.T_world_sensor(i).inverse() * recording.T_world_sensor(k);
+}
+
+/// Whether the given poses are exact and determined at up to three places: scans between
+/// which they move by 2 m meet within 3 cm, forth and back, from the given motion. A fraction of
+/// the work of diagnose(); false says nothing. Throws IoError.
+bool are_poses_exact(const Recording& recording);
 
 /// Compares and registers a sample of scans, in two threads. It takes about a second for a
 /// recording of any length. If scans do not agree, the recording may be opened again with other

@@ -23,4 +23,13 @@ inline PointBuffer finite_points(const RecordedScan& scan, std::size_t step = 1)
   return points;
 }
 
+/// The step of a sample of about 40,000 points of a scan. It is odd: scans list their beams in
+/// turn, and their number is even, so an even step would leave out half of the beams.
+inline std::size_t sample_step(const RecordedScan& scan) { return 1 + 2 * (scan.size() / 80000); }
+
+/// A sample of the measured points of a scan, m, sensor frame.
+inline PointBuffer sampled_points(const RecordedScan& scan) {
+  return finite_points(scan, sample_step(scan));
+}
+
 }  // namespace dynains

@@ -8,9 +8,10 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
-#include "poses/given_motion.hpp"
-#include "poses/in_two_threads.hpp"
-#include "poses/landmarks.hpp"
+#include "dynains/poses/diagnosis.hpp"
+#include "dynains/surfaces/landmarks.hpp"
+#include "dynains/threads/in_two_threads.hpp"
+#include "io/points/finite_points.hpp"
 
 namespace dynains::run {
 namespace {

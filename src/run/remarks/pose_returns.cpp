@@ -8,9 +8,9 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
+#include "dynains/surfaces/landmarks.hpp"
+#include "dynains/surfaces/motion_size.hpp"
 #include "io/text.hpp"
-#include "poses/given_motion.hpp"
-#include "poses/landmarks.hpp"
 #include "run/recorded_scans.hpp"
 
 namespace dynains::run {

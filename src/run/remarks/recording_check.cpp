@@ -10,10 +10,10 @@
 #include "cloud_remarks.hpp"
 #include "dynains/config.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "dynains/poses/sensor_agreement.hpp"
 #include "io/text.hpp"
 #include "odd_scans.hpp"
 #include "pose_advice.hpp"
-#include "poses/sensor_agreement.hpp"
 #include "start_check.hpp"
 
 namespace dynains::run {

@@ -5,8 +5,9 @@
 #include <optional>
 
 #include "dynains/parameters.hpp"
+#include "dynains/poses/diagnosis.hpp"
+#include "dynains/surfaces/motion_size.hpp"
 #include "io/text.hpp"
-#include "poses/given_motion.hpp"
 
 namespace dynains::run {
 namespace {

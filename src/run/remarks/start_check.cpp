@@ -12,11 +12,10 @@
 #include "cloud_remarks.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
+#include "dynains/poses/ray_origin.hpp"
+#include "io/points/finite_points.hpp"
 #include "io/text.hpp"
 #include "pose_advice.hpp"
-#include "poses/landmarks.hpp"
-#include "poses/pose_fit.hpp"
-#include "poses/ray_origin.hpp"
 
 namespace dynains::run {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
+#include "dynains/surfaces/motion_size.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "given_motion.hpp"
 
 namespace dynains {
 

@@ -6,13 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "cell_surfaces.hpp"
-#include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/poses/diagnosis.hpp"
 #include "dynains/sensor/mounting.hpp"
-#include "io/points/finite_points.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
 
 namespace dynains {
 
@@ -20,6 +17,13 @@ namespace dynains {
 inline constexpr std::size_t kMinLandmarks = 60;
 /// Nearer points (m) of two scans agree.
 inline constexpr double kAgreeing = 0.3;
+
+/// Agreement of two scans above the ground.
+struct Agreement {
+  double share = 0.0;  ///< ratio of points with a surface of the other scan within 0.3 m, [0, 1]
+  double gap = 1.0;    ///< mean distance to the surfaces of the other scan, m, at most 1
+  std::size_t points = 0;  ///< number of compared points
+};
 
 /// Points of one scan: above the ground, 2 m to `farthest` from the sensor, one per voxel of 0.25
 /// m, sorted by voxel. The first search builds a tree; only after it may threads search at once.
@@ -48,14 +52,5 @@ class Landmarks {
   struct Tree;
   std::unique_ptr<Tree> tree_;
 };
-
-/// The step of a sample of about 40,000 points of a scan. It is odd: scans list their beams in
-/// turn, and their number is even, so an even step would leave out half of the beams.
-inline std::size_t sample_step(const RecordedScan& scan) { return 1 + 2 * (scan.size() / 80000); }
-
-/// A sample of the measured points of a scan, m, sensor frame.
-inline PointBuffer sampled_points(const RecordedScan& scan) {
-  return finite_points(scan, sample_step(scan));
-}
 
 }  // namespace dynains

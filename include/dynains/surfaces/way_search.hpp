@@ -6,20 +6,22 @@
 #include <optional>
 #include <vector>
 
-#include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
-#include "landmarks.hpp"
-#include "scan_registration.hpp"
+#include "dynains/surfaces/landmarks.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
 
 namespace dynains {
 
 /// Range (m) of landmarks for the search: beside a motorway, near ones may be traffic and rails.
 inline constexpr double kWayRange = 80.0;
 
+/// Longest period (s) over which a motion is predicted.
+inline constexpr double kMaxPeriod = 1.0;
+
 /// Longest way (m) of a sensor in `period` (s), of which 0.1 to 1 s count: times may be wrong.
 inline double longest_way(double period) {
   constexpr double kFastest = 60.0;  // m/s
-  return kFastest * std::clamp(period, 0.1, kMaxPoseGap);
+  return kFastest * std::clamp(period, 0.1, kMaxPeriod);
 }
 
 /// Mean distance (m) of the points of each scan from those of the other one, at most 1 m.

@@ -1,4 +1,4 @@
-#include "cell_surfaces.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

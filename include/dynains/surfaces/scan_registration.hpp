@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "cell_surfaces.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/registration/normal_equations.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
 
 namespace dynains {
 

@@ -1,4 +1,4 @@
-#include "landmarks.hpp"
+#include "dynains/surfaces/landmarks.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "cell_surfaces.hpp"
+#include "dynains/surfaces/surface_grid.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {

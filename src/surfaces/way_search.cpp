@@ -1,4 +1,4 @@
-#include "way_search.hpp"
+#include "dynains/surfaces/way_search.hpp"
 
 #include <algorithm>
 #include <cmath>

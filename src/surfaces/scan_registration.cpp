@@ -1,4 +1,4 @@
-#include "scan_registration.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "given_motion.hpp"
+#include "dynains/surfaces/motion_size.hpp"
 
 namespace dynains {
 namespace {
