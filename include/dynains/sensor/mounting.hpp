@@ -133,11 +133,12 @@ class MountingEstimator {
     };
     VoxelHashTable<> number;  // by cell
     std::vector<Sum> sums;
+    std::uint32_t at = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!is_near(points, i)) continue;
       const double p[3] = {points.x[i], points.y[i], points.z[i]};
       const VoxelKey cell = voxel_at(p, kCell);
-      const std::uint32_t at = number.insert(cell);
+      if (at >= sums.size() || sums[at].cell != cell) at = number.insert(cell);
       if (at == sums.size()) sums.push_back({cell, 0.0, 0.0, 0.0, 0.0});
       sums[at].x += p[0];
       sums[at].y += p[1];

@@ -85,17 +85,18 @@ inline BeamAngles beam_angles(PointsView points) {
 /// lowest and highest elevation (deg) are given.
 inline double mean_spacing(const std::vector<float>& azimuths, double lowest, double highest) {
   constexpr double kSector = 4.0;  // deg; those without returns are no part of the field of view
-  std::vector<bool> seen(static_cast<std::size_t>(360.0 / kSector) + 1, false);
+  std::vector<std::uint8_t> seen(static_cast<std::size_t>(360.0 / kSector) + 1, 0);
   for (const float azimuth : azimuths) {
-    seen[static_cast<std::size_t>((static_cast<double>(azimuth) + 180.0) / kSector)] = true;
+    seen[static_cast<std::uint32_t>((static_cast<double>(azimuth) + 180.0) / kSector)] = 1;
   }
-  const double width = kSector * static_cast<double>(std::count(seen.begin(), seen.end(), true));
+  const double width = kSector * static_cast<double>(std::count(seen.begin(), seen.end(), 1));
   const double height = (std::sin(highest * kRadians) - std::sin(lowest * kRadians)) / kRadians;
   return std::sqrt(width * height / static_cast<double>(azimuths.size()));
 }
 
-/// The value above the ratio `ratio` ([0, 1]) of the other ones. `values` must not be empty.
-inline double percentile(std::vector<float> values, double ratio) {
+/// The value above the ratio `ratio` ([0, 1]) of the other ones. Reorders `values`, which must not
+/// be empty.
+inline double percentile(std::vector<float>& values, double ratio) {
   const auto rank = static_cast<std::ptrdiff_t>(ratio * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   return static_cast<double>(values[static_cast<std::size_t>(rank)]);
@@ -107,29 +108,34 @@ inline double percentile(std::vector<float> values, double ratio) {
 inline std::vector<float> gaps_in_bands(const std::vector<float>& across,
                                         const std::vector<float>& along, double width,
                                         double smallest) {
-  const auto band_of = [&](float angle) {
-    return static_cast<std::size_t>((static_cast<double>(angle) + 181.0) / width);
+  const auto band_at = [&](float angle) {
+    return static_cast<std::uint32_t>((static_cast<double>(angle) + 181.0) / width);
   };
-  std::vector<std::uint32_t> counts(band_of(181.0F) + 1, 0);  // 180 deg may be rounded up
-  for (const float angle : across) ++counts[band_of(angle)];
-  std::vector<std::vector<float>> bands(counts.size());
-  std::size_t sorted = 0, lower = 0;
-  for (std::size_t band = 0; band < bands.size(); ++band) {
-    if (4 * sorted <= lower) {
-      bands[band].reserve(counts[band]);
-      sorted += counts[band];
-    }
-    lower += counts[band];
-  }
+  std::vector<std::uint32_t> counts(band_at(181.0F) + 1, 0);  // 180 deg may be rounded up
+  std::vector<std::uint16_t> band_of(across.size());
   for (std::size_t i = 0; i < across.size(); ++i) {
-    std::vector<float>& band = bands[band_of(across[i])];
-    if (band.capacity() > 0) band.push_back(along[i]);
+    band_of[i] = static_cast<std::uint16_t>(band_at(across[i]));
+    ++counts[band_of[i]];
+  }
+  std::vector<std::uint32_t> ends(counts.size());
+  std::uint32_t sorted = 0, lower = 0;
+  for (std::size_t band = 0; band < counts.size(); ++band) {
+    ends[band] = sorted;
+    const bool skips = 4 * sorted > lower;
+    lower += counts[band];
+    if (skips) counts[band] = 0;
+    sorted += counts[band];
+  }
+  std::vector<float> angles(sorted);
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    if (counts[band_of[i]] != 0) angles[ends[band_of[i]]++] = along[i];
   }
   std::vector<float> gaps;
-  for (std::vector<float>& band : bands) {
-    std::sort(band.begin(), band.end());
-    for (std::size_t k = 1; k < band.size(); ++k) {
-      const float gap = band[k] - band[k - 1];
+  for (std::size_t band = 0; band < counts.size(); ++band) {
+    const std::size_t begin = ends[band] - counts[band];
+    std::sort(angles.data() + begin, angles.data() + ends[band]);
+    for (std::size_t i = begin + 1; i < ends[band]; ++i) {
+      const float gap = angles[i] - angles[i - 1];
       if (static_cast<double>(gap) > smallest) gaps.push_back(gap);
     }
   }
@@ -150,11 +156,11 @@ inline SensorModel estimate_sensor_model(PointsView points) {
   const detail::BeamAngles angles = detail::beam_angles(points);
   SensorModel model;
   model.height = SensorModel::typical().height;
-  model.elevation_min = detail::percentile(angles.elevation, 0.0005);
-  model.elevation_max = detail::percentile(angles.elevation, 0.9995);
+  std::vector<float> elevations = angles.elevation;
+  model.elevation_min = detail::percentile(elevations, 0.0005);
+  model.elevation_max = detail::percentile(elevations, 0.9995);
   // The elevations of one beam differ by up to 0.1 deg, those of two beams by 0.08 deg or more.
-  const std::vector<float> steps =
-      detail::gaps_in_bands(angles.elevation, angles.azimuth, 0.1, 0.01);
+  std::vector<float> steps = detail::gaps_in_bands(angles.elevation, angles.azimuth, 0.1, 0.01);
   if (steps.empty()) return {};
   model.azimuth_step = std::clamp(detail::percentile(steps, 0.5), 0.05, 2.0);
   // Returns of one ring are closer together than those that are spread evenly.
@@ -164,7 +170,7 @@ inline SensorModel estimate_sensor_model(PointsView points) {
     model.azimuth_step = model.elevation_gap = model.elevation_gap_wide = spacing;
     return model;
   }
-  const std::vector<float> gaps =
+  std::vector<float> gaps =
       detail::gaps_in_bands(angles.azimuth, angles.elevation, model.azimuth_step, 0.08);
   const auto gap_at = [&](double ratio) {
     return gaps.empty() ? 1.0 : std::clamp(detail::percentile(gaps, ratio), 0.1, 5.0);
