@@ -15,6 +15,7 @@
 #include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/normal_equations.hpp"
 #include "dynains/registration/voxel_planes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
 
@@ -187,36 +188,44 @@ class PlaneAligner {
                    const Vector& found) {
     using Block = VoxelPlanes::Block;
     matches_.clear();
-    for (std::size_t begin = 0; begin < points.size(); begin += Block::kMaxCount * step) {
-      const std::size_t end = std::min(points.size(), begin + Block::kMaxCount * step);
-      Block block;
-      for (std::size_t i = begin; i < end; i += step) {
-        block.push_position(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
-                            static_cast<double>(points.z[i]));
+    // AVX2 processors add four numbers at a time, here and below.
+    with_packs([&](auto) {
+      for (std::size_t begin = 0; begin < points.size(); begin += Block::kMaxCount * step) {
+        match_block(points, begin, step, planes, T, found);
       }
-      planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
-        const double(&p)[3] = block.points[i];
-        const std::size_t point = begin + i * step;
-        const SensorErrors errors = sensor_errors(T, static_cast<double>(points.x[point]),
-                                                  static_cast<double>(points.y[point]),
-                                                  static_cast<double>(points.z[point]));
-        Match match = {&plane,
-                       {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
-                       {},
-                       plane.distance(p),
-                       static_cast<std::uint32_t>(point)};
-        for (std::size_t k = 0; k < kSensorErrors; ++k) {
-          match.errors[k] = -plane.moved[k];
-          for (std::size_t axis = 0; axis < 3; ++axis) {
-            match.errors[k] += plane.normal[axis] * static_cast<double>(errors[k][axis]);
-          }
-          match.distance += match.errors[k] * ((k == 0 ? elevation_ : 0.0) + found[6 + k]);
-        }
-        matches_.push_back(match);
-      });
-    }
+    });
     for (const Match& match : matches_) match.plane->matches = 0;
     for (const Match& match : matches_) ++match.plane->matches;
+  }
+
+  // Matches every `step`-th point from index `begin` on, as many as a block holds.
+  void match_block(PointsView points, std::size_t begin, std::size_t step, VoxelPlanes& planes,
+                   const Pose& T, const Vector& found) {
+    VoxelPlanes::Block block;
+    for (std::size_t i = begin; i < points.size() && !block.is_full(); i += step) {
+      block.push_position(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                          static_cast<double>(points.z[i]));
+    }
+    planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
+      const double(&p)[3] = block.points[i];
+      const std::size_t point = begin + i * step;
+      const SensorErrors errors =
+          sensor_errors(T, static_cast<double>(points.x[point]),
+                        static_cast<double>(points.y[point]), static_cast<double>(points.z[point]));
+      Match match = {&plane,
+                     {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
+                     {},
+                     plane.distance(p),
+                     static_cast<std::uint32_t>(point)};
+      for (std::size_t k = 0; k < kSensorErrors; ++k) {
+        match.errors[k] = -plane.moved[k];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          match.errors[k] += plane.normal[axis] * static_cast<double>(errors[k][axis]);
+        }
+        match.distance += match.errors[k] * ((k == 0 ? elevation_ : 0.0) + found[6 + k]);
+      }
+      matches_.push_back(match);
+    });
   }
 
   // Calls `add(match, derivatives, weight)` for each match. `scale`: m, of robust_weight(). The
@@ -239,8 +248,10 @@ class PlaneAligner {
   // Equations of the matches for the next step after `found`.
   Equations sum_equations(double scale, const Vector& found, bool is_exact) const {
     Equations equations;
-    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
-      equations.add(derivatives, match.distance, weight);
+    with_packs([&](auto) {
+      weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
+        equations.add(derivatives, match.distance, weight);
+      });
     });
     for (std::size_t i = 0; i < 6; ++i) equations.attract(i, -found[i], kAttraction[i]);
     equations.attract(6, -found[6], elevation_weight_);
@@ -350,8 +361,10 @@ class PlaneAligner {
   void add_changes(const Equations& equations, double scale, GroupOf&& group_of,
                    PoseCovariance& covariance) {
     groups_.assign(kGroups + 1, Equations());
-    weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
-      groups_[group_of(match.point)].add(derivatives, match.distance, weight);
+    with_packs([&](auto) {
+      weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
+        groups_[group_of(match.point)].add(derivatives, match.distance, weight);
+      });
     });
     const Vector all = equations.solve();
     for (std::size_t group = 0; group < kGroups; ++group) {

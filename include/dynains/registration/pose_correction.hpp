@@ -13,6 +13,7 @@
 #include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/plane_aligner.hpp"
 #include "dynains/registration/voxel_planes.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
@@ -133,13 +134,16 @@ class PoseCorrection final : public MotionStage {
     const Pose T = composed(T_origin_world_, T_world_level);
     has_planes_ = true;
     planes_.begin_scan(T);
-    VoxelPlanes::Block block;
-    visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
-      if (!moving.empty() && i >= split.ground_count && moving[i - split.ground_count] != 0) return;
-      block.push_back(T, x, y, z);
-      if (block.is_full()) planes_.add(block);
+    with_packs([&](auto) {
+      VoxelPlanes::Block block;
+      visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
+        const bool is_object = i >= split.ground_count;
+        if (is_object && !moving.empty() && moving[i - split.ground_count] != 0) return;
+        block.push_back(T, x, y, z);
+        if (block.is_full()) planes_.add(block);
+      });
+      planes_.add(block);
     });
-    planes_.add(block);
   }
 
   const std::optional<PoseResidual>& residual() const override { return residual_; }
