@@ -16,6 +16,7 @@
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
@@ -142,7 +143,9 @@ class MovedGround {
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, const GroundSamples& samples) {
     found_.clear();
     under_.assign(GroundFootprint::block_count(ground.size()), 0);
-    if (!footprint_.empty() && removes_footprint_) find_under(ground, samples);
+    if (!footprint_.empty() && removes_footprint_) {
+      with_packs([&](auto) { find_under(ground, samples); });
+    }
     if (find_free_voxels(samples)) remove_free_runs(ground, samples);
     footprint_.clear();
     return found_;

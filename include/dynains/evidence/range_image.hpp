@@ -159,12 +159,16 @@ class RangeImage {
 
   // Copies the returns of static objects, before the ground is added to the image.
   static void keep_objects(Scratch& scratch) {
-    scratch.objects.resize(scratch.returns.size());
-    std::transform(scratch.returns.begin(), scratch.returns.end(), scratch.objects.begin(),
-                   [](std::int32_t value) {
-                     const auto range = static_cast<std::int16_t>(value >> 16);
-                     return (range & kMoving) != 0 ? kNothing : range;
-                   });
+    const std::size_t count = scratch.returns.size();
+    scratch.objects.resize(count);
+    const std::int32_t* const from = scratch.returns.data();
+    std::int16_t* const objects = scratch.objects.data();
+    detail::with_packs([&](auto) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto range = static_cast<std::int16_t>(from[i] >> 16);
+        objects[i] = (range & kMoving) != 0 ? kNothing : range;
+      }
+    });
   }
 
   // Splits the returns into ranges and beams.
