@@ -259,13 +259,11 @@ inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
     for (std::size_t block = 0; block < count; block += kBeamBlock) {
       const std::size_t end = std::min(block + kBeamBlock, count);
       for (std::size_t i = block; i < end; i += kPackWidth) {
-        if (bits.hit[i / 8] == Packs::kAll) continue;  // another image settled it
         test.locate(Float::load(x + i), Float::load(y + i), Float::load(z + i), &cell[i - block],
                     &range[i - block]);
       }
       std::size_t passed_count = 0;
       for (std::size_t i = block; i < end; i += kPackWidth) {
-        if (bits.hit[i / 8] == Packs::kAll) continue;
         const auto compared = test.compare(&cell[i - block], &range[i - block]);
         if (compared.before == 0) {
           bits.hit[i / 8] = static_cast<std::uint8_t>(bits.hit[i / 8] | compared.at);
