@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
+#include "dynains/pipeline/object_tracks.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
@@ -99,6 +100,60 @@ TEST_CASE("a moving van is one object with its place, size and velocity") {
     CHECK(4 * fast >= 3 * found->size());
   }
   CHECK(listed.newest.front().object.id == listed.final.front().object.id);
+}
+
+/// Observes a scan of moving clusters: points from the corner `low` on, 10 x 10 in a rectangle.
+struct Rectangle {
+  Eigen::Vector2f low, size;  // m
+};
+Span<const MovingObject> observe(std::uint64_t i, const std::vector<Rectangle>& clusters,
+                                 detail::ObjectTracks& tracks) {
+  detail::ScanSlot scan;
+  scan.scan = i;
+  scan.time = 0.1 * static_cast<double>(i);
+  std::vector<EvidenceVerdict::Group> groups(1);
+  std::vector<std::uint32_t> cluster_of, group_of;
+  for (std::uint32_t c = 0; c < clusters.size(); ++c) {
+    scan.ids.push_back(c + 1);
+    groups.push_back({Cause::kFreeSpace, 1.0F});
+    cluster_of.push_back(c);
+    for (int k = 0; k < 100; ++k) {
+      const Eigen::Array2f share(static_cast<float>(k % 10) / 9.0F,
+                                 static_cast<float>(k / 10) / 9.0F);
+      const Eigen::Array2f point = clusters[c].low.array() + share * clusters[c].size.array();
+      scan.split.points.push_back(point.x(), point.y(), 0.0F);
+      group_of.push_back(c + 1);
+    }
+  }
+  scan.split.count = scan.split.points.size();
+  return tracks.observe(scan, {groups, cluster_of, group_of, {}});
+}
+
+TEST_CASE("a van keeps the length that was seen before it drove away") {
+  detail::ObjectTracks tracks(18.0, 4.5, 10, nullptr);
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    const float rear = 2.0F + 0.8F * static_cast<float>(i);
+    const float seen = i < 15 ? 4.2F : 0.3F;  // m: then its rear hides the rest
+    const auto objects = observe(i, {{{rear, -0.9F}, {seen, 1.8F}}}, tracks);
+    if (i < 5) continue;
+    REQUIRE(objects.size() == 1);
+    CHECK(objects[0].length == Approx(4.2).margin(0.2));
+    CHECK(objects[0].centre.x() == Approx(rear + 2.1).margin(0.3));
+  }
+}
+
+TEST_CASE("vehicles abreast that move alike are no single object") {
+  detail::ObjectTracks tracks(18.0, 3.0, 10, nullptr);  // objects are up to 3 m wide
+  std::size_t listed = 0;
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    const float rear = 5.0F + 0.8F * static_cast<float>(i);
+    const Eigen::Vector2f size(4.2F, 1.8F);
+    const auto objects =
+        observe(i, {{{rear, 2.0F}, size}, {{rear, 4.05F}, size}, {{rear, 6.1F}, size}}, tracks);
+    listed = objects.size();
+    for (const MovingObject& object : objects) CHECK(object.width < 2.0);
+  }
+  CHECK(listed == 3);
 }
 
 TEST_CASE("two threads list the same objects") {

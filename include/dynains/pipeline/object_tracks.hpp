@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -63,11 +64,12 @@ class ObjectTracks {
   static constexpr double kError = 0.2;         // m, standard deviation of a measured centre
   static constexpr double kAcceleration = 2.0;  // m/s^2, standard deviation
   static constexpr double kSpeed = 15.0;        // m/s, standard deviation before it is measured
-  static constexpr double kDeviations = 3.0;    // of usual errors
-  static constexpr std::size_t kAxes = 9;       // directions that a box may have
+  static constexpr double kDeviations = 2.0;    // of usual errors
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+  static constexpr std::size_t kAxes = 9;  // directions that a box may have
   // Distances between points of an object, m. Those between rings grow with the range.
   static constexpr float kGap = 0.3F, kGapOfRange = 0.02F;
-  static constexpr float kGapOfInstance = 0.5F;  // m, added for points of an instance of the object
+  static constexpr float kGapOfInstance = 0.2F;  // m, added for points of an instance of the object
 
   struct Track {
     MovingObject object;
@@ -75,6 +77,9 @@ class ObjectTracks {
     double pp = 0.0, pv = 0.0, vv = 0.0;  // covariance of position and velocity, per axis
     bool is_directed = false;             // its motion is certain, and so is its yaw
     double yaw = 0.0, yaw_variance = M_PI * M_PI;
+    // When the motion became certain:
+    double first_time = 0.0, first_vv = 0.0;
+    Eigen::Vector2d first_velocity = Eigen::Vector2d::Zero();
     // In the newest scan:
     std::uint32_t points = 0;
     Eigen::Vector2f along, place;        // direction; predicted centre along it and to its left, m
@@ -214,7 +219,7 @@ class ObjectTracks {
       object.length = static_cast<double>(part.box.sizes().x());
       object.width = static_cast<double>(part.box.sizes().y());
       std::size_t t = begun;
-      while (t < tracks_.size() && !common_box(tracks_[t].object, object, kGap)) ++t;
+      while (t < tracks_.size() && !common_box(tracks_[t].object, object)) ++t;
       if (t == tracks_.size()) {
         if (part.points < kMinPoints) continue;
         begin_track(scan, scan.ids[p], object);
@@ -228,37 +233,41 @@ class ObjectTracks {
   // The box of two objects along the axes of the first one, from its centre, m. None if they are
   // not beside each other, or too large for one object.
   std::optional<Eigen::AlignedBox2d> common_box(const MovingObject& first,
-                                                const MovingObject& second, float max_gap) const {
+                                                const MovingObject& second) const {
     const Eigen::Matrix2d R = axes_of(first.yaw).transpose();
     const Eigen::Vector2d half = 0.5 * size_of(first);
     const Eigen::Vector2d other = 0.5 * (R * axes_of(second.yaw)).cwiseAbs() * size_of(second);
     const Eigen::Vector2d offset = R * (second.centre - first.centre).head<2>();
     const double gap = (offset.cwiseAbs() - half - other).cwiseMax(0.0).norm();
-    if (gap > std::min<double>(max_gap, std::max(half.norm(), other.norm()))) return std::nullopt;
+    if (gap > std::min<double>(kGap, std::max(half.norm(), other.norm()))) return std::nullopt;
     Eigen::AlignedBox2d box(-half, half);
     box.extend(Eigen::AlignedBox2d(offset - other, offset + other));
-    if (box.sizes().norm() > max_length_) return std::nullopt;
+    if (!is_size_of_object(box.sizes())) return std::nullopt;
     return box;
+  }
+
+  // Nothing that moves is wider than it may be high.
+  bool is_size_of_object(const Eigen::Vector2d& size) const {
+    return size.norm() <= max_length_ && size.minCoeff() <= max_height_;
   }
 
   void begin_track(const ScanSlot& scan, std::uint32_t instance, const MovingObject& object) {
     Track track;
-    track.object = object;
-    track.vv = kSpeed * kSpeed;
     const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(instance);
     const Track* const known = find(id) != nullptr ? nullptr : known_later(id);
-    if (known != nullptr) {
-      track = *known;
-      track.object.centre = object.centre;
-      const double deviation = kAcceleration * (later_->time_ - time_);
-      track.vv = deviation * deviation;
-    } else {
-      track.object.id = next_id();
-    }
-    track.points = 0;
-    track.pp = kError * kError;
-    track.pv = 0.0;
+    track.object = object;
+    track.object.id = known != nullptr ? id : next_id();
     track.object.first_scan = scan.scan;
+    track.pp = kError * kError;
+    track.vv = kSpeed * kSpeed;
+    if (known != nullptr && known->is_directed) {
+      track.object.length = known->object.length;
+      track.object.width = known->object.width;
+      track.object.velocity = known->first_velocity;
+      const double deviation = kAcceleration * (known->first_time - time_);
+      track.vv = known->first_vv + deviation * deviation;
+      turn(track);
+    }
     tracks_.push_back(track);
   }
 
@@ -323,7 +332,13 @@ class ObjectTracks {
   void update(const ScanSlot& scan, Track& track) {
     MovingObject& object = track.object;
     const Track* const known = known_later(object.id);
-    const Eigen::Vector2d centre = measure_centre(choose_yaw(track), known, track);
+    const Eigen::AlignedBox2f extent = choose_yaw(track);
+    if (!is_size_of_object(extent.sizes().cast<double>())) {
+      // It holds points of others: its instances begin tracks anew.
+      track.seen = kNever;
+      return;
+    }
+    const Eigen::Vector2d centre = measure_centre(extent, known, track);
     if (object.first_scan == scan.scan) {
       object.centre.head<2>() = centre;
     } else {
@@ -346,13 +361,14 @@ class ObjectTracks {
     MovingObject& object = track.object;
     const Eigen::Matrix2d axes = axes_of(object.yaw);
     const Eigen::Vector2d expected = axes.transpose() * from_sensor(object);
+    const Eigen::Array2d view = expected.normalized().array().square();
     Eigen::Vector2d centre = sensor_.head<2>();
     for (int k = 0; k < 2; ++k) {
       double& size = k == 0 ? object.length : object.width;
       const double low = static_cast<double>(extent.min()[k]);
       const double high = static_cast<double>(extent.max()[k]);
       const double before = size, middle = 0.5 * (low + high);
-      size = remembered_size(track, size, high - low);
+      size = remembered_size(track, size, high - low, view[1 - k]);
       if (known != nullptr && known->is_directed) {
         size = std::max(size, size_of(known->object)[k]);
       }
@@ -370,11 +386,12 @@ class ObjectTracks {
   }
 
   // The size of an object after it was seen as `seen`: nearly the largest one, since parts may be
-  // hidden. Its box may have other axes until it is directed.
-  static double remembered_size(const Track& track, double size, double seen) {
-    constexpr double kGrowth = 0.5, kShrinkage = 0.08;  // of the difference, in each scan
+  // hidden. `across`: squared sine of the angle between this side and the view; along it, the far
+  // end cannot be seen. The box may have other axes until it is directed.
+  static double remembered_size(const Track& track, double size, double seen, double across) {
+    constexpr double kGrowth = 0.5, kShrinkage = 0.2;  // of the difference, in each scan
     if (!track.is_directed) return seen;
-    return size + (seen > size ? kGrowth : kShrinkage) * (seen - size);
+    return size + (seen > size ? kGrowth : kShrinkage * across) * (seen - size);
   }
 
   static void correct(const Eigen::Vector2d& centre, Track& track) {
@@ -389,12 +406,15 @@ class ObjectTracks {
   }
 
   // The yaw follows the motion while that is certain.
-  static void turn(Track& track) {
+  void turn(Track& track) const {
     const Eigen::Vector2d& velocity = track.object.velocity;
     const double variance = track.vv / velocity.squaredNorm();  // of the direction
     if (!(variance * kDeviations * kDeviations <= 1.0)) return;
     const double direction = std::atan2(velocity.y(), velocity.x());
     if (!std::exchange(track.is_directed, true)) {
+      track.first_time = time_;
+      track.first_vv = track.vv;
+      track.first_velocity = velocity;
       track.yaw = direction;
       track.yaw_variance = variance;
     }
@@ -420,7 +440,6 @@ class ObjectTracks {
 
   // Tracks beside each other that move alike are parts of one object. The older one stays.
   void join_tracks() {
-    constexpr float kMaxGap = 0.7F;    // m
     constexpr double kUnlikely = 4.0;  // squared deviation of a difference between velocities
     for (std::size_t a = 0; a < tracks_.size(); ++a) {
       for (std::size_t b = tracks_.size(); --b > a;) {
@@ -429,7 +448,7 @@ class ObjectTracks {
         const bool move_alike = (to.velocity - from.velocity).squaredNorm() <=
                                 kUnlikely * (tracks_[a].vv + tracks_[b].vv);
         if (!is_directed_now(tracks_[a]) || !is_directed_now(tracks_[b]) || !move_alike) continue;
-        const auto box = common_box(to, from, kMaxGap);
+        const auto box = common_box(to, from);
         if (!box) continue;
         to.centre.head<2>() += axes_of(to.yaw) * box->center();
         to.length = box->sizes().x();
@@ -452,7 +471,8 @@ class ObjectTracks {
 
   void forget(std::uint64_t scan) {
     const auto is_lost = [&](const Track& track) {
-      return !is_followed(track) && scan > track.object.last_scan + memory_;
+      return track.seen == kNever ||
+             (!is_followed(track) && scan > track.object.last_scan + memory_);
     };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_lost), tracks_.end());
     const auto is_old = [&](const Named& named) {
