@@ -5,11 +5,6 @@
 #include "../failure.hpp"
 #include "../input_file.hpp"
 #include "log_folder.hpp"
-#include "mcap.hpp"
-#include "ros_bag.hpp"
-#if defined(DYNAINS_HAS_SQLITE3)
-#include "sqlite_bag.hpp"
-#endif
 
 namespace dynains {
 namespace {
@@ -21,10 +16,10 @@ std::unique_ptr<LogFile> open_file(const fs::path& path) {
   if (is_compressed_log(path) && !extension.empty()) {
     fail(path, "is compressed as a whole; decompress it: zstd -d --rm " + path.string());
   }
-  if (extension == ".mcap") return std::make_unique<McapFile>(path);
-  if (extension == ".bag") return std::make_unique<RosBag>(path);
+  if (extension == ".mcap") return open_mcap(path);
+  if (extension == ".bag") return open_ros_bag(path);
 #if defined(DYNAINS_HAS_SQLITE3)
-  if (extension == ".db3") return std::make_unique<SqliteBag>(path);
+  if (extension == ".db3") return open_sqlite_bag(path);
 #else
   if (extension == ".db3") fail(path, "this build has no SQLite (Debian: libsqlite3-dev)");
 #endif

@@ -119,6 +119,11 @@ bool has_logs(const std::filesystem::path& folder);
 /// library that the format needs; the message names its package.
 std::unique_ptr<LogFile> open_log(const std::filesystem::path& path, bool accept_missing = false);
 
+/// Open one file: MCAP, a bag of ROS 1, a database of rosbag2.
+std::unique_ptr<LogFile> open_mcap(const std::filesystem::path& path);
+std::unique_ptr<LogFile> open_ros_bag(const std::filesystem::path& path);
+std::unique_ptr<LogFile> open_sqlite_bag(const std::filesystem::path& path);
+
 /// "sensor_msgs/msg/PointCloud2" of ROS 2 as in ROS 1.
 std::string plain_type(std::string type);
 

@@ -1,10 +1,11 @@
-#include "mcap.hpp"
-
 #include <algorithm>
+#include <map>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "../scalar.hpp"
-#include "mcap_format.hpp"
+#include "chunked_log.hpp"
 #include "mcap_writer.hpp"
 
 namespace dynains {
@@ -36,143 +37,158 @@ std::string metadata_index(Bytes fields) {
   return ByteWriter().string(fields.string("the name of metadata")).bytes();
 }
 
-}  // namespace
-
-McapFile::McapFile(const std::filesystem::path& path) : ChunkedLog(path) {
-  read_index(mcap::kMagic, "expected the magic bytes of MCAP, version 0");
-}
-
-std::optional<std::uint64_t> McapFile::record_size(std::uint64_t position) {
-  if (file_.size() - position < kRecordHead) return std::nullopt;
-  const auto head = file_.read(position, kRecordHead, "a record");
-  Bytes fields(path_, position, head.data(), head.size());
-  const auto opcode = fields.number<std::uint8_t>("an opcode");
-  const auto size = fields.number<std::uint64_t>("a length");
-  // Some file systems fill the end of a file with zeros after a crash.
-  if (opcode == 0 || size > file_.size() - position - kRecordHead) return std::nullopt;
-  return kRecordHead + size;
-}
-
-bool McapFile::take_record(std::uint64_t position, std::uint64_t size) {
-  const auto head = file_.read(position, std::min(size, kMaxHead), "a record");
-  Bytes fields(path_, position, head.data(), head.size());
-  const auto opcode = fields.number<std::uint8_t>("an opcode");
-  if (opcode == mcap::kMessageIndex) {
-    take_message_index(position, size);
-    return true;
+/// MCAP (mcap.dev, specification of version 0).
+class McapFile final : public ChunkedLog {
+ public:
+  explicit McapFile(const std::filesystem::path& path) : ChunkedLog(path) {
+    read_index(mcap::kMagic, "expected the magic bytes of MCAP, version 0");
   }
-  finish_chunk();
-  if (opcode == mcap::kChunk) take_chunk(position, size);
-  if (opcode == mcap::kMessage) {
-    fields.skip(8, "a length");
-    const auto channel = fields.number<std::uint16_t>("a channel id");
-    fields.skip(4, "a sequence number");
-    add_message(channel, fields.number<std::uint64_t>("a log time"), position);
-  }
-  if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
-    const auto record = file_.read(position, size, "a record");
-    Bytes bytes(path_, position, record.data(), record.size());
-    parse_record(bytes);
-  }
-  if (opcode == mcap::kAttachment || opcode == mcap::kMetadata || opcode >= mcap::kFirstPrivate) {
-    others_.push_back(position);
-  }
-  if (opcode == mcap::kHeader) take_header(position, size);
-  has_footer_ = opcode == mcap::kFooter;
-  return !has_footer_;
-}
 
-void McapFile::take_header(std::uint64_t position, std::uint64_t size) {
-  const auto record = file_.read(position, size, "a header");
-  Bytes fields(path_, position, record.data(), record.size());
-  fields.skip(kRecordHead, "a record");
-  profile_ = fields.string("a profile");
-}
-
-void McapFile::take_chunk(std::uint64_t position, std::uint64_t size) {
-  const auto head = file_.read(position, std::min(size, kMaxHead), "a chunk");
-  Bytes fields(path_, position, head.data(), head.size());
-  Chunk chunk;
-  fields.skip(kRecordHead + 16, "the times of a chunk");
-  chunk.uncompressed_size = fields.number<std::uint64_t>("the size of a chunk");
-  chunk.uncompressed_crc = fields.number<std::uint32_t>("the checksum of a chunk");
-  chunk.compression = fields.string("the compression of a chunk");
-  chunk.compressed_size = fields.number<std::uint64_t>("the size of compressed records");
-  chunk.content = position + fields.position();
-  add_chunk(position, std::move(chunk));
-}
-
-void McapFile::take_message_index(std::uint64_t position, std::uint64_t size) {
-  const auto record = file_.read(position, size, "a message index");
-  Bytes fields(path_, position, record.data(), record.size());
-  fields.skip(kRecordHead, "a record");
-  const auto channel = fields.number<std::uint16_t>("a channel id");
-  Bytes pairs =
-      fields.block(fields.number<std::uint32_t>("the length of an index"), "a message index");
-  while (pairs.remaining() > 0) {
-    const auto time = pairs.number<std::uint64_t>("a log time");
-    add_indexed(channel, time, pairs.number<std::uint64_t>("an offset"));
-  }
-}
-
-std::optional<ChunkedLog::Message> McapFile::parse_record(Bytes& records) {
-  const auto opcode = records.number<std::uint8_t>("an opcode");
-  Bytes fields = records.block(records.number<std::uint64_t>("a length"), "a record");
-  if (opcode != mcap::kMessage) {
-    take_definition(opcode, fields);
-    return std::nullopt;
-  }
-  const auto channel = fields.number<std::uint16_t>("a channel id");
-  MessageStamp stamp;
-  stamp.sequence = fields.number<std::uint32_t>("a sequence number");
-  const auto time = fields.number<std::uint64_t>("a log time");
-  stamp.publish_time = fields.number<std::uint64_t>("a publish time");
-  return Message{channel, time, stamp, fields};
-}
-
-void McapFile::take_definition(std::uint8_t opcode, Bytes fields) {
-  if (opcode == mcap::kSchema) {
-    auto& schema = schemas_[fields.number<std::uint16_t>("a schema id")];
-    const std::string name = fields.string("a schema name");
-    const std::string encoding = fields.string("a schema encoding");
-    schema = std::make_shared<LogSchema>(
-        LogSchema{name, encoding, fields.string("the definition of a schema")});
-  }
-  if (opcode != mcap::kChannel) return;
-  const auto id = fields.number<std::uint16_t>("a channel id");
-  const auto schema = schemas_.find(fields.number<std::uint16_t>("a schema id"));
-  LogTopic topic;
-  if (schema != schemas_.end()) {
-    topic.schema = schema->second;
-    topic.type = plain_type(topic.schema->name);
-  }
-  topic.name = fields.string("a topic");
-  topic.message_encoding = fields.string("a message encoding");
-  topic.encoding = encoding_of(topic.message_encoding);
-  Bytes metadata =
-      fields.block(fields.number<std::uint32_t>("the length of metadata"), "metadata of a channel");
-  while (metadata.remaining() > 0) {
-    const std::string name = metadata.string("a name");
-    topic.metadata[name] = metadata.string("a value");
-  }
-  add_channel(id, std::move(topic));
-}
-
-void McapFile::copy_others(McapWriter& writer) {
-  for (const std::uint64_t position : others_) {
-    const std::uint64_t size = record_size(position).value_or(0);
-    const auto begin = file_.read(position, std::min(size, kMaxHead), "a record");
-    Bytes fields(path_, position, begin.data(), begin.size());
-    const auto opcode = fields.number<std::uint8_t>("an opcode");
-    fields.skip(kRecordHead - 1, "a length");
-    if (opcode == mcap::kAttachment) {
-      writer.copy_record(file_, position, size, mcap::kAttachmentIndex, attachment_index(fields));
-    } else if (opcode == mcap::kMetadata) {
-      writer.copy_record(file_, position, size, mcap::kMetadataIndex, metadata_index(fields));
-    } else {
-      writer.copy_record(file_, position, size, std::nullopt, "");
+  void copy_others(McapWriter& writer) override {
+    for (const std::uint64_t position : others_) {
+      const std::uint64_t size = record_size(position).value_or(0);
+      const auto begin = file_.read(position, std::min(size, kMaxHead), "a record");
+      Bytes fields(path_, position, begin.data(), begin.size());
+      const auto opcode = fields.number<std::uint8_t>("an opcode");
+      fields.skip(kRecordHead - 1, "a length");
+      if (opcode == mcap::kAttachment) {
+        writer.copy_record(file_, position, size, mcap::kAttachmentIndex, attachment_index(fields));
+      } else if (opcode == mcap::kMetadata) {
+        writer.copy_record(file_, position, size, mcap::kMetadataIndex, metadata_index(fields));
+      } else {
+        writer.copy_record(file_, position, size, std::nullopt, "");
+      }
     }
   }
+
+ private:
+  std::optional<std::uint64_t> record_size(std::uint64_t position) override {
+    if (file_.size() - position < kRecordHead) return std::nullopt;
+    const auto head = file_.read(position, kRecordHead, "a record");
+    Bytes fields(path_, position, head.data(), head.size());
+    const auto opcode = fields.number<std::uint8_t>("an opcode");
+    const auto size = fields.number<std::uint64_t>("a length");
+    // Some file systems fill the end of a file with zeros after a crash.
+    if (opcode == mcap::kNone || size > file_.size() - position - kRecordHead) return std::nullopt;
+    return kRecordHead + size;
+  }
+
+  bool take_record(std::uint64_t position, std::uint64_t size) override {
+    const auto head = file_.read(position, std::min(size, kMaxHead), "a record");
+    Bytes fields(path_, position, head.data(), head.size());
+    const auto opcode = fields.number<std::uint8_t>("an opcode");
+    if (opcode == mcap::kMessageIndex) {
+      take_message_index(position, size);
+      return true;
+    }
+    finish_chunk();
+    if (opcode == mcap::kChunk) take_chunk(position, size);
+    if (opcode == mcap::kMessage) {
+      fields.skip(8, "a length");
+      const auto channel = fields.number<std::uint16_t>("a channel id");
+      fields.skip(4, "a sequence number");
+      add_message(channel, fields.number<std::uint64_t>("a log time"), position);
+    }
+    if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
+      const auto record = file_.read(position, size, "a record");
+      Bytes bytes(path_, position, record.data(), record.size());
+      parse_record(bytes);
+    }
+    if (opcode == mcap::kAttachment || opcode == mcap::kMetadata || opcode >= 0x80) {
+      others_.push_back(position);
+    }
+    if (opcode == mcap::kHeader) take_header(position, size);
+    has_footer_ = opcode == mcap::kFooter;
+    return !has_footer_;
+  }
+
+  void take_header(std::uint64_t position, std::uint64_t size) {
+    const auto record = file_.read(position, size, "a header");
+    Bytes fields(path_, position, record.data(), record.size());
+    fields.skip(kRecordHead, "a record");
+    profile_ = fields.string("a profile");
+  }
+
+  void take_chunk(std::uint64_t position, std::uint64_t size) {
+    const auto head = file_.read(position, std::min(size, kMaxHead), "a chunk");
+    Bytes fields(path_, position, head.data(), head.size());
+    Chunk chunk;
+    fields.skip(kRecordHead + 16, "the times of a chunk");
+    chunk.uncompressed_size = fields.number<std::uint64_t>("the size of a chunk");
+    chunk.uncompressed_crc = fields.number<std::uint32_t>("the checksum of a chunk");
+    chunk.compression = fields.string("the compression of a chunk");
+    chunk.compressed_size = fields.number<std::uint64_t>("the size of compressed records");
+    chunk.content = position + fields.position();
+    add_chunk(position, std::move(chunk));
+  }
+
+  void take_message_index(std::uint64_t position, std::uint64_t size) {
+    const auto record = file_.read(position, size, "a message index");
+    Bytes fields(path_, position, record.data(), record.size());
+    fields.skip(kRecordHead, "a record");
+    const auto channel = fields.number<std::uint16_t>("a channel id");
+    Bytes pairs =
+        fields.block(fields.number<std::uint32_t>("the length of an index"), "a message index");
+    while (pairs.remaining() > 0) {
+      const auto time = pairs.number<std::uint64_t>("a log time");
+      add_indexed(channel, time, pairs.number<std::uint64_t>("an offset"));
+    }
+  }
+
+  std::optional<ChunkedLog::Message> parse_record(Bytes& records) override {
+    const auto opcode = records.number<std::uint8_t>("an opcode");
+    Bytes fields = records.block(records.number<std::uint64_t>("a length"), "a record");
+    if (opcode != mcap::kMessage) {
+      take_definition(opcode, fields);
+      return std::nullopt;
+    }
+    const auto channel = fields.number<std::uint16_t>("a channel id");
+    MessageStamp stamp;
+    stamp.sequence = fields.number<std::uint32_t>("a sequence number");
+    const auto time = fields.number<std::uint64_t>("a log time");
+    stamp.publish_time = fields.number<std::uint64_t>("a publish time");
+    return Message{channel, time, stamp, fields};
+  }
+
+  void take_definition(std::uint8_t opcode, Bytes fields) {
+    if (opcode == mcap::kSchema) {
+      auto& schema = schemas_[fields.number<std::uint16_t>("a schema id")];
+      const std::string name = fields.string("a schema name");
+      const std::string encoding = fields.string("a schema encoding");
+      schema = std::make_shared<LogSchema>(
+          LogSchema{name, encoding, fields.string("the definition of a schema")});
+    }
+    if (opcode != mcap::kChannel) return;
+    const auto id = fields.number<std::uint16_t>("a channel id");
+    const auto schema = schemas_.find(fields.number<std::uint16_t>("a schema id"));
+    LogTopic topic;
+    if (schema != schemas_.end()) {
+      topic.schema = schema->second;
+      topic.type = plain_type(topic.schema->name);
+    }
+    topic.name = fields.string("a topic");
+    topic.message_encoding = fields.string("a message encoding");
+    topic.encoding = encoding_of(topic.message_encoding);
+    Bytes metadata = fields.block(fields.number<std::uint32_t>("the length of metadata"),
+                                  "metadata of a channel");
+    while (metadata.remaining() > 0) {
+      const std::string name = metadata.string("a name");
+      topic.metadata[name] = metadata.string("a value");
+    }
+    add_channel(id, std::move(topic));
+  }
+
+  bool is_complete() const override { return has_footer_; }
+
+  std::map<std::uint16_t, std::shared_ptr<const LogSchema>> schemas_;  ///< by id
+  std::vector<std::uint64_t> others_;  ///< positions of records that belong to no channel
+  bool has_footer_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<LogFile> open_mcap(const std::filesystem::path& path) {
+  return std::make_unique<McapFile>(path);
 }
 
 }  // namespace dynains

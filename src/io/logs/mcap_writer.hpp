@@ -11,10 +11,38 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/points.hpp"
 #include "log_file.hpp"
-#include "mcap_format.hpp"
 #include "raw_file.hpp"
 
 namespace dynains {
+
+/// The file format, version 0.
+namespace mcap {
+
+/// First and last bytes of a file.
+inline const std::string kMagic("\x89MCAP0\r\n", 8);
+
+/// First byte of a record, in the order of the specification, from 1 to 15. Records from 0x80 on
+/// are private to their writers.
+enum Opcode : std::uint8_t {
+  kNone,
+  kHeader,
+  kFooter,
+  kSchema,
+  kChannel,
+  kMessage,
+  kChunk,
+  kMessageIndex,
+  kChunkIndex,
+  kAttachment,
+  kAttachmentIndex,
+  kStatistics,
+  kMetadata,
+  kMetadataIndex,
+  kSummaryOffset,
+  kDataEnd
+};
+
+}  // namespace mcap
 
 /// Writes chunks of some megabytes with their index, and a summary. The file appears whole, at
 /// `commit()`, or not at all. All members throw IoError.

@@ -1,10 +1,9 @@
-#include "ros_bag.hpp"
-
 #include <algorithm>
 #include <string>
 #include <utility>
 
 #include "../failure.hpp"
+#include "chunked_log.hpp"
 
 namespace dynains {
 namespace {
@@ -13,13 +12,14 @@ namespace bag {
 
 const std::string kMagic = "#ROSBAG V2.0\n";
 
+/// In the order of the specification, from 2 on.
 enum Opcode : std::uint8_t {
-  kMessageData = 0x02,
-  kBagHeader = 0x03,
-  kIndexData = 0x04,
-  kChunk = 0x05,
-  kChunkInfo = 0x06,
-  kConnection = 0x07
+  kMessageData = 2,
+  kBagHeader,
+  kIndexData,
+  kChunk,
+  kChunkInfo,
+  kConnection
 };
 
 }  // namespace bag
@@ -63,108 +63,124 @@ std::uint64_t read_time(Bytes& in) {
   return kSecondOfLog * seconds + in.number<std::uint32_t>("nanoseconds");
 }
 
-}  // namespace
-
-RosBag::RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
-  profile_ = "ros1";
-  read_index(bag::kMagic, "expected \"#ROSBAG V2.0\" and the end of a line");
-}
-
-std::optional<std::uint64_t> RosBag::record_size(std::uint64_t position) {
-  std::uint64_t size = 0;
-  for (const char* const purpose : {"the length of a header", "the length of data"}) {
-    if (file_.size() - position - size < sizeof(std::uint32_t)) return std::nullopt;
-    const auto bytes = file_.read(position + size, sizeof(std::uint32_t), purpose);
-    Bytes length(path_, position + size, bytes.data(), bytes.size());
-    size += sizeof(std::uint32_t) + length.number<std::uint32_t>(purpose);
-    if (size > file_.size() - position) return std::nullopt;
+/// A bag of ROS 1 (wiki.ros.org/Bags/Format/2.0).
+class RosBag final : public ChunkedLog {
+ public:
+  explicit RosBag(const std::filesystem::path& path) : ChunkedLog(path) {
+    profile_ = "ros1";
+    read_index(bag::kMagic, "expected \"#ROSBAG V2.0\" and the end of a line");
   }
-  return size;
-}
 
-bool RosBag::take_record(std::uint64_t position, std::uint64_t size) {
-  // The data of a chunk are not read here.
-  const auto bytes = file_.read(position, std::min(size, kMaxHead), "a record");
-  Bytes rest(path_, position, bytes.data(), bytes.size());
-  const Bytes header = next_header(rest);
-  const auto opcode = number_in<std::uint8_t>(header, "op");
-  if (opcode == bag::kIndexData) {
-    take_index(position, size);
+ private:
+  std::optional<std::uint64_t> record_size(std::uint64_t position) override {
+    std::uint64_t size = 0;
+    for (const char* const purpose : {"the length of a header", "the length of data"}) {
+      if (file_.size() - position - size < sizeof(std::uint32_t)) return std::nullopt;
+      const auto bytes = file_.read(position + size, sizeof(std::uint32_t), purpose);
+      Bytes length(path_, position + size, bytes.data(), bytes.size());
+      size += sizeof(std::uint32_t) + length.number<std::uint32_t>(purpose);
+      if (size > file_.size() - position) return std::nullopt;
+    }
+    return size;
+  }
+
+  bool take_record(std::uint64_t position, std::uint64_t size) override {
+    // The data of a chunk are not read here.
+    const auto bytes = file_.read(position, std::min(size, kMaxHead), "a record");
+    Bytes rest(path_, position, bytes.data(), bytes.size());
+    const Bytes header = next_header(rest);
+    const auto opcode = number_in<std::uint8_t>(header, "op");
+    if (opcode == bag::kIndexData) {
+      take_index(position, size);
+      return true;
+    }
+    finish_chunk();
+    if (opcode == bag::kBagHeader) take_bag_header(position, header);
+    if (opcode == bag::kChunk) take_chunk(position, header, rest);
+    if (opcode == bag::kChunkInfo) ++chunk_infos_;
+    if (opcode == bag::kMessageData) {
+      Bytes time = field_of(header, "time");
+      add_message(number_in<std::uint32_t>(header, "conn"), read_time(time), position);
+    }
+    if (opcode == bag::kConnection) {
+      const auto record = file_.read(position, size, "a connection");
+      Bytes connection(path_, position, record.data(), record.size());
+      parse_record(connection);
+    }
     return true;
   }
-  finish_chunk();
-  if (opcode == bag::kBagHeader) take_bag_header(position, header);
-  if (opcode == bag::kChunk) take_chunk(position, header, rest);
-  if (opcode == bag::kChunkInfo) ++chunk_infos_;
-  if (opcode == bag::kMessageData) {
+
+  void take_bag_header(std::uint64_t position, const Bytes& header) {
+    const std::optional<Bytes> encryptor = find_field(header, "encryptor");
+    if (encryptor && encryptor->remaining() > 0) {
+      fail_at_byte(path_, position, "expected a bag without encryption");
+    }
+    has_index_ = number_in<std::uint64_t>(header, "index_pos") != 0;
+    announced_chunks_ = number_in<std::uint32_t>(header, "chunk_count");
+  }
+
+  void take_chunk(std::uint64_t position, const Bytes& header, Bytes& rest) {
+    Chunk chunk;
+    chunk.compression = text_in(header, "compression");
+    if (chunk.compression == "none") chunk.compression.clear();
+    chunk.uncompressed_size = number_in<std::uint32_t>(header, "size");
+    chunk.compressed_size = rest.number<std::uint32_t>("the length of data");
+    chunk.content = position + rest.position();
+    add_chunk(position, std::move(chunk));
+  }
+
+  void take_index(std::uint64_t position, std::uint64_t size) {
+    const auto record = file_.read(position, size, "an index");
+    Bytes rest(path_, position, record.data(), record.size());
+    const Bytes header = next_header(rest);
+    if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
+    const auto connection = number_in<std::uint32_t>(header, "conn");
+    Bytes entries = rest.block(rest.number<std::uint32_t>("the length of data"), "an index");
+    while (entries.remaining() > 0) {
+      const std::uint64_t time = read_time(entries);
+      add_indexed(connection, time, entries.number<std::uint32_t>("an offset"));
+    }
+  }
+
+  std::optional<ChunkedLog::Message> parse_record(Bytes& records) override {
+    const Bytes header = next_header(records);
+    const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
+    const auto opcode = number_in<std::uint8_t>(header, "op");
+    if (opcode == bag::kConnection) take_connection(header, content);
+    if (opcode != bag::kMessageData) return std::nullopt;
     Bytes time = field_of(header, "time");
-    add_message(number_in<std::uint32_t>(header, "conn"), read_time(time), position);
+    const std::uint64_t recorded = read_time(time);
+    return Message{number_in<std::uint32_t>(header, "conn"), recorded, {recorded, 0}, content};
   }
-  if (opcode == bag::kConnection) {
-    const auto record = file_.read(position, size, "a connection");
-    Bytes connection(path_, position, record.data(), record.size());
-    parse_record(connection);
+
+  void take_connection(const Bytes& header, Bytes content) {
+    LogTopic topic;
+    topic.name = text_in(header, "topic");
+    topic.type = text_in(content, "type");
+    topic.encoding = MessageEncoding::kRos1;
+    topic.message_encoding = "ros1";
+    const std::optional<Bytes> definition = find_field(content, "message_definition");
+    topic.schema = std::make_shared<LogSchema>(
+        LogSchema{topic.type, "ros1msg", definition ? definition->rest_as_text() : std::string()});
+    for (const std::string name : {"callerid", "latching", "md5sum"}) {
+      const std::optional<Bytes> value = find_field(content, name);
+      if (value) topic.metadata[name] = value->rest_as_text();
+    }
+    add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
   }
-  return true;
-}
 
-void RosBag::take_bag_header(std::uint64_t position, const Bytes& header) {
-  const std::optional<Bytes> encryptor = find_field(header, "encryptor");
-  if (encryptor && encryptor->remaining() > 0) {
-    fail_at_byte(path_, position, "expected a bag without encryption");
-  }
-  has_index_ = number_in<std::uint64_t>(header, "index_pos") != 0;
-  announced_chunks_ = number_in<std::uint32_t>(header, "chunk_count");
-}
+  /// A recorder writes the place of the index, and the number of chunks, when it closes the bag.
+  bool is_complete() const override { return has_index_ && chunk_infos_ == announced_chunks_; }
 
-void RosBag::take_chunk(std::uint64_t position, const Bytes& header, Bytes& rest) {
-  Chunk chunk;
-  chunk.compression = text_in(header, "compression");
-  if (chunk.compression == "none") chunk.compression.clear();
-  chunk.uncompressed_size = number_in<std::uint32_t>(header, "size");
-  chunk.compressed_size = rest.number<std::uint32_t>("the length of data");
-  chunk.content = position + rest.position();
-  add_chunk(position, std::move(chunk));
-}
+  bool has_index_ = false;
+  std::uint32_t announced_chunks_ = 0;
+  std::uint32_t chunk_infos_ = 0;
+};
 
-void RosBag::take_index(std::uint64_t position, std::uint64_t size) {
-  const auto record = file_.read(position, size, "an index");
-  Bytes rest(path_, position, record.data(), record.size());
-  const Bytes header = next_header(rest);
-  if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
-  const auto connection = number_in<std::uint32_t>(header, "conn");
-  Bytes entries = rest.block(rest.number<std::uint32_t>("the length of data"), "an index");
-  while (entries.remaining() > 0) {
-    const std::uint64_t time = read_time(entries);
-    add_indexed(connection, time, entries.number<std::uint32_t>("an offset"));
-  }
-}
+}  // namespace
 
-std::optional<ChunkedLog::Message> RosBag::parse_record(Bytes& records) {
-  const Bytes header = next_header(records);
-  const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
-  const auto opcode = number_in<std::uint8_t>(header, "op");
-  if (opcode == bag::kConnection) take_connection(header, content);
-  if (opcode != bag::kMessageData) return std::nullopt;
-  Bytes time = field_of(header, "time");
-  const std::uint64_t recorded = read_time(time);
-  return Message{number_in<std::uint32_t>(header, "conn"), recorded, {recorded, 0}, content};
-}
-
-void RosBag::take_connection(const Bytes& header, Bytes content) {
-  LogTopic topic;
-  topic.name = text_in(header, "topic");
-  topic.type = text_in(content, "type");
-  topic.encoding = MessageEncoding::kRos1;
-  topic.message_encoding = "ros1";
-  const std::optional<Bytes> definition = find_field(content, "message_definition");
-  topic.schema = std::make_shared<LogSchema>(
-      LogSchema{topic.type, "ros1msg", definition ? definition->rest_as_text() : std::string()});
-  for (const std::string name : {"callerid", "latching", "md5sum"}) {
-    const std::optional<Bytes> value = find_field(content, name);
-    if (value) topic.metadata[name] = value->rest_as_text();
-  }
-  add_channel(number_in<std::uint32_t>(header, "conn"), std::move(topic));
+std::unique_ptr<LogFile> open_ros_bag(const std::filesystem::path& path) {
+  return std::make_unique<RosBag>(path);
 }
 
 }  // namespace dynains
