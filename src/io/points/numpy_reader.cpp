@@ -1,15 +1,234 @@
 #include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "../failure.hpp"
+#include "../logs/bytes.hpp"
 #include "../logs/raw_file.hpp"
-#include "npy_array.hpp"
+#include "../scalar.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {
 namespace {
+
+constexpr std::string_view kNpyMagic("\x93NUMPY", 6);
+constexpr std::size_t kMaxNpyField = 1000000000;              // bytes
+constexpr std::size_t kMaxNpyHeader = std::size_t{1} << 16U;  // bytes
+
+/// Header of an array (.npy, format 1 to 3).
+struct NpyArray {
+  /// A field of a structured array, or the only value of another one.
+  struct Field {
+    std::string name;            ///< empty if the array is not structured
+    std::optional<Scalar> type;  ///< empty: not a number that is read here
+    bool swap = false;           ///< big-endian
+    std::size_t offset = 0;      ///< bytes from the begin of an item
+  };
+
+  std::vector<Field> fields;
+  std::vector<std::uint64_t> shape;
+  bool is_column_major = false;
+  std::size_t item_size = 0;     ///< bytes
+  std::uint64_t data_begin = 0;  ///< byte of the first item
+
+  bool is_structured() const { return !fields.front().name.empty(); }
+  /// Product of the shape.
+  std::uint64_t item_count() const {
+    std::uint64_t count = 1;
+    for (const std::uint64_t length : shape) count *= length;
+    return count;
+  }
+};
+
+/// Parses the literal of Python in which a header describes its array.
+class NpyLiteral {
+ public:
+  NpyLiteral(const Bytes& place, std::string_view text) : place_(place), rest_(text) {}
+
+  bool is_next(char c) {
+    const std::size_t begin = rest_.find_first_not_of(" \t\r\n");
+    rest_.remove_prefix(begin == std::string_view::npos ? rest_.size() : begin);
+    return !rest_.empty() && rest_.front() == c;
+  }
+  bool skip(char c) {
+    if (!is_next(c)) return false;
+    rest_.remove_prefix(1);
+    return true;
+  }
+  void expect(char c) {
+    if (!skip(c)) fail(std::string("expected '") + c + '\'');
+  }
+  std::string string() {
+    const char quote = is_next('"') ? '"' : '\'';
+    expect(quote);
+    const std::size_t end = rest_.find(quote);
+    if (end == std::string_view::npos) fail("expected the end of a text");
+    std::string text(rest_.substr(0, end));
+    rest_.remove_prefix(end + 1);
+    return text;
+  }
+  bool boolean() {
+    for (const auto& [name, value] : {std::pair("True", true), std::pair("False", false)}) {
+      if (!is_next(name[0])) continue;
+      const std::string_view word(name);
+      if (rest_.substr(0, word.size()) != word) break;
+      rest_.remove_prefix(word.size());
+      return value;
+    }
+    fail("expected True or False");
+  }
+  /// (3,), (3, 4) or ().
+  std::vector<std::uint64_t> shape() {
+    std::vector<std::uint64_t> values;
+    expect('(');
+    while (!skip(')')) {
+      std::uint64_t value = 0;
+      const auto [stop, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+      if (error != std::errc{}) fail("expected the length of a dimension");
+      rest_.remove_prefix(static_cast<std::size_t>(stop - rest_.data()));
+      values.push_back(value);
+      if (!skip(',') && !is_next(')')) fail("expected ',' or ')'");
+    }
+    return values;
+  }
+  [[noreturn]] void fail(const std::string& what) const {
+    place_.fail("header of the array: " + what);
+  }
+
+ private:
+  const Bytes& place_;
+  std::string_view rest_;
+};
+
+/// Appends a field of a type such as "<f4" and gives its size, bytes.
+std::size_t add_npy_field(const NpyLiteral& literal, const std::string& name,
+                          const std::string& type, NpyArray& array) {
+  std::string_view text = type;
+  const bool is_big = !text.empty() && text.front() == '>';
+  if (!text.empty() && std::string_view("<>|=").find(text.front()) != std::string_view::npos) {
+    text.remove_prefix(1);
+  }
+  if (text == "O") {  // pickled objects, of at least one byte each
+    array.fields.push_back({name, std::nullopt, false, array.item_size});
+    return 1;
+  }
+  std::uint32_t size = 0;
+  const char* const begin = text.data() + std::min<std::size_t>(1, text.size());
+  const auto [stop, error] = std::from_chars(begin, text.data() + text.size(), size);
+  if (text.empty() || error != std::errc{} || size == 0 || size > kMaxNpyField) {
+    literal.fail("expected a type such as '<f4', found '" + type.substr(0, 40) + '\'');
+  }
+  struct Type {
+    std::string_view name;
+    Scalar scalar;
+  };
+  static constexpr Type kTypes[] = {{"f4", Scalar::kFloat},  {"f8", Scalar::kDouble},
+                                    {"u1", Scalar::kUint8},  {"u2", Scalar::kUint16},
+                                    {"u4", Scalar::kUint32}, {"u8", Scalar::kUint64},
+                                    {"i1", Scalar::kInt8},   {"i2", Scalar::kInt16},
+                                    {"i4", Scalar::kInt32},  {"i8", Scalar::kInt64}};
+  NpyArray::Field field;
+  field.name = name;
+  field.swap = is_big;
+  field.offset = array.item_size;
+  for (const Type& known : kTypes) {
+    if (known.name == text) field.type = known.scalar;
+  }
+  array.fields.push_back(std::move(field));
+  return text.front() == 'U' ? 4 * size : size;  // letters have four bytes
+}
+
+void read_npy_type(NpyLiteral& literal, NpyArray& array) {
+  if (!literal.skip('[')) {
+    array.item_size += add_npy_field(literal, "", literal.string(), array);
+    return;
+  }
+  while (!literal.skip(']')) {
+    literal.expect('(');
+    const std::string name = literal.string();
+    literal.expect(',');
+    if (name.empty() || literal.is_next('[')) literal.fail("expected fields of one level");
+    std::size_t size = add_npy_field(literal, name, literal.string(), array);
+    if (literal.skip(',') && literal.is_next('(')) {
+      // Several values in one field are no column.
+      array.fields.back().type.reset();
+      for (const std::uint64_t length : literal.shape()) {
+        if (length > 0 && size > kMaxNpyField / length) {
+          literal.fail("expected fields of at most 1 GB");
+        }
+        size *= static_cast<std::size_t>(length);
+      }
+    }
+    literal.expect(')');
+    array.item_size += size;
+    literal.skip(',');
+  }
+  if (array.fields.empty()) literal.fail("expected at least one field");
+}
+
+void read_npy_description(NpyLiteral& literal, NpyArray& array) {
+  bool has_shape = false;
+  literal.expect('{');
+  while (!literal.skip('}')) {
+    const std::string key = literal.string();
+    literal.expect(':');
+    if (key == "descr" && array.fields.empty()) {
+      read_npy_type(literal, array);
+    } else if (key == "fortran_order") {
+      array.is_column_major = literal.boolean();
+    } else if (key == "shape") {
+      array.shape = literal.shape();
+      has_shape = true;
+    } else {
+      literal.fail("expected descr, fortran_order and shape, once each");
+    }
+    literal.skip(',');
+  }
+  if (array.fields.empty() || !has_shape) literal.fail("expected descr and shape");
+}
+
+/// Reads the header at the begin of `in`, which holds the first bytes of an array of `size` bytes,
+/// at least kMaxNpyHeader of them if there are as many. Throws IoError unless all items lie
+/// within `size`.
+NpyArray parse_npy_header(Bytes in, std::uint64_t size) {
+  const Bytes begin = in;
+  if (in.remaining() < kNpyMagic.size() ||
+      !std::equal(kNpyMagic.begin(), kNpyMagic.end(), in.here(),
+                  [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; })) {
+    in.fail("expected the magic bytes of an array of NumPy");
+  }
+  in.skip(kNpyMagic.size(), "magic bytes");
+  const auto major = in.number<std::uint8_t>("a version");
+  in.skip(1, "a version");
+  if (major < 1 || major > 3) in.fail("expected format 1 to 3 of NumPy");
+  const std::uint32_t length = major == 1 ? in.number<std::uint16_t>("the length of the header")
+                                          : in.number<std::uint32_t>("the length of the header");
+  Bytes header = in.block(length, "the header of the array");
+  NpyArray array;
+  array.data_begin = in.position();
+  const std::string text = header.rest_as_text();
+  NpyLiteral literal(header, text);
+  read_npy_description(literal, array);
+
+  // Items that each step leaves room for: a product could overflow.
+  std::uint64_t available = array.item_size == 0 ? 0 : (size - array.data_begin) / array.item_size;
+  const bool is_empty = std::count(array.shape.begin(), array.shape.end(), 0U) > 0;
+  if (array.item_size == 0) begin.fail("expected items of at least one byte");
+  for (const std::uint64_t dimension : array.shape) available /= is_empty ? 1 : dimension;
+  // An array without dimensions has one item.
+  if (!is_empty && available == 0) {
+    begin.fail("expected all items of the array, found " + std::to_string(size) + " bytes");
+  }
+  return array;
+}
 
 /// A column of numbers in the bytes of an array.
 struct NpyColumn {
