@@ -2,7 +2,6 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
-#include "dynains/io/point_bytes.hpp"
 #include "run/output/output_folder.hpp"
 
 namespace dynains::run {

@@ -55,14 +55,13 @@ TEST_CASE("Points are read as they were written, in their order") {
   const auto count = GENERATE(values<std::size_t>({0, 9, 10, 123456}));
   PointColumns columns;
   columns.intensity = columns.label = columns.time = columns.ring = GENERATE(false, true);
-  columns.double_xyz = columns.rgb = GENERATE(false, true);
+  columns.double_xyz = GENERATE(false, true);
   const fs::path path = folder / ("points" + extension);
   PointFileWriter writer(path, columns);
   for (std::size_t k = 0; k < count; ++k) {
     const int i = static_cast<int>(k);
     FilePoint point;
     point.position = {691234.125 + i, -2.0 * i, 0.1 * i};
-    point.rgb = {200, 100, 50};
     point.intensity = static_cast<float>(i);
     point.label = static_cast<std::uint32_t>(3 * i);
     point.ring = static_cast<std::uint16_t>(i % 64);
@@ -96,19 +95,19 @@ TEST_CASE("Points are read as they were written, in their order") {
 TEST_CASE("A written PLY has the bytes of the format") {
   TemporaryFolder folder;
   PointColumns columns;
-  columns.rgb = true;
+  columns.label = true;
   PointFileWriter writer(folder / "a.ply", columns);
   FilePoint point;
   point.position = {1.0, 2.0, 3.0};
-  point.rgb = {7, 8, 9};
+  point.label = 7;
   writer.add(point);
   writer.commit();
   const std::string text = read_text(folder / "a.ply");
   CHECK_THAT(text, StartsWith("ply\nformat binary_little_endian 1.0\ncomment dynains..."));
   CHECK(text.substr(text.find("\nelement")) ==
         "\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n" +
-            pack(1.0F, 2.0F, 3.0F) + "\x07\x08\x09");
+        "property uint label\nend_header\n" +
+            pack(1.0F, 2.0F, 3.0F) + pack(7U));
 }
 
 TEST_CASE("A point file without commit leaves no file") {

@@ -33,13 +33,19 @@ void read_scan(const std::filesystem::path& file, std::vector<float>& xyzi);
 /// Reads a file of labels, one uint32 per point. Throws IoError unless it has `count` labels.
 std::vector<std::uint32_t> read_labels(const std::filesystem::path& file, std::size_t count);
 
-/// Writers of this layout. Each file is replaced atomically; folders must exist. Scans and labels
-/// are not synchronized with the disk: see `sync_files()`. All throw IoError.
+/// Reads a file of one byte per point. Empty if there is no such file. Throws IoError unless it has
+/// `count` bytes.
+std::vector<std::uint8_t> read_point_bytes(const std::filesystem::path& file, std::size_t count);
+
+/// Writers of this layout. Each file is replaced atomically; folders must exist. Scans, labels
+/// and bytes are not synchronized with the disk: see `sync_files()`. All throw IoError.
 ///
 /// `xyzi`: x y z intensity of each point, interleaved, m.
 void write_scan(const std::filesystem::path& file, Span<const float> xyzi);
 /// `labels`: class in the lower, instance in the upper 16 bits.
 void write_labels(const std::filesystem::path& file, Span<const std::uint32_t> labels);
+/// `bytes`: one per point.
+void write_point_bytes(const std::filesystem::path& file, Span<const std::uint8_t> bytes);
 /// `poses`: the poses P of poses.txt, equal to T_world_sensor without calib.txt.
 void write_poses(const std::filesystem::path& file, Span<const Pose> poses);
 /// `times`: s, one per scan.

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/point_records.hpp"
 #include "dynains/pose.hpp"
 
 namespace dynains {
@@ -18,6 +17,27 @@ namespace dynains {
 /// Largest coordinate, m, that a float represents with an error of at most 0.5 mm. Larger
 /// coordinates require doubles: UTM coordinates as floats have errors of up to 0.25 m.
 inline constexpr double kFloatCoordinateLimit = 1e4;
+
+/// One point to write. Members without a column in the file are ignored; values are written as they
+/// are.
+struct FilePoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  float intensity = 0.0F;
+  std::uint32_t label = 0;
+  std::uint16_t ring = 0;
+  double time = 0.0;
+  std::uint16_t session = 0;
+};
+
+/// Columns in addition to x y z.
+struct PointColumns {
+  bool double_xyz = false;  ///< x y z as double; some PCD readers support floats only
+  bool intensity = false;   ///< float `intensity`
+  bool label = false;       ///< uint32 `label`
+  bool ring = false;        ///< uint16 `ring`
+  bool time = false;        ///< double `time`
+  bool session = false;     ///< uint16 `session`, of a map of many sessions
+};
 
 /// Writes a binary point file, point by point, with few points in memory. The number of points need
 /// not be known in advance. `commit()` creates or replaces the file atomically.
@@ -43,7 +63,7 @@ class PointFileWriter {
   Pose viewpoint_;
   bool pcd_;
   std::size_t size_ = 0;
-  PointRecords buffer_;
+  std::string buffer_;  ///< bytes of points that are not in the file yet
   AtomicFile file_;
 };
 
@@ -86,7 +106,7 @@ PointFile read_points(const std::filesystem::path& path);
 /// Header of a point file.
 struct PointFileHeader {
   Pose viewpoint = Pose::Identity();  ///< as in PointFile
-  PointColumns columns;               ///< without rgb and double_xyz
+  PointColumns columns;               ///< without double_xyz
   std::uint64_t point_count = 0;
 };
 /// Reads the header of a point file, but no points; lines of a text are counted. Throws IoError

@@ -56,6 +56,19 @@ std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) 
   return labels;
 }
 
+std::vector<std::uint8_t> read_point_bytes(const fs::path& file, std::size_t count) {
+  const std::string expected =
+      "; expected a byte for each of the scan's " + std::to_string(count) + " points";
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error == std::errc::no_such_file_or_directory) return {};
+  if (error) fail(file, error.message() + expected);
+  if (size != count) fail(file, "has " + std::to_string(size) + " bytes" + expected);
+  std::vector<std::uint8_t> bytes(count);
+  read_all(file, bytes);
+  return bytes;
+}
+
 void write_scan(const fs::path& file, Span<const float> xyzi) {
   if (xyzi.size() % 4 != 0) fail(file, "expected 4 floats for each point to write");
   write_all(file, xyzi);
@@ -63,6 +76,10 @@ void write_scan(const fs::path& file, Span<const float> xyzi) {
 
 void write_labels(const fs::path& file, Span<const std::uint32_t> labels) {
   write_all(file, labels);
+}
+
+void write_point_bytes(const fs::path& file, Span<const std::uint8_t> bytes) {
+  write_all(file, bytes);
 }
 
 void write_poses(const fs::path& file, Span<const Pose> poses) {

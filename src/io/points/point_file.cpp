@@ -4,9 +4,11 @@
 #include <sstream>
 #include <string>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 
 #include "../failure.hpp"
+#include "../scalar.hpp"
 #include "../text.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
@@ -45,18 +47,36 @@ const PointFileFormat& format_to_read(const fs::path& path) {
                         : "expected a name that ends in .ply, .pcd, .las, .npy, .xyz or .csv");
 }
 
+/// Calls `visit(name, value)` for the columns of a point, in the order of the file.
+template <class Visit>
+void visit_columns(const PointColumns& columns, const FilePoint& point, Visit&& visit) {
+  constexpr const char* axes[] = {"x", "y", "z"};
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (columns.double_xyz) {
+      visit(axes[i], point.position[i]);
+    } else {
+      visit(axes[i], static_cast<float>(point.position[i]));
+    }
+  }
+  if (columns.intensity) visit("intensity", point.intensity);
+  if (columns.label) visit("label", point.label);
+  if (columns.ring) visit("ring", point.ring);
+  if (columns.time) visit("time", point.time);
+  if (columns.session) visit("session", point.session);
+}
+
+const char* ply_type(float) { return "float"; }
+const char* ply_type(double) { return "double"; }
+const char* ply_type(std::uint16_t) { return "ushort"; }
+const char* ply_type(std::uint32_t) { return "uint"; }
+
 std::string ply_header(std::size_t count, const PointColumns& columns, const std::string& padding,
                        const Pose&) {
-  const std::string coordinate = columns.double_xyz ? "double" : "float";
   std::string text = "ply\nformat binary_little_endian 1.0\ncomment dynains" + padding +
                      "\nelement vertex " + std::to_string(count) + '\n';
-  for (const char* axis : {"x", "y", "z"}) text += "property " + coordinate + ' ' + axis + '\n';
-  if (columns.intensity) text += "property float intensity\n";
-  if (columns.rgb) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  if (columns.label) text += "property uint label\n";
-  if (columns.ring) text += "property ushort ring\n";
-  if (columns.time) text += "property double time\n";
-  if (columns.session) text += "property ushort session\n";
+  visit_columns(columns, {}, [&](const std::string& name, auto value) {
+    text += std::string("property ") + ply_type(value) + ' ' + name + '\n';
+  });
   return text + "end_header\n";
 }
 
@@ -73,22 +93,13 @@ std::string viewpoint_line(const Pose& pose) {
 
 std::string pcd_header(std::size_t count, const PointColumns& columns, const std::string& padding,
                        const Pose& viewpoint) {
-  std::string fields = "FIELDS x y z";
-  std::string sizes = columns.double_xyz ? "SIZE 8 8 8" : "SIZE 4 4 4";
-  std::string types = "TYPE F F F";
-  std::string counts = "COUNT 1 1 1";
-  const auto add = [&](const std::string& name, char type, std::size_t bytes = 4) {
+  std::string fields = "FIELDS", sizes = "SIZE", types = "TYPE", counts = "COUNT";
+  visit_columns(columns, {}, [&](const std::string& name, auto value) {
     fields += ' ' + name;
-    sizes += ' ' + std::to_string(bytes);
-    types += std::string(" ") + type;
+    sizes += ' ' + std::to_string(sizeof(value));
+    types += std::is_floating_point_v<decltype(value)> ? " F" : " U";
     counts += " 1";
-  };
-  if (columns.intensity) add("intensity", 'F');
-  if (columns.rgb) add("rgb", 'F');
-  if (columns.label) add("label", 'U');
-  if (columns.ring) add("ring", 'U', 2);
-  if (columns.time) add("time", 'F', 8);
-  if (columns.session) add("session", 'U', 2);
+  });
   const std::string size = std::to_string(count);
   return "# .PCD v0.7 - Point Cloud Data file format\n# dynains" + padding + "\nVERSION 0.7\n" +
          fields + '\n' + sizes + '\n' + types + '\n' + counts + "\nWIDTH " + size + "\nHEIGHT 1\n" +
@@ -99,11 +110,7 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
                                  const Pose& viewpoint)
-    : columns_(columns),
-      viewpoint_(viewpoint),
-      pcd_(is_pcd(path)),
-      buffer_(columns, pcd_),
-      file_(path) {
+    : columns_(columns), viewpoint_(viewpoint), pcd_(is_pcd(path)), file_(path) {
   file_.stream() << header();
 }
 
@@ -117,14 +124,13 @@ std::string PointFileWriter::header() const {
 }
 
 void PointFileWriter::add(const FilePoint& point) {
-  buffer_.add(point);
+  visit_columns(columns_, point, [&](const char*, auto value) { append_number(value, buffer_); });
   ++size_;
-  if (buffer_.bytes().size() >= 1U << 16U) write_buffer();
+  if (buffer_.size() >= 1U << 16U) write_buffer();
 }
 
 void PointFileWriter::write_buffer() {
-  const Span<const char> bytes = buffer_.bytes();
-  file_.stream().write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file_.stream().write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
   buffer_.clear();
 }
 
