@@ -1,5 +1,3 @@
-#include "open_recording.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <iomanip>

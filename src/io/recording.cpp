@@ -12,9 +12,9 @@
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "io/poses/recording_poses.hpp"
-#include "open_recording.hpp"
 #include "points/deskew.hpp"
 #include "points/point_clock.hpp"
+#include "scan_reader.hpp"
 #include "text.hpp"
 
 namespace dynains {

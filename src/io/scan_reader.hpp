@@ -1,4 +1,4 @@
-// How the scans of a recording are read, by their format.
+// Opening a recording, and how its scans are read, by their format.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -40,5 +40,14 @@ class ScanReader {
 /// For scans in files, one each.
 std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout);
 std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans);
+
+struct OpenedRecording {
+  RecordingContents contents;
+  std::unique_ptr<ScanReader> reader;
+};
+
+/// Reads and checks all files except points and labels. Throws IoError with path, position and
+/// expected content, and ConfigError for options that are for recordings of another format.
+OpenedRecording open_recording(const std::filesystem::path& path, const RecordingOptions& options);
 
 }  // namespace dynains

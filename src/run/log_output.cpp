@@ -10,7 +10,6 @@
 
 #include "dynains/errors.hpp"
 #include "interrupt.hpp"
-#include "io/logs/cloud_edit.hpp"
 #include "io/logs/log_copy.hpp"
 #include "io/logs/log_scans.hpp"
 

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "io/logs/mcap_writer.hpp"
-#include "io/logs/message_types.hpp"
 #include "io/logs/message_writer.hpp"
 #include "io/scalar.hpp"
 #include "simulation/write_sequence.hpp"

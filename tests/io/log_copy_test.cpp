@@ -14,7 +14,6 @@
 
 #include "db3_writer.hpp"
 #include "files.hpp"
-#include "io/logs/cloud_edit.hpp"
 #include "io/logs/log_file.hpp"
 #include "log_writer.hpp"
 #include "ros_writer.hpp"

@@ -1,4 +1,4 @@
-// Fields of a message of ROS, in order.
+// Fields of a message of ROS, in order, and the types of the messages that are written.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -111,5 +112,14 @@ inline std::string cloud_message(std::uint64_t time, const std::string& frame,
   out.number(std::uint8_t{0}).number(step).number(size);                // little endian
   return out.number(size).raw(points).number(std::uint8_t{1}).bytes();  // dense
 }
+
+/// Schema of a message of ROS 2, for example "tf2_msgs/msg/TFMessage"; with its definition if it is
+/// one of the types below.
+std::shared_ptr<const LogSchema> ros2_schema(const std::string& name);
+
+/// A topic of sensor_msgs/msg/PointCloud2.
+LogTopic cloud_topic(const std::string& name);
+/// A topic of tf2_msgs/msg/TFMessage.
+LogTopic transforms_topic(const std::string& name);
 
 }  // namespace dynains

@@ -12,7 +12,7 @@
 
 #include "../failure.hpp"
 #include "log_file.hpp"
-#include "message_types.hpp"
+#include "message_writer.hpp"
 #include "raw_file.hpp"
 
 namespace dynains {

@@ -1,4 +1,4 @@
-#include "message_types.hpp"
+#include "message_writer.hpp"
 
 namespace dynains {
 namespace {
