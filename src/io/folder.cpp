@@ -21,6 +21,12 @@ std::optional<FileIdentity> identity_of(const std::filesystem::path& path) {
   return FileIdentity(status.st_dev, status.st_ino);
 }
 
+void create_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) fail(folder, "cannot be created: " + error.message());
+}
+
 Folder::Folder(std::filesystem::path path)
     : path_(std::move(path)),
       descriptor_(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {

@@ -17,6 +17,9 @@ using FileIdentity = std::pair<dev_t, ino_t>;
 /// Identity of the file or folder that `path` leads to, through links; nothing if there is none.
 std::optional<FileIdentity> identity_of(const std::filesystem::path& path);
 
+/// Creates a folder and those above it. Throws IoError.
+void create_folder(const std::filesystem::path& folder);
+
 /// An open folder. All members throw IoError with the path.
 class Folder {
  public:

@@ -10,7 +10,6 @@
 #include "simulation/materials.hpp"
 #include "simulation/random.hpp"
 #include "simulation/renderer.hpp"
-#include "simulation/returns.hpp"
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {
@@ -92,6 +91,37 @@ Pose stand_on(Terrain& terrain, const Waypoint& at, double length, double width)
   return isometry(rotation(at.heading, pitch, roll), at.position.x, at.position.y, z);
 }
 
+/// Place where a beam meets the ground or an object.
+struct Surface {
+  float range = 0;   ///< m
+  float cosine = 1;  ///< of the angle of incidence
+  float loss = 0;    ///< probability of no return, besides that of weak returns
+  float reflectivity = 0;
+  float roughness = 0;  ///< m, added to the noise of the range
+  std::uint32_t label = 0;
+};
+
+/// Surfaces in the order of measurement.
+using Surfaces = std::vector<std::optional<Surface>>;
+
+float power_of(const Surface& surface, float share) {
+  return share * surface.reflectivity / std::max(surface.range * surface.range, 0.01F);
+}
+
+/// The return of two surfaces, `share` of the beam on the first: one if they are less than 1.5 m
+/// apart, which is of neither if it lies more than 0.25 m from both.
+Surface one_return(const Surface& own, const Surface& other, float share) {
+  if (std::abs(own.range - other.range) > 1.5F) {
+    return power_of(own, share) >= power_of(other, 1 - share) ? own : other;
+  }
+  Surface result = share >= 0.5F ? own : other;
+  result.range = share * own.range + (1 - share) * other.range;
+  if (std::min(std::abs(result.range - own.range), std::abs(result.range - other.range)) > 0.25F) {
+    result.label = semantic::kOutlier;
+  }
+  return result;
+}
+
 }  // namespace
 
 class Simulator::Implementation {
@@ -99,8 +129,7 @@ class Simulator::Implementation {
   explicit Implementation(const Config& config)
       : config_((config.validate(), config)),
         model_(sensor_model(config.sensor, config.seed)),
-        world_(build_world(config)),
-        returns_(config_, model_) {
+        world_(build_world(config)) {
     if (config_.max_range > 0) model_.max_range = config_.max_range;
     if (config_.sensor_height > 0) model_.height = config_.sensor_height;
     play();
@@ -440,6 +469,47 @@ class Simulator::Implementation {
     if (scan.objects.empty() && columns.first == 0) scan.objects = std::move(states);
   }
 
+  bool is_lost(std::size_t column, std::uint64_t seed) const {
+    if (config_.packet_loss <= 0) return false;
+    return unit_float(mix(mix(seed, 15), column / model_.packet)) <
+           static_cast<float>(config_.packet_loss);
+  }
+
+  float bias_of(int laser) const {
+    if (config_.beam_bias <= 0) return 0;
+    return static_cast<float>(config_.beam_bias) *
+           normal_float(mix(mix(config_.seed, 13), static_cast<std::uint64_t>(laser)));
+  }
+
+  /// The surface beside, if it lies within the width of the beam as well, is seen with it.
+  Surface mixed(std::size_t i, std::size_t columns, std::uint64_t random) const {
+    const Surface& own = *surfaces_[i];
+    if (config_.divergence <= 0) return own;
+    const bool later = unit_float(mix(random, 7)) < 0.5F;
+    const std::size_t column = i % columns;
+    if (later ? column + 1 == columns : column == 0) return own;
+    const std::size_t beside = later ? i + 1 : i - 1;
+    if (!surfaces_[beside]) return own;
+    const auto& order = beams_.measured_order();
+    const float gap = norm(beams_.direction(order[i]) - beams_.direction(order[beside]));
+    // The edge lies anywhere between the two beams, within half a width with this probability.
+    const auto width = static_cast<float>(config_.divergence * kPi / 180);
+    if (unit_float(mix(random, 8)) * gap >= width) return own;
+    return one_return(own, *surfaces_[beside], 0.5F + 0.5F * unit_float(mix(random, 9)));
+  }
+
+  /// The surface that beam number `i` of some columns reports. `seed` differs from part to part of
+  /// all scans.
+  std::optional<Surface> reported(std::size_t i, BeamTable::Columns columns,
+                                  std::uint64_t seed) const {
+    const auto count = static_cast<std::size_t>(columns.last - columns.first);
+    const std::size_t column = static_cast<std::size_t>(columns.first) + i % count;
+    if (!surfaces_[i] || is_lost(column, seed)) return std::nullopt;
+    Surface result = mixed(i, count, mix(seed, beams_.measured_order()[i]));
+    result.range += bias_of(model_.laser_of(i, count));
+    return result;
+  }
+
   /// Turns surfaces into points with noise, losses and labels.
   void measure(const Moment& moment, BeamTable::Columns columns, SimulatedScan& scan,
                std::uint64_t scan_seed) {
@@ -460,7 +530,7 @@ class Simulator::Implementation {
       surfaces_.push_back(surface);
     }
     for (std::size_t i = 0; i < order.size(); ++i) {
-      const std::optional<Surface> seen = returns_.at(surfaces_, beams_, i, columns, scan_seed);
+      const std::optional<Surface> seen = reported(i, columns, scan_seed);
       if (seen) add_point(*seen, beams_.direction(order[i]), mix(scan_seed, order[i]), scan);
     }
   }
@@ -508,7 +578,6 @@ class Simulator::Implementation {
   std::vector<std::array<double, 3>> drift_;  ///< m, of each moment
   BeamTable beams_;
   Renderer renderer_;
-  Returns returns_;
   Surfaces surfaces_;
 };
 

@@ -1,12 +1,16 @@
 #include "simulation/write_sequence.hpp"
 
+#include <cmath>
+#include <cstdint>
 #include <string>
-#include <system_error>
 #include <vector>
 
-#include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/kitti.hpp"
+#include "io/folder.hpp"
+#include "io/logs/mcap_writer.hpp"
+#include "io/logs/message_writer.hpp"
+#include "io/scalar.hpp"
 
 namespace dynains::simulation {
 namespace {
@@ -19,17 +23,22 @@ Pose camera_from_sensor() {
   return Tr;
 }
 
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw IoError(folder.string() + ": cannot create the folder: " + error.message());
-}
-
-void write_sensors(const std::filesystem::path& path, const std::vector<std::uint8_t>& sensors) {
-  AtomicFile file(path);
-  file.stream().write(reinterpret_cast<const char*>(sensors.data()),
-                      static_cast<std::streamsize>(sensors.size()));
-  file.commit(AtomicFile::Sync::kLater);
+std::string cloud_of(const SimulatedScan& scan, std::uint64_t time) {
+  CloudLayout layout{{{"x", Scalar::kFloat},
+                      {"y", Scalar::kFloat},
+                      {"z", Scalar::kFloat},
+                      {"intensity", Scalar::kFloat},
+                      {"label", Scalar::kUint32}}};
+  const bool has_times = !scan.times.empty();
+  if (has_times) layout.fields.push_back({"time", Scalar::kFloat});
+  std::string points;
+  points.reserve(scan.labels.size() * layout.point_size());
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    for (std::size_t k = 0; k < 4; ++k) append_number(scan.xyzi[4 * i + k], points);
+    append_number(scan.labels[i], points);
+    if (has_times) append_number(scan.times[i], points);
+  }
+  return cloud_message(time, "lidar", layout, points);
 }
 
 }  // namespace
@@ -42,10 +51,10 @@ std::string scan_name(std::size_t i) {
 
 bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
                     const std::function<bool(std::size_t, std::size_t)>& progress) {
-  make_folder(folder / "velodyne");
-  make_folder(folder / "labels");
+  create_folder(folder / "velodyne");
+  create_folder(folder / "labels");
   const std::vector<Pose> mounts = simulator.mounts();
-  if (!mounts.empty()) make_folder(folder / "sensor");
+  if (!mounts.empty()) create_folder(folder / "sensor");
   const Pose Tr = camera_from_sensor();
   const Pose Tr_inverse = Tr.inverse();
   std::vector<Pose> poses, true_poses;
@@ -55,7 +64,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
     const std::string name = scan_name(i);
     write_scan(folder / "velodyne" / (name + ".bin"), scan.xyzi);
     write_labels(folder / "labels" / (name + ".label"), scan.labels);
-    if (!mounts.empty()) write_sensors(folder / "sensor" / (name + ".id"), scan.sensors);
+    if (!mounts.empty()) write_point_bytes(folder / "sensor" / (name + ".id"), scan.sensors);
     poses.push_back(Tr * scan.T_world_sensor_noisy * Tr_inverse);
     true_poses.push_back(Tr * scan.T_world_sensor * Tr_inverse);
     times.push_back(scan.time);
@@ -70,6 +79,23 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
   }
   if (!mounts.empty()) write_poses(folder / "sensors.txt", mounts);
   write_poses(folder / "poses.txt", poses);
+  return true;
+}
+
+bool write_log(Simulator& simulator, const std::filesystem::path& file,
+               const std::function<bool(std::size_t, std::size_t)>& progress) {
+  McapWriter writer(file);
+  const std::uint16_t clouds = writer.add_channel(cloud_topic("/points"));
+  const std::uint16_t transforms = writer.add_channel(transforms_topic("/tf"));
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    const SimulatedScan scan = simulator.scan(i);
+    const auto time = static_cast<std::uint64_t>(std::llround(scan.time * 1e9));
+    writer.write(transforms, time,
+                 transform_message(time, "map", "lidar", scan.T_world_sensor_noisy));
+    writer.write(clouds, time, cloud_of(scan, time));
+    if (progress && !progress(i + 1, simulator.size())) return false;
+  }
+  writer.commit();
   return true;
 }
 

@@ -154,12 +154,6 @@ fs::path whole_path(const fs::path& path) {
   return whole.has_filename() ? whole : whole.parent_path();
 }
 
-void create_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw IoError(folder.string() + ": cannot be created: " + error.message());
-}
-
 Json begin_marker(const OutputKind& kind) {
   return {{"program", "dynains"},
           {"version", kVersionString},

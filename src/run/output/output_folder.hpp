@@ -46,9 +46,6 @@ OutputListing read_listing(const std::filesystem::path& file, const nlohmann::or
 /// are of one place if these are equal, whether it is there yet or not.
 std::filesystem::path whole_path(const std::filesystem::path& path);
 
-/// Creates a folder and those above it. Throws IoError.
-void create_folder(const std::filesystem::path& folder);
-
 /// Whether a file in the place of an output is replaced.
 enum class Existing {
   kStays,   ///< the command is refused: --force was not given
