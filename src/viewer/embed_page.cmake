@@ -21,7 +21,13 @@ set(text "")
 embed(html "${html}")
 embed(style "${style}")
 embed(script "${script}")
-set(file "#include \"viewer/page_files.hpp\"\n\nnamespace dynains::viewer {\nnamespace {\n\n${text}
+set(file "#include <cstddef>
+#include <string_view>
+
+namespace dynains::viewer {
+namespace {
+
+${text}
 template <std::size_t kSize>
 std::string_view text_of(const unsigned char (&bytes)[kSize]) {
   return {reinterpret_cast<const char*>(bytes), kSize - 1};
@@ -29,9 +35,11 @@ std::string_view text_of(const unsigned char (&bytes)[kSize]) {
 
 }  // namespace
 
-const std::string_view kPageHtml = text_of(html_bytes);
-const std::string_view kPageStyle = text_of(style_bytes);
-const std::string_view kPageScript = text_of(script_bytes);
+std::string_view page_file(std::string_view name);
+std::string_view page_file(std::string_view name) {
+  if (name == \"html\") return text_of(html_bytes);
+  return name == \"style\" ? text_of(style_bytes) : text_of(script_bytes);
+}
 
 }  // namespace dynains::viewer\n")
 file(WRITE ${OUTPUT} "${file}")

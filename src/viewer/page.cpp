@@ -1,19 +1,185 @@
 #include "page.hpp"
 
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "dynains/evaluation/causes.hpp"
-#include "page_files.hpp"
-#include "point_packer.hpp"
 
 namespace dynains::viewer {
+
+/// A file of the page, embedded by CMake: "html", "style" or "script".
+std::string_view page_file(std::string_view name);
+
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr double kUnit = 0.002;              // m
+constexpr std::int64_t kChunkSteps = 65536;  // steps of kUnit per edge of a chunk
+
+using Steps = std::array<std::int64_t, 3>;
+
+struct PackedPoint {
+  Steps chunk;
+  std::array<std::uint16_t, 3> steps;
+  std::uint64_t order;  // along a Morton curve within the chunk
+  const ViewPoint* point;
+};
+
+std::uint64_t spread_bits(std::uint64_t value) {
+  std::uint64_t spread = 0;
+  for (unsigned bit = 0; bit < 16; ++bit) spread |= (value >> bit & 1U) << 3U * bit;
+  return spread;
+}
+
+PackedPoint packed(const ViewPoint& point) {
+  PackedPoint result{{}, {}, 0, &point};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double local = static_cast<double>(point.local[static_cast<Eigen::Index>(axis)]);
+    const std::int64_t step = std::llround(local / kUnit);
+    // Rounded towards minus infinity.
+    result.chunk[axis] = (step >= 0 ? step : step - kChunkSteps + 1) / kChunkSteps;
+    result.steps[axis] = static_cast<std::uint16_t>(step - result.chunk[axis] * kChunkSteps);
+    result.order |= spread_bits(result.steps[axis]) << axis;
+  }
+  return result;
+}
+
+/// Values of a 16 bit column as differences to the value before.
+class Column16 {
+ public:
+  void restart() { last_ = 0; }
+  void add(std::uint16_t value) {
+    const auto difference = static_cast<std::uint16_t>(value - last_);
+    last_ = value;
+    low_ += static_cast<char>(difference & 0xFFU);
+    high_ += static_cast<char>(difference >> 8U);
+  }
+  std::string bytes() const { return low_ + high_; }
+
+ private:
+  std::uint16_t last_ = 0;
+  std::string low_;
+  std::string high_;
+};
+
+class Packer {
+ public:
+  explicit Packer(double full_intensity) : full_intensity_(full_intensity) {}
+
+  void add_layer(int layer, const std::vector<ViewPoint>& points) {
+    std::vector<PackedPoint> sorted;
+    sorted.reserve(points.size());
+    for (const ViewPoint& point : points) sorted.push_back(packed(point));
+    std::stable_sort(sorted.begin(), sorted.end(), [](const auto& one, const auto& other) {
+      return one.chunk != other.chunk ? one.chunk < other.chunk : one.order < other.order;
+    });
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      if (i == 0 || sorted[i].chunk != sorted[i - 1].chunk) begin_chunk(layer, sorted[i].chunk);
+      add(sorted[i]);
+    }
+  }
+
+  const Json& chunks() const { return chunks_; }
+
+  std::string columns() const {
+    std::string bytes;
+    for (const Column16* column : {&steps_[0], &steps_[1], &steps_[2], &scan_, &instance_}) {
+      bytes += column->bytes();
+    }
+    return bytes + intensity_ + belief_ + cause_ + flags_;
+  }
+
+ private:
+  void begin_chunk(int layer, const Steps& chunk) {
+    Json origin = Json::array();
+    for (const std::int64_t number : chunk) {
+      origin.push_back(static_cast<double>(number * kChunkSteps) * kUnit);
+    }
+    chunks_.push_back({{"layer", layer}, {"count", 0}, {"origin", origin}});
+    for (Column16* column : {&steps_[0], &steps_[1], &steps_[2], &scan_, &instance_}) {
+      column->restart();
+    }
+  }
+
+  void add(const PackedPoint& packed_point) {
+    const ViewPoint& point = *packed_point.point;
+    for (std::size_t axis = 0; axis < 3; ++axis) steps_[axis].add(packed_point.steps[axis]);
+    scan_.add(point.scan);
+    instance_.add(point.instance);
+    const double share = static_cast<double>(point.intensity) / full_intensity_;
+    intensity_ += static_cast<char>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
+    belief_ += static_cast<char>(point.belief);
+    cause_ += static_cast<char>(point.cause);
+    flags_ += static_cast<char>(static_cast<unsigned>(point.label) +
+                                4U * static_cast<unsigned>(point.truth));
+    auto& count = chunks_.back()["count"];
+    count = count.get<std::size_t>() + 1;
+  }
+
+  double full_intensity_;
+  Json chunks_ = Json::array();
+  std::array<Column16, 3> steps_;
+  Column16 scan_, instance_;
+  std::string intensity_, belief_, cause_, flags_;
+};
+
+/// The 99th percentile of the intensities; 1 if it is not positive.
+double full_intensity(const ViewData& data) {
+  std::vector<float> values;
+  for (const std::vector<ViewPoint>* points : {&data.map, &data.moving}) {
+    for (const ViewPoint& point : *points) {
+      if (std::isfinite(point.intensity)) values.push_back(point.intensity);
+    }
+  }
+  if (values.empty()) return 1.0;
+  const auto rank = static_cast<std::ptrdiff_t>((values.size() - 1) * 99 / 100);
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  const auto value = static_cast<double>(values[static_cast<std::size_t>(rank)]);
+  return value > 0.0 ? value : 1.0;
+}
+
+std::string compressed(const std::string& bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::string result(size, '\0');
+  const int error = compress2(reinterpret_cast<Bytef*>(result.data()), &size,
+                              reinterpret_cast<const Bytef*>(bytes.data()),
+                              static_cast<uLong>(bytes.size()), Z_DEFAULT_COMPRESSION);
+  if (error != Z_OK) throw std::bad_alloc();  // the only error of a large enough buffer
+  result.resize(size);
+  return result;
+}
+
+struct PackedPoints {
+  /// zlib stream of columns, each with one value per point: x, y, z, scan, instance (differences
+  /// to the point before in its chunk, modulo 65536; first all low bytes, then all high bytes),
+  /// intensity, belief, cause, and flags (label + 4 * truth), one byte each.
+  std::string bytes;
+  /// `unit`: step of x, y, z, m. `intensity`: value of 255. `chunks`: `layer` (0 map, 1 moving),
+  /// `count` of points, `origin` of x, y, z in m.
+  Json description;
+};
+
+/// Packs the map and the moving points. The order of points is not kept. Coordinates are rounded to
+/// 2 mm, intensities to steps of 1/255 of their 99th percentile, at which they are cut.
+PackedPoints pack(const ViewData& data) {
+  const double intensity = full_intensity(data);
+  Packer packer(intensity);
+  packer.add_layer(0, data.map);
+  packer.add_layer(1, data.moving);
+  return {compressed(packer.columns()),
+          {{"unit", kUnit}, {"intensity", intensity}, {"chunks", packer.chunks()}}};
+}
 
 std::string base64(const std::string& bytes) {
   constexpr std::string_view kDigits =
@@ -81,13 +247,11 @@ std::string script_json(const Json& json) {
 void write_page(std::ostream& out, const ViewData& data) {
   const PackedPoints points = pack(data);
   const auto content_of = [&](std::string_view mark) -> std::string {
-    if (mark == "style") return std::string(kPageStyle);
-    if (mark == "script") return std::string(kPageScript);
     if (mark == "description") return script_json(describe(data, points.description));
-    return base64(points.bytes);
+    return mark == "points" ? base64(points.bytes) : std::string(page_file(mark));
   };
   // Each {{NAME}} becomes content_of(NAME).
-  std::string_view html = kPageHtml;
+  std::string_view html = page_file("html");
   for (std::size_t begin = html.find("{{"); begin != html.npos; begin = html.find("{{")) {
     const std::size_t end = html.find("}}", begin);
     out << html.substr(0, begin) << content_of(html.substr(begin + 2, end - begin - 2));
