@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "detail/located_points.hpp"
-
 namespace dynains::evaluation {
 
 void MapProtocol::add(const LabelledScan& scan) {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "detail/range_gate.hpp"
+#include "detail/located_points.hpp"
 
 namespace dynains::evaluation {
 namespace {

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "detail/cell_groups.hpp"
-#include "detail/located_points.hpp"
 
 namespace dynains::evaluation {
 

@@ -11,8 +11,8 @@
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
+#include "evaluation/detail/located_points.hpp"
 #include "evaluation/detail/preservation.hpp"
-#include "evaluation/detail/range_gate.hpp"
 #include "evaluation/detail/voxel_grid.hpp"
 
 namespace dynains::evaluation {
