@@ -25,7 +25,7 @@
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/map_spacing.hpp"
+#include "run/map_file.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"

@@ -11,7 +11,7 @@
 #include "command.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "parameter_flags.hpp"
-#include "run/preset.hpp"
+#include "run/run_settings.hpp"
 
 namespace dynains::program {
 namespace {

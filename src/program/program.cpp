@@ -4,21 +4,82 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
+#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <streambuf>
+#include <utility>
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
 #include "odometry_command.hpp"
 #include "run/interrupt.hpp"
-#include "run/printable.hpp"
 
 namespace dynains::program {
 namespace {
+
+constexpr unsigned char kLeadOfControls = 0xC2;  // first byte of U+0080 to U+00BF
+
+std::string escaped(unsigned char c) {
+  std::array<char, 5> code{};
+  std::snprintf(code.data(), code.size(), "\\x%02X", static_cast<unsigned>(c));
+  return code.data();
+}
+
+bool is_control(unsigned char c) { return (c < 0x20 && c != '\n' && c != '\t') || c == 0x7F; }
+
+/// Replaces control characters by \xNN, so that file names cannot steer a terminal. Line feeds and
+/// tabs stay; UTF-8 stays, except its control characters (U+0080 to U+009F).
+class PrintableStream : std::streambuf {
+ public:
+  /// Filters `stream` as long as this object lives.
+  explicit PrintableStream(std::ostream& stream) : stream_(stream), target_(stream.rdbuf(this)) {}
+  ~PrintableStream() override { stream_.rdbuf(target_); }
+  PrintableStream(const PrintableStream&) = delete;
+  PrintableStream& operator=(const PrintableStream&) = delete;
+
+ private:
+  int_type overflow(int_type value) override {
+    if (traits_type::eq_int_type(value, traits_type::eof())) return traits_type::not_eof(value);
+    const auto c = static_cast<unsigned char>(value);
+    const bool is_second = std::exchange(has_lead_, c == kLeadOfControls);
+    const bool ends_control = is_second && c >= 0x80 && c < 0xA0;
+    std::string shown;
+    if (is_second) shown += ends_control ? escaped(kLeadOfControls) : std::string(1, '\xC2');
+    if (ends_control || is_control(c)) {
+      shown += escaped(c);
+    } else if (!has_lead_) {
+      shown += static_cast<char>(c);
+    }
+    const auto size = static_cast<std::streamsize>(shown.size());
+    return target_->sputn(shown.data(), size) == size ? value : traits_type::eof();
+  }
+  int sync() override { return target_->pubsync(); }
+
+  std::ostream& stream_;
+  std::streambuf* target_;
+  bool has_lead_ = false;  ///< the first byte of U+0080 to U+00BF waits for the second
+};
+
+/// The text on one line: line feeds and tabs become \n and \t.
+std::string on_one_line(const std::string& text) {
+  std::string line;
+  for (const char c : text) {
+    if (c == '\n') {
+      line += "\\n";
+    } else if (c == '\t') {
+      line += "\\t";
+    } else {
+      line += c;
+    }
+  }
+  return line;
+}
 
 /// Help in two lengths: --help with the options that matter, --help-all with the rest, grouped.
 class HelpFormatter : public CLI::Formatter {

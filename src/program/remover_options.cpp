@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "parameter_flags.hpp"
-#include "run/preset.hpp"
+#include "run/run_settings.hpp"
 
 namespace dynains::program {
 

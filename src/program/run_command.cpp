@@ -13,7 +13,6 @@
 #include "recording_options.hpp"
 #include "remover_options.hpp"
 #include "run/interrupt.hpp"
-#include "run/preset.hpp"
 #include "run/run.hpp"
 #include "run/run_plan.hpp"
 

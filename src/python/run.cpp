@@ -13,7 +13,6 @@
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "recording.hpp"
-#include "run/preset.hpp"
 #include "run/run_plan.hpp"
 #include "run/write_view.hpp"
 #include "settings.hpp"

@@ -14,8 +14,8 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "judged_scan.hpp"
 #include "scan_range.hpp"
+#include "verdict_files.hpp"
 
 namespace dynains::run {
 
@@ -58,6 +58,16 @@ class MapAttributeTable {
 /// Whether the extension is that of a map: .ply, .pcd or .las.
 bool is_map_name(const std::filesystem::path& path);
 bool is_las(const std::filesystem::path& path);
+
+/// The edge of voxels that hold about one of `points` points of surfaces, m, from `least` on and
+/// about `most` at the most. `count(edge)`: number of voxels of this edge that hold points.
+template <class Count>
+double edge_by_spacing(std::size_t points, double least, double most, Count&& count) {
+  double edge = least;
+  // Voxels 1.42 times as wide hold twice as many points of a surface.
+  while (edge < most && points < 2 * count(1.42 * edge)) edge *= 1.2;
+  return edge;
+}
 
 /// Options of a LAS file whose origin is a whole number of kilometres near `position` (m, world),
 /// so that its coordinates stay short.

@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
-#include "judged_scan.hpp"
 #include "picture.hpp"
+#include "verdict_files.hpp"
 
 namespace dynains::run {
 

@@ -215,7 +215,7 @@ OutputListing listing_of(const RunOutputs& outputs, const Recording& recording,
   if (outputs.write_online) listing.folders["online"] = ".label";
   if (outputs.write_clean) {
     listing.folders["clean"] =
-        std::filesystem::path(CleanWriter::name(recording, range.first)).extension().string();
+        std::filesystem::path(clean_name(recording, range.first)).extension().string();
   }
   for (std::size_t i = range.first; i <= range.last; ++i)
     listing.scans.insert(listed_name(recording.name(i)));

@@ -6,7 +6,9 @@
 #include <map>
 #include <utility>
 
+#include "clean_writer.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "io/folder.hpp"
 #include "recorded_scans.hpp"
 
 namespace dynains::run {
@@ -47,13 +49,11 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
                        const RunOutputs& outputs, Passes* passes)
     : recording_(recording),
       range_(range),
+      outputs_(outputs),
       passes_(passes),
-      write_beliefs_(outputs.write_beliefs),
-      needs_beliefs_(outputs.needs_beliefs()),
       final_labels_(outputs.folder, "labels", outputs.write_beliefs),
       dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
       overview_(path_of(recording, range)),
-      overview_file_(outputs.folder / kOverviewPicture),
       writing_(outputs.thread()),
       writing_online_(outputs.thread()) {
   final_labels_.create_folders();
@@ -62,10 +62,12 @@ RunResults::RunResults(const Recording& recording, const ScanRange& range,
   });
   if (outputs.write_online) online_labels_.emplace(outputs.folder, "online").create_folders();
   if (outputs.write_clean) {
-    clean_scans_.emplace(outputs.folder / "clean", recording, outputs.drop_not_judged);
-    add([this](const JudgedScan& judged) { clean_scans_->write(judged); });
+    const std::filesystem::path folder = outputs.folder / "clean";
+    create_folder(folder);
+    add([this, folder](const JudgedScan& judged) {
+      write_clean(recording_, judged, folder, outputs_.drop_not_judged);
+    });
   }
-  if (outputs.write_tracks) tracks_file_ = outputs.folder / kTracksFile;
   if (!outputs.map.empty()) {
     map_ = open_map(outputs.map, recording, range, outputs.map_attributes, outputs.crs);
   }
@@ -122,7 +124,7 @@ void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   }
   finish();
   judged_.index = range_.first + verdict.scan;
-  judged_.arrays.take(verdict, needs_beliefs_);
+  judged_.arrays.take(verdict, outputs_.needs_beliefs());
   judged_.verdict = judged_.arrays.verdict(verdict);
   if (scan != nullptr) std::swap(judged_.scan, *scan);
   writing_.begin([this, reads = scan == nullptr] {
@@ -144,13 +146,11 @@ void RunResults::take_revised(JudgedScan& judged) {
 }
 
 void RunResults::hand_out() {
-  judged_.packed.pack(judged_.verdict, write_beliefs_);
+  judged_.packed.pack(judged_.verdict, outputs_.write_beliefs);
   if (needs_truth_) judged_.truth = recording_.read_labels(judged_.index);
   tally_.add(judged_.verdict);
   for (const Sink& sink : sinks_) sink(judged_);
 }
-
-void RunResults::finish() { writing_.wait(); }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
   map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
@@ -160,8 +160,8 @@ void RunResults::commit() {
   finish();
   writing_online_.wait();
   dynamic_points_.commit();
-  if (!tracks_file_.empty()) write_tracks(tracks_file_, tracks_);
-  overview_.picture().write_png(overview_file_);
+  if (outputs_.write_tracks) write_tracks(outputs_.folder / kTracksFile, tracks_);
+  overview_.picture().write_png(outputs_.folder / kOverviewPicture);
   if (revised_map_) revised_map_->for_each([&](const auto& point) { add_map_point(point); });
   if (map_) map_->commit();
 }

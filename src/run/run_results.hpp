@@ -7,12 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "clean_writer.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
-#include "judged_scan.hpp"
 #include "map_file.hpp"
 #include "overview.hpp"
 #include "passes.hpp"
@@ -50,7 +48,7 @@ class RunResults {
   /// points and arrays. Gives the content of an earlier one back.
   void take_revised(JudgedScan& judged);
   /// Waits for the results of the last scan. Throws IoError.
-  void finish();
+  void finish() { writing_.wait(); }
   /// See RunOutputs::thread().
   std::launch thread() const { return writing_.policy(); }
 
@@ -71,22 +69,19 @@ class RunResults {
 
   const Recording& recording_;
   ScanRange range_;
+  RunOutputs outputs_;
   Passes* passes_;
-  bool write_beliefs_, needs_beliefs_;
   bool needs_truth_ = false;
   std::vector<Sink> sinks_;
   VerdictFiles final_labels_;
   std::optional<VerdictFiles> online_labels_;
   PackedVerdict online_;  // belongs to writing_online_
-  std::optional<CleanWriter> clean_scans_;
   PointFileWriter dynamic_points_;
   Overview overview_;
-  std::filesystem::path overview_file_;
   std::unique_ptr<MapFile> map_;
   std::optional<MapAttributeTable> map_attributes_;
   std::optional<StaticMapAccumulator> revised_map_;
-  std::vector<std::uint8_t> keep_;     // of the points for that map
-  std::filesystem::path tracks_file_;  // empty: none
+  std::vector<std::uint8_t> keep_;  // of the points for that map
   std::vector<TrackRow> tracks_;
   std::size_t finished_ = 0;
   Tally tally_;

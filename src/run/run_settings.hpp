@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/config.hpp"
@@ -26,6 +27,17 @@ inline constexpr const char* kTracksFile = "tracks.csv";
 inline constexpr const char* kEstimatedPoses = "poses.txt";
 /// The page of `dynains view` in the folder of results.
 inline constexpr const char* kViewPage = "view.html";
+
+/// The names that a run accepts, a part of those of DynaInsRemover::Config::preset().
+inline const std::vector<std::string>& preset_names() {
+  static const std::vector<std::string> names = {"default", "offline", "paper", "published"};
+  return names;
+}
+
+/// Whether the preset holds the ranges of the paper.
+inline bool has_ranges_of_paper(const std::string& name) {
+  return name == "paper" || name == "published";
+}
 
 /// The results of a run. A plan has them whole: in settings, an empty `map` is the file
 /// static_map.ply in the folder.

@@ -7,7 +7,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
-#include "map_spacing.hpp"
+#include "map_file.hpp"
 #include "run/output/output_folder.hpp"
 
 namespace dynains::run {

@@ -8,9 +8,9 @@
 
 #include "dynains/evaluation/truth.hpp"
 #include "dynains/io/recording.hpp"
-#include "judged_scan.hpp"
 #include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
+#include "verdict_files.hpp"
 #include "viewer/thinning.hpp"
 #include "viewer/view_data.hpp"
 

@@ -8,7 +8,7 @@
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "program/tiny_sequence.hpp"
-#include "run/judged_scan.hpp"
+#include "run/verdict_files.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
