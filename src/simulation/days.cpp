@@ -9,22 +9,20 @@ namespace {
 
 /// Something that stands on the pavement from one day to another.
 struct Change {
-  semantic::Class label;
+  std::uint16_t label;
   Size size;  // m
   int first_day, last_day;
 };
 
-constexpr Change kChanges[] = {{semantic::kOtherObject, {4.0, 1.6, 1.7}, 2, 3},
-                               {semantic::kFence, {6.0, 0.1, 1.8}, 3, 9999},
-                               {semantic::kVegetation, {0.4, 0.4, 7.0}, 1, 1},
-                               {semantic::kOtherObject, {4, 1.6, 1.7}, 3, 9999},
-                               {semantic::kFence, {6.0, 0.1, 1.8}, 1, 2},
-                               {semantic::kVegetation, {0.4, 0.4, 7.0}, 1, 3}};
+constexpr Change kChanges[] = {
+    {kClasses.other_object, {4.0, 1.6, 1.7}, 2, 3}, {kClasses.fence, {6.0, 0.1, 1.8}, 3, 9999},
+    {kClasses.vegetation, {0.4, 0.4, 7.0}, 1, 1},   {kClasses.other_object, {4, 1.6, 1.7}, 3, 9999},
+    {kClasses.fence, {6.0, 0.1, 1.8}, 1, 2},        {kClasses.vegetation, {0.4, 0.4, 7.0}, 1, 3}};
 
 Model model_of(const Change& change, Random& random) {
   const auto& [length, width, height] = change.size;
-  if (change.label == semantic::kFence) return fence_model(Fence::kWood, length, height, random);
-  if (change.label == semantic::kVegetation) return tree_model(false, height, 1.8, 2.4, random);
+  if (change.label == kClasses.fence) return fence_model(Fence::kWood, length, height, random);
+  if (change.label == kClasses.vegetation) return tree_model(false, height, 1.8, 2.4, random);
   return Model().block(kMaterials.street_furniture, -length / 2, length / 2, -width / 2, width / 2,
                        0, height);
 }

@@ -106,14 +106,13 @@ Model& Model::limb(const Material& material, double x, double y, double z, doubl
 }
 
 const KindTraits& traits_of(Kind kind) {
-  using namespace semantic;
   static constexpr KindTraits kTraits[] = {
-      {kCar, 252, {3.6, 1.65, 1.4}, {1.2, 0.2, 0.3}},
-      {kCar, 252, {4.8, 1.9, 2.0}, {1.4, 0.15, 0.6}},  // van
-      {kTruck, 258, {7, 2.4, 3.1}, {8, 0.15, 0.7}},
-      {kBus, 257, {10.5, 2.5, 3.0}, {2, 0, 0.2}},
-      {kPerson, 254, {0.5, 0.5, 1.5}, {0, 0.15, 0.4}},
-      {kBicyclist, 253, {1.75, 0.6, 1.65}, {0, 0, 0.2}},
+      {kClasses.car, 252, {3.6, 1.65, 1.4}, {1.2, 0.2, 0.3}},
+      {kClasses.car, 252, {4.8, 1.9, 2.0}, {1.4, 0.15, 0.6}},  // van
+      {kClasses.truck, 258, {7, 2.4, 3.1}, {8, 0.15, 0.7}},
+      {kClasses.bus, 257, {10.5, 2.5, 3.0}, {2, 0, 0.2}},
+      {kClasses.person, 254, {0.5, 0.5, 1.5}, {0, 0.15, 0.4}},
+      {kClasses.bicyclist, 253, {1.75, 0.6, 1.65}, {0, 0, 0.2}},
   };
   return kTraits[static_cast<std::size_t>(kind)];
 }

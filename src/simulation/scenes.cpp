@@ -176,7 +176,7 @@ Place walk(const Config& config, Random& random, double speed, double before, do
   p.small = true;
   p.street = straight(2 * before + travel(config, speed) + 20);
   p.half_width = half_width;
-  p.ground = {0.0005, 180, 0.003, 0, semantic::kTerrain, semantic::kSidewalk};
+  p.ground = {0.0005, 180, 0.003, 0, kClasses.terrain, kClasses.sidewalk};
   p.walkers = walkers;
   p.outer = 0.9 * half_width;
   p.drift = 0.5 * half_width;
@@ -192,7 +192,7 @@ Place parking(const Config& config, Random& random, bool roofed) {
   const double length = 2 * p.before + travel(config, p.speed) + 60;
   p.street = folded(random, std::max(length, 300.0), 60, 90, kPi, 8.6, true);
   p.half_width = 8.5;
-  p.ground = {random.uniform(0.002, 0.03), 180, 0.03, 0, semantic::kParking, semantic::kParking};
+  p.ground = {random.uniform(0.002, 0.03), 180, 0.03, 0, kClasses.parking, kClasses.parking};
   if (roofed) {
     p.ground.hill_slope = 0.002;
     p.ground.roughness = 0.005;
@@ -286,7 +286,7 @@ Place place_of(const Config& config, Random& random) {
     case Scene::kForest: {
       Place p = walk(config, random, 1.4, 60, 1.7, 0.12);
       p.street = winding(random, p.street.length(), 0.03);
-      p.ground = {random.uniform(0.02, 0.08), 60, 0.18, 0, semantic::kTerrain, semantic::kTerrain};
+      p.ground = {random.uniform(0.02, 0.08), 60, 0.18, 0, kClasses.terrain, kClasses.terrain};
       p.lanes = {{-0.4}, {0.5, {0, 35, 4, 0, 0, 1}}};
       p.plants_from = 0.6;
       p.plants_to = 35;
@@ -305,7 +305,7 @@ Place place_of(const Config& config, Random& random) {
       const double beside = 0.4 * p.half_width;
       p.lanes = {{-beside, {0, 60, 3, 0, 0, 1}}, {beside, {0, 60, 3, 0, 0, 1}}};
       p.ground = {random.uniform(0.002, 0.02), 180, 0.04, 0};
-      p.ground.street_label = semantic::kSidewalk;
+      p.ground.street_label = kClasses.sidewalk;
       p.look[0].buildings = p.look[1].buildings = 0.95;
       p.things = 0.8;
       p.outer = p.half_width - 0.1;

@@ -117,7 +117,7 @@ Surface one_return(const Surface& own, const Surface& other, float share) {
   Surface result = share >= 0.5F ? own : other;
   result.range = share * own.range + (1 - share) * other.range;
   if (std::min(std::abs(result.range - own.range), std::abs(result.range - other.range)) > 0.25F) {
-    result.label = semantic::kOutlier;
+    result.label = kClasses.outlier;
   }
   return result;
 }
@@ -431,8 +431,8 @@ class Simulator::Implementation {
     surface.cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
     surface.label = world_.terrain.label_near(p.x, p.y);
     surface.loss = 0.01F;
-    const bool grass = surface.label == semantic::kTerrain;
-    const bool sidewalk = surface.label == semantic::kSidewalk;
+    const bool grass = surface.label == kClasses.terrain;
+    const bool sidewalk = surface.label == kClasses.sidewalk;
     surface.reflectivity = grass ? 0.3F : sidewalk ? 0.28F : 0.18F;
     surface.roughness = grass ? 0.015F : 0.003F;
     return surface;

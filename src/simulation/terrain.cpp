@@ -121,9 +121,9 @@ void Terrain::build(int ix, int iy, Tile& tile) const {
       height -= 0.02 * ground.half_width * across * across * (1 - off_street);
       tile.heights[sample] = static_cast<float>(height);
       if (row < kCells && column < kCells) {
-        const semantic::Class label = ground.edge < 0       ? config_.street_label
-                                      : ground.pavement > 0 ? semantic::kSidewalk
-                                                            : config_.open_label;
+        const std::uint16_t label = ground.edge < 0       ? config_.street_label
+                                    : ground.pavement > 0 ? kClasses.sidewalk
+                                                          : config_.open_label;
         tile.labels[grid_index(row, column, kCells)] = static_cast<std::uint8_t>(label);
       }
     }

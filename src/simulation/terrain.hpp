@@ -18,8 +18,8 @@ struct TerrainConfig {
   double hill_length = 180.0;  ///< m, distance between crests, about
   double roughness = 0.04;     ///< m, unevenness off the street; a third of it on the street
   double kerb = 0.12;          ///< m, height of the pavement over the street
-  semantic::Class open_label = semantic::kTerrain;  ///< class where there is no street
-  semantic::Class street_label = semantic::kRoad;   ///< class of the carriageway
+  std::uint16_t open_label = kClasses.terrain;  ///< class where there is no street
+  std::uint16_t street_label = kClasses.road;   ///< class of the carriageway
 };
 
 /// The ground is a height field with 0.25 m between samples, made tile by tile where it is asked
