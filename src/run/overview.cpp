@@ -14,11 +14,26 @@
 namespace dynains::run {
 namespace {
 
-constexpr int kTextHeight = 14;                                       // pixels
-constexpr int kRows = 7, kAdvance = 6, kScale = kTextHeight / kRows;  // of letters
+/// Sizes and colours of the picture.
+struct Style {
+  int letter_rows = 7, letter_columns = 6, letter_scale = 2;  ///< pixels, a gap included
+  int text_height = letter_rows * letter_scale;
+  int inset = 4;                        ///< pixels around text and panels
+  int strip = text_height + 2 * inset;  ///< pixels of a title, and of the scale below
+  double margin = 50.0;                 ///< m around the path
+  double longer_side = 1200.0;          ///< pixels of a panel
+  double max_per_metre = 8.0;           ///< pixels
+  double longest_bar = 200.0;           ///< pixels, of the scale
+  Colour ink = {40, 40, 40};
+  Colour grey = {150, 150, 150};  ///< static points in a legend
+  Colour moving = {30, 80, 220};
+  Colour removed = {30, 160, 60};
+  Colour pale = {232, 232, 232};
+};
+constexpr Style kStyle;
 
 /// Rows of a letter from the top, five bits each, the left column in the highest bit.
-using Glyph = std::array<std::uint8_t, kRows>;
+using Glyph = std::array<std::uint8_t, kStyle.letter_rows>;
 
 constexpr std::string_view kCharacters = "abcdefghijklmnopqrstuvwxyz0123456789:";
 constexpr std::array<Glyph, kCharacters.size()> kGlyphs = {{
@@ -44,10 +59,11 @@ constexpr std::array<Glyph, kCharacters.size()> kGlyphs = {{
 }};
 
 void draw_glyph(Picture& picture, int x, int y, const Glyph& glyph, Colour colour) {
-  for (int row = 0; row < kRows * kScale; ++row) {
-    for (int column = 0; column < kAdvance * kScale; ++column) {
-      const int bits = glyph[static_cast<std::size_t>(row / kScale)] << 1;  // and a gap
-      if ((bits >> (kAdvance - 1 - column / kScale) & 1) == 0) continue;
+  for (int row = 0; row < kStyle.letter_rows * kStyle.letter_scale; ++row) {
+    for (int column = 0; column < kStyle.letter_columns * kStyle.letter_scale; ++column) {
+      const int bits = glyph[static_cast<std::size_t>(row / kStyle.letter_scale)]
+                       << 1;  // and a gap
+      if ((bits >> (kStyle.letter_columns - 1 - column / kStyle.letter_scale) & 1) == 0) continue;
       const int to_x = x + column, to_y = y + row;
       if (to_x < 0 || to_y < 0 || to_x >= picture.width() || to_y >= picture.height()) continue;
       picture.set(to_x, to_y, colour);
@@ -57,7 +73,7 @@ void draw_glyph(Picture& picture, int x, int y, const Glyph& glyph, Colour colou
 
 /// Pixels.
 int text_width(const std::string& text) {
-  return static_cast<int>(text.size()) * kAdvance * kScale;
+  return static_cast<int>(text.size()) * kStyle.letter_columns * kStyle.letter_scale;
 }
 
 /// Draws lower-case letters, digits, ':' and blanks; other characters are blanks. `x`, `y`: upper
@@ -66,25 +82,9 @@ void draw_text(Picture& picture, int x, int y, const std::string& text, Colour c
   for (const char character : text) {
     const std::size_t index = kCharacters.find(character);
     if (index != std::string_view::npos) draw_glyph(picture, x, y, kGlyphs[index], colour);
-    x += kAdvance * kScale;
+    x += kStyle.letter_columns * kStyle.letter_scale;
   }
 }
-
-constexpr int kInset = 4;                         // pixels around text and panels
-constexpr int kStrip = kTextHeight + 2 * kInset;  // pixels of a title, and of the scale below
-
-struct Style {
-  double margin = 50.0;         ///< m around the path
-  double longer_side = 1200.0;  ///< pixels of a panel
-  double max_per_metre = 8.0;   ///< pixels
-  double longest_bar = 200.0;   ///< pixels, of the scale
-  Colour ink = {40, 40, 40};
-  Colour grey = {150, 150, 150};  ///< static points in a legend
-  Colour moving = {30, 80, 220};
-  Colour removed = {30, 160, 60};
-  Colour pale = {232, 232, 232};
-};
-constexpr Style kStyle;
 
 /// One of so many static points of a scan is drawn: later scans show the same places again.
 std::size_t static_step(std::size_t scans) {
@@ -109,13 +109,13 @@ using Entries = std::vector<std::pair<Colour, std::string>>;
 
 /// Title and legend of a panel, above it. `x`, `y`: its upper left corner, pixels.
 void draw_title(Picture& picture, int x, int y, const std::string& title, const Entries& entries) {
-  x += kInset;
-  y += kInset;
+  x += kStyle.inset;
+  y += kStyle.inset;
   draw_text(picture, x, y, title, kStyle.ink);
   x += text_width(title + ' ');
   for (const auto& [colour, meaning] : entries) {
-    fill(picture, x, y + 2, kTextHeight - 4, kTextHeight - 4, colour);
-    x += kTextHeight;
+    fill(picture, x, y + 2, kStyle.text_height - 4, kStyle.text_height - 4, colour);
+    x += kStyle.text_height;
     draw_text(picture, x, y, meaning, kStyle.ink);
     x += text_width(meaning + "  ");
   }
@@ -128,9 +128,10 @@ void draw_scale(Picture& picture, double scale) {
     if (next * scale <= kStyle.longest_bar) metres = next;
   }
   const int length = std::max(1, static_cast<int>(std::lround(metres * scale)));
-  const int y = picture.height() - kStrip + kInset;
-  fill(picture, kInset, y + (kTextHeight - kInset) / 2, length, kInset, kStyle.ink);
-  draw_text(picture, 3 * kInset + length, y, std::to_string(metres) + " m", kStyle.ink);
+  const int y = picture.height() - kStyle.strip + kStyle.inset;
+  fill(picture, kStyle.inset, y + (kStyle.text_height - kStyle.inset) / 2, length, kStyle.inset,
+       kStyle.ink);
+  draw_text(picture, 3 * kStyle.inset + length, y, std::to_string(metres) + " m", kStyle.ink);
 }
 
 }  // namespace
@@ -182,11 +183,11 @@ Overview::Pixel* Overview::pixel_at(const Eigen::Vector3d& p) {
 
 Picture Overview::picture() const {
   const bool is_beside = height_ > width_;
-  const int step_x = is_beside ? width_ + 2 * kInset : 0;
-  const int step_y = is_beside ? 0 : kStrip + height_ + 2 * kInset;
-  Picture picture(width_ + 2 * step_x, kStrip + height_ + 2 * step_y + kStrip);
+  const int step_x = is_beside ? width_ + 2 * kStyle.inset : 0;
+  const int step_y = is_beside ? 0 : kStyle.strip + height_ + 2 * kStyle.inset;
+  Picture picture(width_ + 2 * step_x, kStyle.strip + height_ + 2 * step_y + kStyle.strip);
   const auto draw = [&](int panel, int x, int y, Colour colour) {
-    picture.set(x + panel * step_x, y + kStrip + panel * step_y, colour);
+    picture.set(x + panel * step_x, y + kStyle.strip + panel * step_y, colour);
   };
   for (int y = 0; y < height_; ++y) {
     const std::vector<Pixel>& row = rows_[static_cast<std::size_t>(y)];
