@@ -15,9 +15,17 @@
 namespace dynains {
 namespace {
 
-constexpr double kReach = 40.0;     // m, points of a scan that count
-constexpr std::size_t kNewest = 3;  // sessions in a tile that count
-constexpr double kInlier = 0.15;    // m
+/// Bounds of an alignment.
+struct AlignmentBounds {
+  double reach = 40.0;     ///< m, points of a scan that count
+  std::size_t newest = 3;  ///< sessions in a tile that count
+  double inlier = 0.15;    ///< m
+  double upright = 200.0;  ///< points at upright surfaces, at least
+  double fitting = 0.7;    ///< ratio of these that are inliers, at least
+  double slack = 1.1;      ///< ratio, of SessionAligner::kMaxTranslation and kMaxRotation
+  std::size_t points[2] = {3000, 60000};  ///< that are aligned, near the seed and all
+};
+constexpr AlignmentBounds kBounds;
 
 std::string rounded(double value, int digits) {
   const double scale = std::pow(10.0, digits);
@@ -49,7 +57,7 @@ std::vector<Pose> guesses() {
 /// near `places` (m, frame of the city). Adds the names of these sessions.
 PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& places,
                         const Eigen::Vector3d& origin, std::set<std::string>& names) {
-  constexpr double near = kReach + SessionAligner::kMaxTranslation;  // m
+  constexpr double near = kBounds.reach + SessionAligner::kMaxTranslation;  // m
   const SessionGrid& grid = city.grid();
   std::map<TileIndex, std::size_t> counts;
   PointBuffer points;
@@ -61,7 +69,7 @@ PointBuffer points_near(const City& city, const std::vector<Eigen::Vector3d>& pl
         const Eigen::Array2d from_corner = (place - corner).head<2>().array();
         return (from_corner > -near).all() && (from_corner < grid.tile + near).all();
       };
-      if (!std::any_of(places.begin(), places.end(), is_near) || counts[tile]++ >= kNewest)
+      if (!std::any_of(places.begin(), places.end(), is_near) || counts[tile]++ >= kBounds.newest)
         continue;
       names.insert(session->name);
       for (const SessionPoint& point : city.read_tile(*session, tile)) {
@@ -98,7 +106,7 @@ Fit fitted(const RegistrationScan& map, const RegistrationScan& session, const P
     const CellSurface* const surface = map.surfaces().find(kCellLevels - 1, p);
     if (surface == nullptr || surface->variance > 0.0) continue;
     const double squared = surface->squared_distance(p);
-    const bool is_inlier = squared <= kInlier * kInlier;
+    const bool is_inlier = squared <= kBounds.inlier * kBounds.inlier;
     fit.upright += surface->is_upright ? 1.0 : 0.0;
     fit.upright_inliers += is_inlier && surface->is_upright ? 1.0 : 0.0;
     fit.inliers += is_inlier ? 1.0 : 0.0;
@@ -122,21 +130,19 @@ Fit best_fit(const RegistrationScan& map, const RegistrationScan& session) {
 
 /// Throws ConfigError unless a result is a fit.
 void check_fit(const City& city, const Fit& fit) {
-  constexpr double kMin = 200.0;  // points at upright surfaces
-  constexpr double kMinFitting = 0.7;
-  constexpr double kSlack = 1.1;
   const std::string limits = rounded(SessionAligner::kMaxTranslation, 0) + " m and " +
                              rounded(SessionAligner::kMaxRotation, 0) + " degrees";
-  if (fit.upright < kMin) {
+  if (fit.upright < kBounds.upright) {
     refuse(city, "only " + rounded(fit.upright, 0) +
                      " of its points meet walls, poles or the like of the map; expected at least " +
-                     rounded(kMin, 0));
+                     rounded(kBounds.upright, 0));
   }
-  if (fit.fitting() < kMinFitting) {
+  if (fit.fitting() < kBounds.fitting) {
     refuse(city, "it does not fit: " + rounded(100.0 * fit.fitting(), 0) +
-                     " % of its points at upright surfaces are within " + rounded(kInlier, 2) +
-                     " m of them; expected at least " + rounded(100.0 * kMinFitting, 0) +
-                     " %. Is the start within " + limits + '?');
+                     " % of its points at upright surfaces are within " +
+                     rounded(kBounds.inlier, 2) + " m of them; expected at least " +
+                     rounded(100.0 * kBounds.fitting, 0) + " %. Is the start within " + limits +
+                     '?');
   }
   if (fit.uncertainty > kMaxUncertain) {
     refuse(city, "one direction is uncertain by " + rounded(fit.uncertainty, 2) +
@@ -145,8 +151,8 @@ void check_fit(const City& city, const Fit& fit) {
   if (fit.is_ambiguous) refuse(city, "it fits nearly as well at another place");
   const double way = fit.T.translation().norm();
   const double angle = angle_of(fit.T.linear()) / detail::kRadians;
-  if (way > kSlack * SessionAligner::kMaxTranslation ||
-      angle > kSlack * SessionAligner::kMaxRotation) {
+  if (way > kBounds.slack * SessionAligner::kMaxTranslation ||
+      angle > kBounds.slack * SessionAligner::kMaxRotation) {
     refuse(city, "the best fit is " + rounded(way, 2) + " m and " + rounded(angle, 2) +
                      " degrees from the start; expected at most " + limits);
   }
@@ -160,7 +166,7 @@ void SessionAligner::add(PointsView points, const Pose& T_session_sensor) {
     const Eigen::Vector3d local(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
                                 static_cast<double>(points.z[i]));
     const double range = local.norm();
-    if (!(range > kMinPoint && range < kReach)) continue;
+    if (!(range > kMinPoint && range < kBounds.reach)) continue;
     const Eigen::Vector3d point = T_session_sensor * local;
     if (adds(taken_, voxel_at(point - sensors_.front(), kThinned))) points_.push_back(point);
   }
@@ -184,7 +190,6 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
 
   // Points near the seed come first: they determine the rotation. A wrong rotation displaces
   // distant scans by more than the registration can correct.
-  constexpr std::size_t kMaxCount[] = {3000, 60000};  // points, near and all
   Fit fit;
   for (const bool is_first : {true, false}) {
     const double radius = is_first ? 60.0 : std::numeric_limits<double>::infinity();  // m
@@ -194,7 +199,7 @@ SessionAlignment SessionAligner::align(const Pose& T_city_start) const {
       if (p.norm() < radius) near.push_back(p.cast<float>());
     }
     PointBuffer of_session;
-    const std::size_t stride = 1 + near.size() / kMaxCount[is_first ? 0 : 1];
+    const std::size_t stride = 1 + near.size() / kBounds.points[is_first ? 0 : 1];
     for (std::size_t i = 0; i < near.size(); i += stride) {
       of_session.push_back(near[i].x(), near[i].y(), near[i].z());
     }

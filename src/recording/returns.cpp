@@ -10,22 +10,27 @@
 namespace dynains {
 namespace {
 
-constexpr double kKeyWay = 2.0;         // m, between two key scans
-constexpr double kMinInliers = 0.6;     // share of points
-constexpr double kMaxMovement = 0.05;   // m, of points 10 m away, of scans that fit
-constexpr double kMapDeviation = 0.03;  // m, of the earlier poses around, at 10 m
-constexpr float kStoredStep = 0.002F;   // m, of stored coordinates
+constexpr struct ReturnBounds {
+  double key_way = 2.0;         ///< m, between two key scans
+  double min_inliers = 0.6;     ///< share of points
+  double max_movement = 0.05;   ///< m, of points 10 m away, of scans that fit
+  double max_deviation = 0.1;   ///< m, of an alignment, at 10 m
+  double map_deviation = 0.03;  ///< m, of the earlier poses around, at 10 m
+  float stored_step = 0.002F;   ///< m, of stored coordinates
+} kBounds;
 
 using Steps = std::array<std::int16_t, 3>;
 
 }  // namespace
 
-bool ReturnToPlace::fits() const { return is_known() && movement <= kMaxMovement; }
+bool ReturnToPlace::fits() const { return is_known() && movement <= kBounds.max_movement; }
 
-bool ReturnToPlace::is_wrong() const { return inliers < kMinInliers || movement > kMaxMovement; }
+bool ReturnToPlace::is_wrong() const {
+  return inliers < kBounds.min_inliers || movement > kBounds.max_movement;
+}
 
 bool ReturnToPlace::is_known() const {
-  return inliers >= kMinInliers && deviation <= 0.1;  // m
+  return inliers >= kBounds.min_inliers && deviation <= kBounds.max_deviation;
 }
 
 // Puts the points that stand into kept_, and into the store.
@@ -40,7 +45,7 @@ void Returns::keep(PointsView points, Span<const PointLabel> verdicts) {
       continue;
     kept_.points.push_back(x, y, z);
     const auto steps = [](float metres) {
-      return static_cast<std::int16_t>(std::lround(metres / kStoredStep));
+      return static_cast<std::int16_t>(std::lround(metres / kBounds.stored_step));
     };
     const Steps at = {steps(x), steps(y), steps(z)};
     add_bytes(&at, 1, bytes_);
@@ -62,7 +67,7 @@ detail::VoxelPlanes Returns::find_planes(double edge) {
       Steps at;
       std::memcpy(at.data(), bytes_.data() + i, sizeof(at));
       const auto metres = [&](std::size_t axis) {
-        return static_cast<double>(kStoredStep * static_cast<float>(at[axis]));
+        return static_cast<double>(kBounds.stored_step * static_cast<float>(at[axis]));
       };
       block.push_back(T, metres(0), metres(1), metres(2));
       if (block.is_full()) planes.add(block);
@@ -109,7 +114,7 @@ ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given,
   }
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) result.covariance[6 * i + j] = alignment.covariance[i][j];
-    const double deviation = i < 3 ? kMapDeviation : kMapDeviation / detail::kLever;
+    const double deviation = i < 3 ? kBounds.map_deviation : kBounds.map_deviation / detail::kLever;
     result.covariance[7 * i] += deviation * deviation;
   }
   Pose R_later_map = Pose::Identity();
@@ -122,7 +127,7 @@ ReturnToPlace Returns::aligned_from(const Pose& T_guess, const Pose& T_given,
 bool Returns::is_key(const Eigen::Vector3d& sensor, bool begins) {
   if (!keys_.empty()) way_ += (sensor - latest_).norm();
   latest_ = sensor;
-  if (!begins && way_ < kKeyWay && scans_ - keys_.back().scan <= compared_) return false;
+  if (!begins && way_ < kBounds.key_way && scans_ - keys_.back().scan <= compared_) return false;
   way_ = 0.0;
   return true;
 }

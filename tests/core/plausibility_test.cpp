@@ -13,6 +13,8 @@ namespace {
 
 using detail::PlausibilityCheck;
 
+constexpr detail::PlausibilityBounds kBounds = PlausibilityCheck::kBounds;
+
 constexpr std::size_t kWindow = 10;  // scans
 
 PlausibilityCheck::Scan usual_scan() {
@@ -53,20 +55,19 @@ TEST_CASE("a usual window is plausible, and each share has a bound") {
     return free;
   };
   constexpr double kStep = 0.01;
-  using Check = PlausibilityCheck;
-  CHECK(judged(with_shares(Check::kMaxGroundFree - kStep, 0.0)) == Suspicion::kNone);
-  CHECK(judged(with_shares(Check::kMaxGroundFree + kStep, 0.0)) == Suspicion::kRays);
-  CHECK(judged(with_shares(0.0, Check::kMaxInstanceFree - kStep)) == Suspicion::kNone);
-  CHECK(judged(with_shares(0.0, Check::kMaxInstanceFree + kStep)) == Suspicion::kRays);
-  const double ground = Check::kGroundFree, instances = Check::kInstanceFree;
+  CHECK(judged(with_shares(kBounds.ground_free - kStep, 0.0)) == Suspicion::kNone);
+  CHECK(judged(with_shares(kBounds.ground_free + kStep, 0.0)) == Suspicion::kRays);
+  CHECK(judged(with_shares(0.0, kBounds.instance_free - kStep)) == Suspicion::kNone);
+  CHECK(judged(with_shares(0.0, kBounds.instance_free + kStep)) == Suspicion::kRays);
+  const double ground = kBounds.both_ground_free, instances = kBounds.both_instance_free;
   CHECK(judged(with_shares(ground + kStep, instances - kStep)) == Suspicion::kNone);
   CHECK(judged(with_shares(ground - kStep, instances + kStep)) == Suspicion::kNone);
   CHECK(judged(with_shares(ground + kStep, instances + kStep)) == Suspicion::kRays);
 
   scan = usual_scan();
-  scan.residual = PlausibilityCheck::kMaxResidual - 0.01F;
+  scan.residual = kBounds.residual - 0.01F;
   CHECK(judged(scan) == Suspicion::kNone);
-  scan.residual = PlausibilityCheck::kMaxResidual + 0.01F;
+  scan.residual = kBounds.residual + 0.01F;
   CHECK(judged(scan) == Suspicion::kPoses);
 }
 

@@ -28,15 +28,23 @@ class ScanRate {
   std::size_t slow_ = 0, fast_ = 0;  // of the last intervals, without a break
 };
 
-/// Finds windows of scans that no correct recording gives. docs/reliability.md has the distribution
-/// behind the bounds.
+/// Bounds of PlausibilityCheck. docs/reliability.md has the distribution behind them.
+struct PlausibilityBounds {
+  std::size_t window = 10;                          ///< scans
+  float unjudged = 0.98F;                           ///< ratio
+  float misfits = 0.35F;                            ///< ratio
+  float residual = 0.05F;                           ///< m
+  double jump = 0.15;                               ///< m, residual of one jump that counts
+  float ground_free = 0.35F, instance_free = 0.5F;  ///< ratios, each alone
+  float both_ground_free = 0.12F, both_instance_free = 0.2F;  ///< together
+  std::uint64_t min_beams = 300;                              ///< for a share of the ground
+  std::uint64_t min_samples = 500;                            ///< for a share of instances
+};
+
+/// Finds windows of scans that no correct recording gives.
 class PlausibilityCheck {
  public:
-  static constexpr float kMaxUnjudged = 0.98F;
-  static constexpr float kMaxGroundFree = 0.35F, kMaxInstanceFree = 0.5F;  // each alone
-  static constexpr float kGroundFree = 0.12F, kInstanceFree = 0.2F;        // together
-  static constexpr float kMaxMisfits = 0.35F;
-  static constexpr float kMaxResidual = 0.05F;  // m
+  static constexpr PlausibilityBounds kBounds{};
 
   struct Scan {
     std::uint64_t scan = 0;          ///< number of the push
@@ -49,11 +57,11 @@ class PlausibilityCheck {
 
   /// Adds a scan; the result is that of the window which ends with it.
   Plausibility add(const Scan& scan) {
-    scans_[count_++ % kWindow] = scan;
+    scans_[count_++ % kBounds.window] = scan;
     Plausibility result = summary();
     result.suspicion = judge(result);
     if (result.suspicion != last_.suspicion) {
-      const std::uint64_t back = std::min<std::uint64_t>(scan.scan, kWindow - 1);
+      const std::uint64_t back = std::min<std::uint64_t>(scan.scan, kBounds.window - 1);
       result.since = result.suspicion == Suspicion::kNone ? 0 : scan.scan - back;
     } else {
       result.since = last_.since;
@@ -63,17 +71,12 @@ class PlausibilityCheck {
   }
 
  private:
-  static constexpr double kMaxCounted = 0.15;        // m, residual of one jump
-  static constexpr std::size_t kWindow = 10;         // scans
-  static constexpr std::uint64_t kMinBeams = 300;    // for a share of the ground
-  static constexpr std::uint64_t kMinSamples = 500;  // for a share of instances
-
   static float ratio(std::uint64_t part, std::uint64_t whole, std::uint64_t fewest) {
     return whole < fewest ? 0.0F : static_cast<float>(part) / static_cast<float>(whole);
   }
 
   Plausibility summary() const {
-    const std::size_t count = std::min(count_, kWindow);
+    const std::size_t count = std::min(count_, kBounds.window);
     SurfaceCounts sum;
     const SurfaceCounts* most = &scans_[0].surfaces;
     std::uint64_t points = 0, judged = 0, misfits = 0, residuals = 0;
@@ -86,33 +89,36 @@ class PlausibilityCheck {
       judged += scan.judged;
       misfits += scan.is_misfit ? 1 : 0;
       residuals += scan.residual ? 1 : 0;
-      residual += std::min(scan.residual.value_or(0.0), kMaxCounted);
+      residual += std::min(scan.residual.value_or(0.0), kBounds.jump);
     }
     // A fault of the recording is in all scans, the sway of a shock in one.
     sum.ground_free -= most->ground_free;
     sum.ground_hit -= most->ground_hit;
     Plausibility result;
     result.not_judged = ratio(points - judged, points, 1);
-    result.ground_free = ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kMinBeams);
-    result.instance_free = ratio(sum.instances_free, sum.instances_decided, kMinSamples);
-    result.misfits = ratio(misfits, count, kWindow);
-    if (2 * residuals >= kWindow) {
+    result.ground_free =
+        ratio(sum.ground_free, sum.ground_free + sum.ground_hit, kBounds.min_beams);
+    result.instance_free = ratio(sum.instances_free, sum.instances_decided, kBounds.min_samples);
+    result.misfits = ratio(misfits, count, kBounds.window);
+    if (2 * residuals >= kBounds.window) {
       result.residual = static_cast<float>(residual / static_cast<double>(residuals));
     }
     return result;
   }
 
   Suspicion judge(const Plausibility& window) const {
-    if (count_ < kWindow) return Suspicion::kNone;
-    if (window.not_judged > kMaxUnjudged) return Suspicion::kUnits;
-    if (window.misfits > kMaxMisfits || window.residual > kMaxResidual) return Suspicion::kPoses;
-    const bool is_free = window.ground_free > kMaxGroundFree ||
-                         window.instance_free > kMaxInstanceFree ||
-                         (window.ground_free > kGroundFree && window.instance_free > kInstanceFree);
+    if (count_ < kBounds.window) return Suspicion::kNone;
+    if (window.not_judged > kBounds.unjudged) return Suspicion::kUnits;
+    if (window.misfits > kBounds.misfits || window.residual > kBounds.residual)
+      return Suspicion::kPoses;
+    const bool is_free = window.ground_free > kBounds.ground_free ||
+                         window.instance_free > kBounds.instance_free ||
+                         (window.ground_free > kBounds.both_ground_free &&
+                          window.instance_free > kBounds.both_instance_free);
     return is_free ? Suspicion::kRays : Suspicion::kNone;
   }
 
-  std::array<Scan, kWindow> scans_;
+  std::array<Scan, kBounds.window> scans_;
   std::size_t count_ = 0;
   Plausibility last_;
 };

@@ -79,13 +79,26 @@ struct GroundHypothesis {
   double distance(const Eigen::Vector3d& p) const { return dot(up, p) + height; }
 };
 
+/// Bounds of MountingEstimator.
+struct GroundSearch {
+  double min_distance = 0.4;                  ///< m; nearer points may lie on the housing
+  double max_distance = 20.0;                 ///< m; farther ground may lie in another plane
+  double cell = 0.5;                          ///< m; one point per cell evens out the density
+  double min_height = 0.2, max_height = 5.0;  ///< m, of the sensor
+  double min_upright = 0.64;                  ///< cosine of a tilt of 50 deg
+  double on_ground = 0.12;                    ///< m, largest distance of a ground cell
+  double below = 0.4;                         ///< m; cells farther below contradict a plane
+  std::size_t min_cells = 60;
+  std::size_t scored = 2000;  ///< cells that score a plane
+};
+
 /// Finds the ground plane: the plane with most occupied cells on it and fewest below it. RANSAC
 /// over one point per cell, then least squares.
 class MountingEstimator {
  public:
   /// `points`: one scan, m, sensor frame.
   explicit MountingEstimator(PointsView points) : cells_(thin(points)) {
-    for (std::size_t i = 0; i < std::min(kScored, cells_.size()); ++i) {
+    for (std::size_t i = 0; i < std::min(kSearch.scored, cells_.size()); ++i) {
       const Eigen::Vector3d& p = cells_[i];
       scored_.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
                         static_cast<float>(p.z()));
@@ -95,7 +108,7 @@ class MountingEstimator {
   /// The ground plane on the negative z side of the sensor (`side` 1), or on its positive z side
   /// (-1: mounted upside down). Empty if no plane is valid.
   std::optional<GroundHypothesis> find(double side) const {
-    if (cells_.size() < kMinCells) return std::nullopt;
+    if (cells_.size() < kSearch.min_cells) return std::nullopt;
     const std::optional<GroundHypothesis> coarse = search(side);
     if (!coarse) return std::nullopt;
     GroundHypothesis ground = *coarse;
@@ -106,21 +119,12 @@ class MountingEstimator {
   }
 
  private:
-  static constexpr double kMaxDistance = 20.0;  // m; farther ground may lie in another plane
-  static constexpr double kCell = 0.5;          // m; one point per cell evens out the density
-  static constexpr double kMinDistance = 0.4;   // m; nearer points may lie on the housing
-  static constexpr double kMinHeight = 0.2;     // m, height of the sensor
-  static constexpr double kMaxHeight = 5.0;     // m, height of the sensor
-  static constexpr double kMinUpright = 0.64;   // cosine of a tilt of 50 deg
-  static constexpr double kOnGround = 0.12;     // m, largest distance of a ground cell
-  static constexpr double kBelow = 0.4;         // m; cells farther below contradict a plane
-  static constexpr std::size_t kMinCells = 60;
-  static constexpr std::size_t kScored = 2000;  // cells that score a plane
+  static constexpr GroundSearch kSearch{};
 
   static bool is_near(PointsView points, std::size_t i) {
     const float x = points.x[i], y = points.y[i], z = points.z[i];
     const float range = std::sqrt(x * x + (y * y + z * z));
-    return range > kMinDistance && range < kMaxDistance;
+    return range > kSearch.min_distance && range < kSearch.max_distance;
   }
 
   // Mean of the points in each occupied cell, in random order, so that any subrange is a random
@@ -137,7 +141,7 @@ class MountingEstimator {
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (!is_near(points, i)) continue;
       const double p[3] = {points.x[i], points.y[i], points.z[i]};
-      const VoxelKey cell = voxel_at(p, kCell);
+      const VoxelKey cell = voxel_at(p, kSearch.cell);
       if (at >= sums.size() || sums[at].cell != cell) at = number.insert(cell);
       if (at == sums.size()) sums.push_back({cell, 0.0, 0.0, 0.0, 0.0});
       sums[at].x += p[0];
@@ -194,8 +198,8 @@ class MountingEstimator {
       const Float z(static_cast<float>(ground.up.z()));
       const Float height(static_cast<float>(ground.height));
       const Float zero(0.0F), one(1.0F), half(0.5F);
-      const Float slope(static_cast<float>(0.5 / kOnGround));
-      const Float below(static_cast<float>(-kBelow));
+      const Float slope(static_cast<float>(0.5 / kSearch.on_ground));
+      const Float below(static_cast<float>(-kSearch.below));
       Float total(0.0F);
       for (std::size_t begin = 0; begin < count; begin += kStepPoints) {
         const std::size_t end = std::min(count, begin + kStepPoints);
@@ -214,8 +218,8 @@ class MountingEstimator {
   }
 
   static bool is_possible(const GroundHypothesis& ground, double side) {
-    return ground.up.z() * side > kMinUpright && ground.height > kMinHeight &&
-           ground.height < kMaxHeight;
+    return ground.up.z() * side > kSearch.min_upright && ground.height > kSearch.min_height &&
+           ground.height < kSearch.max_height;
   }
 
   // Weighted least squares over the cells within `band` m of the plane. Near cells have a larger
@@ -245,14 +249,14 @@ class MountingEstimator {
     std::size_t below = 0;
     for (const Eigen::Vector3d& p : cells_) {
       const double distance = ground.distance(p);
-      if (std::abs(distance) < kOnGround) ++on;
-      if (distance < -kBelow) ++below;
+      if (std::abs(distance) < kSearch.on_ground) ++on;
+      if (distance < -kSearch.below) ++below;
     }
-    return on >= kMinCells && on * 20 >= cells_.size() && below < on;
+    return on >= kSearch.min_cells && on * 20 >= cells_.size() && below < on;
   }
 
   std::vector<Eigen::Vector3d> cells_;  // m, sensor frame
-  PointBuffer scored_;                  // the first kScored cells
+  PointBuffer scored_;                  // the first kSearch.scored cells
 };
 
 }  // namespace detail

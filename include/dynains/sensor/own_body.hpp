@@ -33,6 +33,13 @@ struct OwnBody {
 
 namespace detail {
 
+/// Cells of directions, NearestReturns.
+struct DirectionCells {
+  float column = 2.0F;  ///< deg of azimuth
+  float row = 1.0F;     ///< deg of elevation
+  std::size_t columns = 181, rows = 182;
+};
+
 /// The nearest return of each direction, scan by scan, and the nearest ground of each azimuth, as
 /// far from the sensor as a body may reach.
 class NearestReturns {
@@ -46,7 +53,7 @@ class NearestReturns {
   };
 
   explicit NearestReturns(const Mounting& mounting)
-      : mounting_(mounting), by_direction_(kColumns * kRows), ground_(kColumns) {}
+      : mounting_(mounting), by_direction_(kCells.columns * kCells.rows), ground_(kCells.columns) {}
 
   void add(PointsView points) {
     near_.clear();
@@ -56,7 +63,7 @@ class NearestReturns {
     }
     const BeamAngles angles = beam_angles(near_);
     nearest_.assign(by_direction_.size(), {});
-    nearest_ground_.assign(kColumns, std::numeric_limits<float>::infinity());
+    nearest_ground_.assign(kCells.columns, std::numeric_limits<float>::infinity());
     for (std::size_t i = 0; i < near_.size(); ++i) {
       const Eigen::Vector3f p(near_.x[i], near_.y[i], near_.z[i]);
       const float range = p.norm();
@@ -64,7 +71,7 @@ class NearestReturns {
       const std::size_t d = direction(angles.azimuth[i], angles.elevation[i]);
       if (range < nearest_[d].range) nearest_[d] = {range, p};
       if (height_of(p) < 0.25) {  // m
-        float& ground = nearest_ground_[d / kRows];
+        float& ground = nearest_ground_[d / kCells.rows];
         ground = std::min(ground, p.head<2>().norm());
       }
     }
@@ -73,7 +80,7 @@ class NearestReturns {
       ranges_.back().push_back(nearest_[d].range);
       if (std::isfinite(nearest_[d].range)) by_direction_[d].push_back(nearest_[d]);
     }
-    for (std::size_t c = 0; c < kColumns; ++c) ground_[c].push_back(nearest_ground_[c]);
+    for (std::size_t c = 0; c < kCells.columns; ++c) ground_[c].push_back(nearest_ground_[c]);
   }
 
   /// How the returns of scan `i` around the direction of a point (m, its sensor frame) compare with
@@ -107,18 +114,16 @@ class NearestReturns {
   template <class Visit>
   void for_each_direction(Visit&& visit) {
     for (std::size_t d = 0; d < by_direction_.size(); ++d) {
-      if (!by_direction_[d].empty()) visit(by_direction_[d], median(ground_[d / kRows]));
+      if (!by_direction_[d].empty()) visit(by_direction_[d], median(ground_[d / kCells.rows]));
     }
   }
 
  private:
-  static constexpr float kColumn = 2.0F;  // deg of azimuth
-  static constexpr float kRow = 1.0F;     // deg of elevation
-  static constexpr std::size_t kColumns = 181;
-  static constexpr std::size_t kRows = 182;
+  static constexpr DirectionCells kCells{};
 
   static std::size_t direction(float azimuth, float elevation) {
-    return cell(azimuth + 180.5F, kColumn, kColumns) * kRows + cell(elevation + 90.5F, kRow, kRows);
+    return cell(azimuth + 180.5F, kCells.column, kCells.columns) * kCells.rows +
+           cell(elevation + 90.5F, kCells.row, kCells.rows);
   }
   static std::size_t cell(float angle, float size, std::size_t count) {
     return std::min(static_cast<std::size_t>(angle / size), count - 1);
