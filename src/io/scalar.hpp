@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 namespace dynains {
@@ -119,8 +120,8 @@ class ByteWriter {
     return number(static_cast<std::uint32_t>(text.size())).raw(text);
   }
   /// A text of at most `size` bytes, filled up with zeros.
-  ByteWriter& text(const std::string& text, std::size_t size) {
-    return raw(text.substr(0, size)).zeros(size - std::min(size, text.size()));
+  ByteWriter& text(std::string_view text, std::size_t size) {
+    return raw(std::string(text.substr(0, size))).zeros(size - std::min(size, text.size()));
   }
   const std::string& bytes() const { return bytes_; }
 

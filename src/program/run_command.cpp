@@ -54,7 +54,7 @@ void print_results(const RunOutcome& run) {
   std::cout << "moving points: " << (outputs.folder / "dynamic_points.ply").string() << " ("
             << labels["dynamic"] << " points)\n"
             << "labels: " << (outputs.folder / "labels").string()
-            << "\npicture: " << (outputs.folder / kOverviewPicture).string()
+            << "\npicture: " << (outputs.folder / kResultNames.picture).string()
             << "\nreport: " << (outputs.folder / "report.json").string() << std::endl;
 }
 
@@ -90,7 +90,7 @@ Recording open(RunFlags& flags, PoseEstimate& estimate) {
   settings.outputs.write_poses = true;
   // Commands over the results take the poses from there.
   settings.recording_flags["--poses"] =
-      (whole_path(settings.outputs.folder) / kEstimatedPoses).string();
+      (whole_path(settings.outputs.folder) / kResultNames.poses).string();
   if (recording.is_deskewed()) settings.recording_flags["--deskew"] = "true";
   return recording;
 }

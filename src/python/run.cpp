@@ -212,7 +212,7 @@ void bind_run(py::module_& module) {
                              "File of the moving points.")
       .def_property_readonly("labels", file("labels"),
                              "Folder of the labels, a file for each scan.")
-      .def_property_readonly("picture", file(run::kOverviewPicture),
+      .def_property_readonly("picture", file(run::kResultNames.picture),
                              "Picture: before, after, removed.")
       .def_readonly("page", &RunResult::page, "Page for a browser; None unless view=True.")
       .def_readonly("report", &RunResult::report, "The content of report.json.")

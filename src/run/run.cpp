@@ -258,7 +258,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   for (const std::string& text : sentences(doubts, plan.sequence)) listener.warn(text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
-  if (outputs.write_poses) write_trajectory(outputs.folder / kEstimatedPoses, plan.sequence);
+  if (outputs.write_poses) write_trajectory(outputs.folder / kResultNames.poses, plan.sequence);
   if (!outside.log.empty() && outcome.complete) {
     write_log(outside.log, plan, labels, listener, outcome);
   }
@@ -277,8 +277,8 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
     return outcome;
   }
   if (page) {
-    outcome.page = plan.settings.outputs.folder / kViewPage;
-    page->write(outputs.folder / kViewPage);
+    outcome.page = plan.settings.outputs.folder / kResultNames.page;
+    page->write(outputs.folder / kResultNames.page);
   }
   const nlohmann::ordered_json written = outside.contents();
   if (!written.is_null()) outcome.report["written"] = written;

@@ -204,12 +204,12 @@ SessionRequest session_request(const RunSettings& settings, const Recording& seq
 OutputListing listing_of(const RunOutputs& outputs, const Recording& recording,
                          const ScanRange& range) {
   OutputListing listing;
-  listing.files = {"timing.csv", "dynamic_points.ply", kOverviewPicture};
+  listing.files = {"timing.csv", "dynamic_points.ply", kResultNames.picture};
   if (!outputs.map.empty() && !outputs.has_outside_map())
     listing.files.insert(listed_name(outputs.map_name()));
-  if (outputs.write_tracks) listing.files.insert(kTracksFile);
-  if (outputs.write_poses) listing.files.insert(kEstimatedPoses);
-  if (outputs.write_page) listing.files.insert(kViewPage);
+  if (outputs.write_tracks) listing.files.insert(kResultNames.tracks);
+  if (outputs.write_poses) listing.files.insert(kResultNames.poses);
+  if (outputs.write_page) listing.files.insert(kResultNames.page);
   listing.folders = {{"labels", ".label"}, {"causes", ".cause"}};
   if (outputs.write_beliefs) listing.folders["beliefs"] = ".belief";
   if (outputs.write_online) listing.folders["online"] = ".label";

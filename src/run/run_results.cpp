@@ -160,8 +160,8 @@ void RunResults::commit() {
   finish();
   writing_online_.wait();
   dynamic_points_.commit();
-  if (outputs_.write_tracks) write_tracks(outputs_.folder / kTracksFile, tracks_);
-  overview_.picture().write_png(outputs_.folder / kOverviewPicture);
+  if (outputs_.write_tracks) write_tracks(outputs_.folder / kResultNames.tracks, tracks_);
+  overview_.picture().write_png(outputs_.folder / kResultNames.picture);
   if (revised_map_) revised_map_->for_each([&](const auto& point) { add_map_point(point); });
   if (map_) map_->commit();
 }

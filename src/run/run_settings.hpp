@@ -21,12 +21,14 @@
 
 namespace dynains::run {
 
-/// The picture of a run, see Overview.
-inline constexpr const char* kOverviewPicture = "overview.png";
-inline constexpr const char* kTracksFile = "tracks.csv";
-inline constexpr const char* kEstimatedPoses = "poses.txt";
-/// The page of `dynains view` in the folder of results.
-inline constexpr const char* kViewPage = "view.html";
+/// Names in the folder of results.
+struct ResultNames {
+  const char* picture = "overview.png";  ///< see Overview
+  const char* tracks = "tracks.csv";
+  const char* poses = "poses.txt";
+  const char* page = "view.html";  ///< of `dynains view`
+};
+inline constexpr ResultNames kResultNames;
 
 /// The names that a run accepts, a part of those of DynaInsRemover::Config::preset().
 inline const std::vector<std::string>& preset_names() {

@@ -141,7 +141,7 @@ std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& 
 
 fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t max_points) {
   ResultFolder out = open_finished_run(folder);
-  OutputFile page(out, kViewPage);
+  OutputFile page(out, kResultNames.page);
   const Recording recording = open(out);
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
   Page content(recording, {scans.front(), scans.back()},
@@ -156,7 +156,7 @@ fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t
   }
   content.write(page.path());
   page.put_in_place([&] { out.mark_with(out.marker(), page.path()); });
-  return out.path() / kViewPage;
+  return out.path() / kResultNames.page;
 }
 
 }  // namespace dynains::run

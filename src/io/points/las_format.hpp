@@ -3,15 +3,18 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <string_view>
 
 #include "../scalar.hpp"
 
 namespace dynains::las {
 
-inline const std::string kMagic = "LASF";
-inline constexpr char kSpecUser[] = "LASF_Spec";
-inline constexpr std::uint16_t kExtraBytesRecord = 4;
+/// What marks a file and its record of extra bytes.
+struct Marks {
+  std::string_view magic = "LASF", spec_user = "LASF_Spec";
+  std::uint16_t extra_bytes_record = 4;
+};
+inline constexpr Marks kMarks;
 
 /// Bytes of the parts of a file.
 struct Sizes {

@@ -93,7 +93,7 @@ void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
     const auto record = fields.number<std::uint16_t>("a record id");
     const auto size = fields.number<std::uint16_t>("the size of a record");
     position += las::kSizes.record_header;
-    if (user == las::kSpecUser && record == las::kExtraBytesRecord) {
+    if (user == las::kMarks.spec_user && record == las::kMarks.extra_bytes_record) {
       const auto content = file.read(position, size, "a variable length record");
       add_extra_columns(sink, header, Bytes(file.path(), position, content.data(), content.size()));
     }
@@ -105,8 +105,8 @@ LasHeader read_header(RawFile& file, PointSink& sink) {
   const auto head = file.read(0, std::min<std::uint64_t>(file.size(), las::kSizes.header_1_2),
                               "the header of LAS");
   Bytes fields(file.path(), 0, head.data(), head.size());
-  if (head.size() < las::kMagic.size() ||
-      !std::equal(las::kMagic.begin(), las::kMagic.end(), head.begin())) {
+  if (head.size() < las::kMarks.magic.size() ||
+      !std::equal(las::kMarks.magic.begin(), las::kMarks.magic.end(), head.begin())) {
     fields.fail("expected LASF, the magic bytes of LAS");
   }
   fields.skip(24, "the header of LAS");

@@ -24,7 +24,7 @@ std::string extra_description(const char* name, Scalar type, const char* descrip
       .bytes();
 }
 
-std::string vlr(const std::string& user, std::uint16_t record, const std::string& description,
+std::string vlr(std::string_view user, std::uint16_t record, const std::string& description,
                 const std::string& content) {
   return ByteWriter()
              .zeros(2)
@@ -37,7 +37,7 @@ std::string vlr(const std::string& user, std::uint16_t record, const std::string
 }
 
 std::string extra_bytes_vlr() {
-  return vlr(las::kSpecUser, las::kExtraBytesRecord, "extra bytes",
+  return vlr(las::kMarks.spec_user, las::kMarks.extra_bytes_record, "extra bytes",
              extra_description("belief", Scalar::kFloat, "probability of being dynamic") +
                  extra_description("cause", Scalar::kUint8, "cause of the verdict") +
                  extra_description("instance", Scalar::kUint32, "0: none"));
@@ -65,7 +65,10 @@ std::string LasWriter::header() const {
   }
   ByteWriter out;
   // Bit 4: coordinate systems are texts (WKT).
-  out.text(las::kMagic, las::kMagic.size()).zeros(2).number(std::uint16_t{1U << 4U}).zeros(16);
+  out.text(las::kMarks.magic, las::kMarks.magic.size())
+      .zeros(2)
+      .number(std::uint16_t{1U << 4U})
+      .zeros(16);
   out.number(std::uint8_t{1}).number(std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files
