@@ -3,7 +3,6 @@
 #include <png.h>
 
 #include <memory>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"

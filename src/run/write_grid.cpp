@@ -1,8 +1,6 @@
 #include "write_grid.hpp"
 
 #include <algorithm>
-#include <iterator>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"

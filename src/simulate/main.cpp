@@ -1,7 +1,6 @@
 #include <array>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <string>
 
 #include "dynains/errors.hpp"

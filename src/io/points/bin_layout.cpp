@@ -6,7 +6,6 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "../failure.hpp"
 #include "../logs/raw_file.hpp"
