@@ -1,15 +1,174 @@
 #include "log_file.hpp"
 
 #include <algorithm>
+#include <set>
+#include <string_view>
+#include <system_error>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
 #include "../input_file.hpp"
-#include "log_folder.hpp"
+#include "../text.hpp"
 
 namespace dynains {
 namespace {
 
 namespace fs = std::filesystem;
+
+std::string extension_of(const fs::path& path) {
+  return text::lower_case(path.extension().string());
+}
+
+/// Whether the file is compressed as a whole, by its name.
+bool is_compressed_log(const fs::path& path) {
+  const std::string extension = extension_of(path);
+  return extension == ".zstd" || extension == ".zst";
+}
+
+/// Extension of a log by its name: ".mcap", ".bag" (also for NAME.bag.active) or ".db3"; also if
+/// the file is compressed as a whole, as NAME.mcap.zstd. Else empty.
+std::string log_extension(const fs::path& path) {
+  std::string extension = extension_of(path);
+  if (is_compressed_log(path)) extension = extension_of(path.stem());
+  if (extension == ".active") extension = extension_of(path.stem()) == ".bag" ? ".bag" : "";
+  const bool is_log = extension == ".mcap" || extension == ".bag" || extension == ".db3";
+  return is_log ? extension : std::string();
+}
+
+/// Files with a name of a log directly in a folder, by name. A compressed file beside its
+/// decompressed form is left out.
+std::vector<fs::path> logs_in_folder(const fs::path& folder) {
+  std::vector<fs::path> logs;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (!log_extension(entry->path()).empty()) logs.push_back(entry->path());
+  }
+  if (error) fail(folder, "cannot be listed: " + error.message());
+  std::sort(logs.begin(), logs.end());
+  const std::vector<fs::path> all = logs;
+  logs.erase(std::remove_if(logs.begin(), logs.end(),
+                            [&](const fs::path& log) {
+                              return is_compressed_log(log) &&
+                                     std::binary_search(all.begin(), all.end(),
+                                                        folder / log.stem());
+                            }),
+             logs.end());
+  return logs;
+}
+
+/// A log that consists of several files in a folder.
+struct LogParts {
+  std::vector<fs::path> files;
+  std::optional<fs::path> metadata;
+  std::optional<std::string> missing;  ///< which parts are not there, one sentence
+};
+
+/// Name without directory and without the extension of a compression.
+std::string plain_name(const fs::path& path) {
+  return (is_compressed_log(path) ? path.stem() : path.filename()).string();
+}
+
+std::string without_quotes(std::string_view token) {
+  constexpr std::string_view kMarks = "\"'[],";
+  while (!token.empty() && kMarks.find(token.front()) != std::string_view::npos) {
+    token.remove_prefix(1);
+  }
+  while (!token.empty() && kMarks.find(token.back()) != std::string_view::npos) {
+    token.remove_suffix(1);
+  }
+  return std::string(token);
+}
+
+/// Names below `relative_file_paths` of a metadata.yaml of rosbag2, without folders.
+std::vector<std::string> listed_files(const fs::path& metadata) {
+  ByteReader reader(metadata);
+  std::vector<std::string> names;
+  bool is_inside = false;
+  for (std::string line; reader.read_line(line);) {
+    std::string_view rest = line;
+    std::string_view first = text::next_token(rest);
+    const bool is_begin = first == "relative_file_paths:";
+    if (is_inside && !is_begin && first != "-") break;
+    if (!is_begin && !is_inside) continue;
+    is_inside = true;
+    for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
+      const std::string name = without_quotes(token);
+      if (!name.empty()) names.push_back(plain_name(fs::path(name).filename()));
+    }
+  }
+  return names;
+}
+
+std::string missing_text(const std::vector<std::string>& missing, std::size_t found) {
+  return std::to_string(missing.size()) + " of " + std::to_string(missing.size() + found) +
+         " parts of the log are missing: " + text::listed(missing);
+}
+
+/// N of a name NAME_N.
+std::optional<std::size_t> part_number(const std::string& stem) {
+  const std::size_t at = stem.rfind('_');
+  if (at == std::string::npos || at + 1 == stem.size() || stem.size() - at > 7) {
+    return std::nullopt;
+  }
+  const std::string digits = stem.substr(at + 1);
+  if (digits.find_first_not_of("0123456789") != std::string::npos) return std::nullopt;
+  return std::stoul(digits);
+}
+
+std::string stem_of(const fs::path& path) { return fs::path(plain_name(path)).stem().string(); }
+
+/// Parts that are missing by metadata.yaml.
+std::vector<std::string> missing_by_list(const LogParts& parts) {
+  std::set<std::string> names;
+  for (const fs::path& file : parts.files) names.insert(plain_name(file));
+  std::vector<std::string> missing;
+  for (const std::string& name : listed_files(*parts.metadata)) {
+    if (names.count(name) == 0) missing.push_back(name);
+  }
+  return missing;
+}
+
+/// Parts that are missing in NAME_0, NAME_1, ... up to the last one that is there.
+std::vector<std::string> missing_by_number(const fs::path& folder, const LogParts& parts) {
+  std::set<std::size_t> numbers;
+  std::set<std::string> kinds;
+  for (const fs::path& file : parts.files) {
+    const auto number = part_number(stem_of(file));
+    if (number) numbers.insert(*number);
+    kinds.insert(log_extension(file));
+  }
+  if (numbers.size() != parts.files.size() || kinds.size() != 1) {
+    std::vector<std::string> names;
+    for (const fs::path& file : parts.files) names.push_back(file.filename().string());
+    fail(folder, "has " + std::to_string(names.size()) + " logs (" + text::listed(names) +
+                     ") and no metadata.yaml; expected one log, or parts NAME_0, NAME_1, ... of "
+                     "one; name one of the files");
+  }
+  std::vector<std::string> missing;
+  const std::string stem = stem_of(parts.files.front());
+  const std::string base = stem.substr(0, stem.rfind('_') + 1);
+  for (std::size_t number = 0; number < *numbers.rbegin() && missing.size() < 1000; ++number) {
+    if (numbers.count(number) == 0) missing.push_back(base + std::to_string(number));
+  }
+  return missing;
+}
+
+/// The parts of the log in a folder, by metadata.yaml; without that file the only log, or parts
+/// NAME_0, NAME_1, ... Throws IoError if the files may be several logs.
+LogParts find_parts(const fs::path& folder) {
+  LogParts parts;
+  parts.files = logs_in_folder(folder);
+  if (is_file(folder / "metadata.yaml")) parts.metadata = folder / "metadata.yaml";
+  std::vector<std::string> missing;
+  if (parts.metadata) {
+    missing = missing_by_list(parts);
+  } else if (parts.files.size() > 1) {
+    missing = missing_by_number(folder, parts);
+  }
+  if (!missing.empty()) parts.missing = missing_text(missing, parts.files.size());
+  return parts;
+}
 
 std::unique_ptr<LogFile> open_file(const fs::path& path) {
   const std::string extension = log_extension(path);
