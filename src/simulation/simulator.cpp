@@ -13,9 +13,24 @@
 #include "simulation/world.hpp"
 
 namespace dynains::simulation {
+
+/// Place where a beam meets the ground or an object.
+struct Surface {
+  float range = 0;   ///< m
+  float cosine = 1;  ///< of the angle of incidence
+  float loss = 0;    ///< probability of no return, besides that of weak returns
+  float reflectivity = 0;
+  float roughness = 0;  ///< m, added to the noise of the range
+  std::uint32_t label = 0;
+};
+
+/// Surfaces in the order of measurement.
+using Surfaces = std::vector<std::optional<Surface>>;
+
 namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
+
 /// A sensor of a rig, from the middle of the body on the ground.
 struct Mount {
   double x, y, z;     ///< m
@@ -90,19 +105,6 @@ Pose stand_on(Terrain& terrain, const Waypoint& at, double length, double width)
   const double z = 0.5 * (front + rear);
   return isometry(rotation(at.heading, pitch, roll), at.position.x, at.position.y, z);
 }
-
-/// Place where a beam meets the ground or an object.
-struct Surface {
-  float range = 0;   ///< m
-  float cosine = 1;  ///< of the angle of incidence
-  float loss = 0;    ///< probability of no return, besides that of weak returns
-  float reflectivity = 0;
-  float roughness = 0;  ///< m, added to the noise of the range
-  std::uint32_t label = 0;
-};
-
-/// Surfaces in the order of measurement.
-using Surfaces = std::vector<std::optional<Surface>>;
 
 float power_of(const Surface& surface, float share) {
   return share * surface.reflectivity / std::max(surface.range * surface.range, 0.01F);

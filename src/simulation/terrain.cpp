@@ -17,8 +17,8 @@ int tile_index(double v, double size) { return static_cast<int>(std::floor(v / s
 
 /// A part of the centre of a street, and what distances to it need.
 struct Segment {
-  Segment(const Street& of, Vec2 from, Vec2 to)
-      : street(&of), a(from), ab(to - from), square(std::max(dot(ab, ab), 1e-9)) {}
+  Segment(const Street& whole, Vec2 from, Vec2 to)
+      : street(&whole), a(from), ab(to - from), square(std::max(dot(ab, ab), 1e-9)) {}
 
   double distance(Vec2 p) const {
     const Vec2 ap = p - a;
