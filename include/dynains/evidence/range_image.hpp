@@ -315,7 +315,7 @@ class RangeImage {
   // objects are near enough.
   void widen(const RangeImageGrid& grid, float reach, Scratch& scratch) {
     constexpr int kWidest = 4;  // cells on each side
-    scratch.wider.resize(grid.cell_count());
+    scratch.wider.assign(grid.cell_count(), kNothing);
     detail::with_packs([&](auto packs) {
       for (int cells = 1; cells <= kWidest; ++cells) {
         const float farthest = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
@@ -334,6 +334,8 @@ class RangeImage {
   void widen_row(const RangeImageGrid& grid, std::size_t row, std::int16_t limit, bool protects,
                  Scratch& scratch) {
     const Short nothing(kNothing), most(limit);
+    Short least_of_row = nothing;
+    std::int16_t* const wider = &scratch.wider[row * grid.stride()];
     const std::int16_t* const low = row_of(scratch.objects, row - 1, grid, scratch);
     const std::int16_t* const middle = row_of(scratch.objects, row, grid, scratch);
     const std::int16_t* const high = row_of(scratch.objects, row + 1, grid, scratch);
@@ -341,15 +343,21 @@ class RangeImage {
     for (std::size_t column = 0; column < grid.stride(); column += detail::kShortPackWidth) {
       const Short least = min(min(Short::load(low + column), Short::load(middle + column)),
                               Short::load(high + column));
+      least_of_row = min(least_of_row, least);
       select(least < most, least, nothing).store(leasts + column);
+    }
+    if (!(least_of_row < most).any()) {
+      std::fill_n(wider, grid.stride(), kNothing);
+      return;
     }
     wrap(leasts, static_cast<std::size_t>(grid.columns));
     for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < grid.stride();
          column += detail::kShortPackWidth) {
       const Short least = least_of_three<Short>(leasts + column);
-      const std::size_t cell = row * grid.stride() + column;
-      least.store(&scratch.wider[cell]);
-      if (protects && (least < nothing).any()) protect(&cells_[cell], least);
+      least.store(wider + column);
+      if (protects && (least < nothing).any()) {
+        protect(&cells_[row * grid.stride() + column], least);
+      }
     }
   }
 
