@@ -82,7 +82,7 @@ detail::VoxelPlanes Returns::find_planes(double edge) {
 ReturnToPlace Returns::aligned(const Pose& T_world_sensor) {
   const Pose T_given = near_.front()->T_world_sensor.inverse() * T_world_sensor;
   detail::VoxelPlanes planes = find_planes(1.0);
-  selected_.select(kept_, {});
+  detail::select_points(kept_, selected_);
   const ReturnToPlace result = aligned_from(T_given, T_given, planes);
   if (!result.is_wrong()) return result;
   detail::VoxelPlanes coarse_planes = find_planes(4.0);

@@ -26,11 +26,10 @@ using simulation::Scene;
 using simulation::Sensor;
 using simulation::SimulatedScan;
 
-constexpr double kTolerance = 0.01;                    // m
-constexpr double kMaxLength = 18.0, kMaxHeight = 4.5;  // m, of objects
+constexpr double kTolerance = 0.01;  // m
 constexpr double kDegrees = M_PI / 180.0;
 
-PoseCorrection new_correction() { return PoseCorrection(kTolerance, kMaxLength, kMaxHeight); }
+PoseCorrection new_correction() { return PoseCorrection(kTolerance); }
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
   const simulation::Config config = drive_of(scene, sensor, scans, 31);
@@ -55,7 +54,7 @@ PoseCorrection after_all_but_last(const std::vector<SimulatedScan>& scans) {
   correction.begin_epoch(scans.front().T_world_sensor);
   for (std::size_t i = 0; i + 1 < scans.size(); ++i) {
     const GroundSplit split = split_of(scans[i]);
-    correction.insert(correction.correct(scans[i].T_world_sensor, split, {}, {}), split, {});
+    correction.insert(correction.correct(scans[i].T_world_sensor, split, {}), split, {});
   }
   return correction;
 }
@@ -81,7 +80,7 @@ std::vector<PoseResidual> residuals_of_exact(PoseCorrection correction,
   for (const SimulatedScan& scan : scans) {
     GroundSplit split = split_of(scan);
     spoil(split);
-    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split, {}, {});
+    const Eigen::Isometry3d T = correction.correct(scan.T_world_sensor, split, {});
     CHECK((T.matrix() - scan.T_world_sensor.matrix()).norm() == 0.0);
     correction.insert(T, split, {});
     if (correction.residual()) residuals.push_back(*correction.residual());
@@ -143,7 +142,7 @@ TEST_CASE("exact poses stay if elevations, ranges or the mounting of the sensor 
                     SensorFault{0.0, 0.0, elevation * kDegrees, -elevation * kDegrees, 0.0},
                     SensorFault{0.0, 0.0, 0.0, 0.0, 0.25 * elevation * kDegrees});
   static const std::vector<SimulatedScan> scans = drive(Scene::kUrban, Sensor::kHdl64, 30);
-  residuals_of_exact({0.003, kMaxLength, kMaxHeight}, scans, [&](GroundSplit& split) {
+  residuals_of_exact(PoseCorrection(0.003), scans, [&](GroundSplit& split) {
     for (std::size_t i = 0; i < split.count; ++i) {
       const Eigen::Vector3f p = fault({split.points.x[i], split.points.y[i], split.points.z[i]});
       split.points.x[i] = p.x();
@@ -170,7 +169,7 @@ TEST_CASE("a perturbed pose is found and corrected") {
                                                         {{-0.3, 0.4, 0.05}, {0.1, -0.1, 0.3}}}));
   const Eigen::Isometry3d T_wrong = T_truth * perturbation(metres, turn);
   PoseCorrection correction = after_all_but_last(scans);
-  const Eigen::Isometry3d T = correction.correct(T_wrong, split, {}, {});
+  const Eigen::Isometry3d T = correction.correct(T_wrong, split, {});
   INFO(metres.transpose() << " m, " << turn.transpose() << " deg");
   REQUIRE(correction.residual());
   CHECK_FALSE(correction.misfit());
@@ -207,7 +206,7 @@ TEST_CASE("the covariance of the best fit explains its errors") {
     };
     PoseCorrection correction = after_all_but_last(scans);
     const Eigen::Vector3d metres = draw(0.1), turn = draw(0.2);
-    correction.correct(scans.back().T_world_sensor * perturbation(metres, turn), split, {}, {});
+    correction.correct(scans.back().T_world_sensor * perturbation(metres, turn), split, {});
     REQUIRE(correction.residual());
     const PoseResidual& residual = *correction.residual();
     const Eigen::Isometry3d T_error =
@@ -264,7 +263,7 @@ TEST_CASE("a lasting offset is one residual, and later poses are corrected by it
     const GroundSplit split = split_of(scans[i]);
     const Pose T_pushed =
         is_moved ? T_moved_world * scans[i].T_world_sensor : scans[i].T_world_sensor;
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {});
     correction.insert(T, split, {});
     INFO("scan " << i);
     CHECK((T.translation() - scans[i].T_world_sensor.translation()).norm() < 0.03);
@@ -307,7 +306,7 @@ TEST_CASE("between two long walls, errors across them are corrected, those along
     const Eigen::Isometry3d T_pushed =
         Eigen::Translation3d(pushed_x, 0.03 * scan, 0.0) *
         Eigen::Isometry3d(Eigen::AngleAxisd(0.2 * kDegrees * scan, Eigen::Vector3d::UnitZ()));
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {});
     INFO("scan " << scan);
     CHECK(T.translation().x() == Approx(pushed_x).margin(0.02));
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
@@ -331,49 +330,12 @@ TEST_CASE("one object alone does not decide about a direction") {
     const GroundSplit split = corridor(40 + static_cast<std::uint64_t>(scan), x, true);
     const Eigen::Isometry3d T_pushed(
         Eigen::Translation3d(static_cast<double>(x), scan < 5 ? 0.0 : 0.1, 0.0));
-    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {}, {});
+    const Eigen::Isometry3d T = correction.correct(T_pushed, split, {});
     INFO("scan " << scan);
     CHECK(T.translation().x() == Approx(static_cast<double>(x)).margin(0.01));
     CHECK(T.translation().y() == Approx(0.0).margin(0.02));
     correction.insert(T, split, {});
   }
-}
-
-// Greatest correction (m) of an exact pose along the corridor in which four vehicles start
-// together, 5 cm per scan. Objects have at most the given size (m).
-double correction_by_traffic(double longest_object, double highest_object) {
-  constexpr float kPlaces[][2] = {{7.0F, -2.0F}, {-9.0F, 2.0F}, {12.0F, 2.0F}, {-14.0F, -2.0F}};
-  PoseCorrection correction(kTolerance, longest_object, highest_object);
-  const Pose T_exact = Eigen::Isometry3d::Identity();
-  correction.begin_epoch(T_exact);
-  double largest = 0.0;
-  for (int scan = 0; scan < 8; ++scan) {
-    GroundSplit split = corridor(70 + static_cast<std::uint64_t>(scan), 0.0F, false);
-    std::vector<std::uint32_t> instance_of(split.count, kNoCluster);
-    std::uint32_t instance = 0;
-    for (const auto& place : kPlaces) {
-      const float x = place[0] + 0.05F * static_cast<float>(scan);
-      Random random(900 + instance);
-      const std::size_t begin = split.count;
-      split.resize(begin + 500);
-      for (std::size_t i = begin; i < split.count; ++i) {  // its rear
-        split.points.x[i] = x + 0.01F * static_cast<float>(random.normal());
-        split.points.y[i] = place[1] + random.uniform_float(-0.9, 0.9);
-        split.points.z[i] = random.uniform_float(-1.5, 0.0);
-      }
-      instance_of.resize(split.count, instance++);
-    }
-    const Pose T = correction.correct(T_exact, split, {instance_of, instance}, {});
-    largest = std::max(largest, std::abs(T.translation().x()));
-    correction.insert(T, split, {});
-  }
-  return largest;
-}
-
-TEST_CASE("traffic that starts together does not correct an exact pose, large objects do") {
-  CHECK(correction_by_traffic(1.9, 1.6) == 0.0);
-  CHECK(correction_by_traffic(1.7, 1.6) > 0.05);
-  CHECK(correction_by_traffic(1.9, 1.4) > 0.05);
 }
 
 TEST_CASE("a scan of another place is lost, and a scan without points has no residual") {
@@ -382,12 +344,12 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
   PoseCorrection correction = after_all_but_last(scans);
   const Eigen::Isometry3d tilted =
       scans.back().T_world_sensor * perturbation({0.0, 0.0, 0.4}, {6.0, 5.0, 30.0});
-  correction.correct(tilted, split_of(others.front()), {}, {});
+  correction.correct(tilted, split_of(others.front()), {});
   CHECK(correction.misfit() == EpochReason::kMisfit);
   CHECK_FALSE(correction.residual());
 
   PoseCorrection next = after_all_but_last(scans);
-  const Eigen::Isometry3d T = next.correct(scans.back().T_world_sensor, GroundSplit(), {}, {});
+  const Eigen::Isometry3d T = next.correct(scans.back().T_world_sensor, GroundSplit(), {});
   CHECK_FALSE(next.misfit());
   CHECK_FALSE(next.residual());
   CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);

@@ -76,8 +76,7 @@ std::unique_ptr<ScanDecision> make_free_space_decision(const Config& config, Bac
 
 template <class Config>
 std::unique_ptr<MotionStage> make_pose_correction(const Config& config) {
-  return std::make_unique<PoseCorrection>(config.pose_tolerance, config.track_length,
-                                          config.track_height);
+  return std::make_unique<PoseCorrection>(config.pose_tolerance);
 }
 
 }  // namespace dynains::detail

@@ -235,9 +235,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     newest.compared.T_world_sensor = newest.T_world_sensor;
     if (motion_ == nullptr) return;
     if (newest.began_epoch) motion_->begin_epoch(newest.T_world_level);
-    newest.T_world_compared =
-        motion_->correct(newest.T_world_level, newest.split,
-                         {window_.newest_cluster_of(), window_.cluster_count()}, newest.time);
+    newest.T_world_compared = motion_->correct(newest.T_world_level, newest.split, newest.time);
     newest.compared.T_world_sensor = motion_->corrected(newest.T_world_sensor);
     if (motion_->misfit()) scans_.begin_epoch(newest, *motion_->misfit());
   }

@@ -92,7 +92,7 @@ class Returns {
   std::vector<ReturnToPlace> found_;
   GroundSplit kept_;  // static points of the newest key scan
   std::vector<std::uint8_t> bytes_;
-  detail::AlignmentPoints selected_{0.0, 0.0};  // of these
+  PointBuffer selected_;  // of these
 };
 
 }  // namespace dynains

@@ -1,7 +1,6 @@
 // The stage that finds the pose by which a scan is compared with earlier scans.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -10,12 +9,6 @@
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {
-
-/// Instances of the non-ground points of a scan. Empty: no point is on an instance.
-struct ScanInstances {
-  Span<const std::uint32_t> of_point;  ///< below `count`, or kNoCluster
-  std::size_t count = 0;
-};
 
 /// Registers each scan with the static surfaces of earlier scans of its epoch.
 class MotionStage {
@@ -29,7 +22,7 @@ class MotionStage {
   /// points, m. `time`: s, if known. Updates residual() and misfit(). After a misfit the scan is
   /// the first one of an epoch, and its pose stays.
   virtual Pose correct(const Pose& T_world_level, const GroundSplit& split,
-                       const ScanInstances& instances, const std::optional<double>& time) = 0;
+                       const std::optional<double>& time) = 0;
 
   /// The pose `T_world_frame` with the correction of the last correct().
   virtual Pose corrected(const Pose& T_world_frame) const = 0;

@@ -12,7 +12,6 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/normal_equations.hpp"
 #include "dynains/registration/voxel_planes.hpp"
 #include "dynains/simd/pack_loops.hpp"
@@ -39,45 +38,13 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
   }
 }
 
-/// At most kMaxCount points of a scan (m, sensor frame), each with a flag for objects that are
-/// small enough to be vehicles or persons.
-class AlignmentPoints {
- public:
-  static constexpr std::size_t kMaxCount = 3000;
-
-  /// Points on instances of at most this horizontal diagonal and height (m) are on objects.
-  AlignmentPoints(double longest_object, double highest_object)
-      : longest_object_(longest_object), highest_object_(highest_object) {}
-
-  void select(const GroundSplit& split, const ScanInstances& instances) {
-    points_.clear();
-    instance_of_.clear();
-    boxes_.assign(instances.count, Eigen::AlignedBox3d());
-    visit_some(split, kMaxCount, [&](std::size_t i, double x, double y, double z) {
-      points_.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
-      const bool has_instance = i >= split.ground_count && !instances.of_point.empty();
-      const std::uint32_t instance =
-          has_instance ? instances.of_point[i - split.ground_count] : kNoCluster;
-      instance_of_.push_back(instance);
-      if (instance != kNoCluster) boxes_[instance].extend(Eigen::Vector3d(x, y, z));
-    });
-  }
-
-  PointsView points() const { return points_; }
-
-  bool is_on_object(std::size_t point) const {
-    const std::uint32_t instance = instance_of_[point];
-    if (instance == kNoCluster) return false;
-    const Eigen::Vector3d size = boxes_[instance].sizes();
-    return std::hypot(size.x(), size.y()) <= longest_object_ && size.z() <= highest_object_;
-  }
-
- private:
-  double longest_object_, highest_object_;
-  PointBuffer points_;
-  std::vector<std::uint32_t> instance_of_;  // by point
-  std::vector<Eigen::AlignedBox3d> boxes_;  // by instance, around its selected points
-};
+/// At most 3,000 points of a scan for an alignment, m, sensor frame.
+inline void select_points(const GroundSplit& split, PointBuffer& points) {
+  points.clear();
+  visit_some(split, 3000, [&](std::size_t i, double, double, double) {
+    points.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
+  });
+}
 
 /// Result of an alignment.
 struct Alignment {
@@ -98,9 +65,7 @@ struct Alignment {
 /// The covariance of a step has a part for the noise of the distances and a part for the choice of
 /// surfaces: a jackknife over overlapping blocks (Kuensch, Ann. Stat. 17(3), 1989), the changes of
 /// the step without two adjacent sectors around the sensor. The latter is large if one object
-/// decides about a direction, for example a slow vehicle ahead. The test of exact poses adds two
-/// parts: the change without all objects, because traffic starts together, and the changes without
-/// bands of elevation, because beams have biases.
+/// decides about a direction, for example a slow vehicle ahead.
 class PlaneAligner {
  public:
   /// Forgets the errors of the sensor.
@@ -112,14 +77,12 @@ class PlaneAligner {
   /// Aligns points with planes, from a first estimate of the pose that is wrong by at most half a
   /// voxel. `is_exact`: whether the pose is presumed to be exact. Directions without information
   /// keep the first estimate.
-  Alignment align(const AlignmentPoints& selected, VoxelPlanes& planes, const Pose& T_guess,
-                  bool is_exact) {
+  Alignment align(PointsView points, VoxelPlanes& planes, const Pose& T_guess, bool is_exact) {
     constexpr double kCoarseScales[] = {0.4, 0.25, 0.15, 0.1};  // edges, by iteration
     constexpr double kSmall = 0.01;                             // m, change by one iteration
     const double fine = 0.06 * planes.edge();                   // m
     constexpr int kMaxIterations = 3;
     constexpr double kConverged = 0.002;  // m
-    const PointsView points = selected.points();
     Vector found = {};
     Pose T = T_guess;
     Equations equations;
@@ -140,7 +103,7 @@ class PlaneAligner {
       equations = sum_equations(fine, found, is_exact);
       if (advance(equations.solve()) <= kConverged) break;
     }
-    return result_of(selected, equations, found, is_exact, fine);
+    return result_of(points, equations, found, is_exact, fine);
   }
 
   /// How well the upright surfaces of a scan fit at a pose: number of points at a small distance
@@ -261,8 +224,8 @@ class PlaneAligner {
     return equations;
   }
 
-  Alignment result_of(const AlignmentPoints& selected, const Equations& equations,
-                      const Vector& found, bool is_exact, double scale) {
+  Alignment result_of(PointsView points, const Equations& equations, const Vector& found,
+                      bool is_exact, double scale) {
     constexpr double kInlier = 0.12;  // m
     Alignment result;
     result.found = pose_step(found);
@@ -273,13 +236,9 @@ class PlaneAligner {
     const Equations::Matrix inverse = equations.inverse();
     elevation_ += found[6];
     elevation_weight_ = std::max(kMinWeight, kMemory / inverse[6][6]);
-    result.covariance = covariance_of(selected, equations, inverse, scale);
-    PoseCovariance tested = result.covariance;
-    if (is_exact && is_certain(result.found, tested)) {
-      add_tests_of_exact(selected, equations, scale, tested);
-    }
-    if (!is_exact || is_certain(result.found, tested)) {
-      result.supported = supported_part(result.found, tested);
+    result.covariance = covariance_of(points, equations, inverse, scale);
+    if (!is_exact || is_certain(result.found, result.covariance)) {
+      result.supported = supported_part(result.found, result.covariance);
     }
     result.change = equations.change(result.supported);
     add_first_error(inverse, result.covariance);
@@ -318,62 +277,36 @@ class PlaneAligner {
     return std::min(static_cast<std::size_t>(angle * (kSectors / 4.0)), kSectors - 1);
   }
 
-  // Bands of equal sines of the elevation, 0.9 deg at the horizon. The outer ones have no end.
-  static std::size_t band_of(float x, float y, float z) {
-    constexpr double kMaxSine = 0.5;  // sine
-    const auto height = static_cast<double>(z);
-    const double range = std::hypot(static_cast<double>(x), static_cast<double>(y), height);
-    if (!(range > 0.0)) return 0;
-    const double place = (height / range + kMaxSine) / (2.0 * kMaxSine);  // [0, 1) within
-    return static_cast<std::size_t>(
-        std::min(std::max(place, 0.0) * kBands, static_cast<double>(kBands - 1)));
-  }
-
-  PoseCovariance covariance_of(const AlignmentPoints& selected, const Equations& equations,
+  PoseCovariance covariance_of(PointsView points, const Equations& equations,
                                const Equations::Matrix& inverse, double scale) {
-    const PointsView points = selected.points();
     PoseCovariance covariance;
     for (std::size_t i = 0; i < 6; ++i) {
       for (std::size_t j = 0; j < 6; ++j) covariance[i][j] = equations.variance() * inverse[i][j];
     }
-    // Pairs of sectors, so that no object is divided.
-    add_changes<kSectors, 2>(
-        equations, scale, [&](std::size_t i) { return sector_of(points.x[i], points.y[i]); },
-        covariance);
+    add_changes(points, equations, scale, covariance);
     return covariance;
   }
 
-  void add_tests_of_exact(const AlignmentPoints& selected, const Equations& equations, double scale,
-                          PoseCovariance& covariance) {
-    const PointsView points = selected.points();
-    add_changes<kBands, 1>(
-        equations, scale,
-        [&](std::size_t i) { return band_of(points.x[i], points.y[i], points.z[i]); }, covariance);
-    add_changes<1, 1>(
-        equations, scale,
-        [&](std::size_t i) { return selected.is_on_object(i) ? std::size_t{0} : std::size_t{1}; },
-        covariance);
-  }
-
-  // Adds the squared changes of the solution without `kTogether` groups of matches in a row, which
-  // begin at each group. `group_of(point)`: at most kGroups, which is in no group.
-  template <std::size_t kGroups, std::size_t kTogether, class GroupOf>
-  void add_changes(const Equations& equations, double scale, GroupOf&& group_of,
+  // Adds the squared changes of the solution without each pair of adjacent sectors: of pairs, so
+  // that no object is divided.
+  void add_changes(PointsView points, const Equations& equations, double scale,
                    PoseCovariance& covariance) {
-    groups_.assign(kGroups + 1, Equations());
+    std::array<Equations, kSectors> sectors;
     with_packs([&](auto) {
       weigh_matches(scale, [&](const Match& match, const Vector& derivatives, double weight) {
-        groups_[group_of(match.point)].add(derivatives, match.distance, weight);
+        const std::size_t i = match.point;
+        sectors[sector_of(points.x[i], points.y[i])].add(derivatives, match.distance, weight);
       });
     });
     const Vector all = equations.solve();
-    for (std::size_t group = 0; group < kGroups; ++group) {
+    for (std::size_t sector = 0; sector < kSectors; ++sector) {
       Equations others = equations;
-      for (std::size_t k = 0; k < kTogether; ++k) others -= groups_[(group + k) % kGroups];
+      others -= sectors[sector];
+      others -= sectors[(sector + 1) % kSectors];
       Vector change = others.solve();
       for (std::size_t i = 0; i < 6; ++i) change[i] -= all[i];
       for (std::size_t i = 0; i < 6; ++i) {
-        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += change[i] * change[j] / kTogether;
+        for (std::size_t j = 0; j < 6; ++j) covariance[i][j] += change[i] * change[j] / 2.0;
       }
     }
   }
@@ -392,11 +325,9 @@ class PlaneAligner {
   }
 
   static constexpr std::size_t kSectors = 32;
-  static constexpr std::size_t kBands = 64;
 
   std::vector<Match> matches_;
-  std::vector<Equations> groups_;  // parts of the equations
-  double elevation_ = 0.0;         // rad, error of all elevations
+  double elevation_ = 0.0;  // rad, error of all elevations
   double elevation_weight_ = kMinWeight;
 };
 

@@ -83,15 +83,12 @@ class MotionPrediction {
 
 /// Aligns each scan with the planes of earlier scans of its epoch. If a pose is inexact, so that
 /// static surfaces of the scan lie too far from the planes, it is replaced by the aligned pose.
-/// Directions in which the planes do not support the correction stay as they were pushed. What two
-/// scans in a row agree on is a lasting offset and applies to later poses, too. Exact poses stay,
-/// bit by bit.
+/// Directions in which the planes do not support the correction stay as they were pushed. Later
+/// poses begin with the correction. Exact poses stay, bit by bit.
 class PoseCorrection final : public MotionStage {
  public:
   /// `tolerance`: root mean square distance (m) between static surfaces up to which a pose stays.
-  /// `longest_object`, `highest_object`: see AlignmentPoints.
-  PoseCorrection(double tolerance, double longest_object, double highest_object)
-      : tolerance_(tolerance), selected_(longest_object, highest_object) {}
+  explicit PoseCorrection(double tolerance) : tolerance_(tolerance) {}
 
   void begin_epoch(const Pose& T_world_level) override {
     motion_.clear();
@@ -100,17 +97,16 @@ class PoseCorrection final : public MotionStage {
     begin_planes(T_world_level);
   }
 
-  Pose correct(const Pose& T_world_level, const GroundSplit& split, const ScanInstances& instances,
+  Pose correct(const Pose& T_world_level, const GroundSplit& split,
                const std::optional<double>& time) override {
     residual_.reset();
     misfit_.reset();
     const Pose T_pushed = composed(T_origin_world_, T_world_level);
-    const Pose T_guess = offset_ ? composed(*offset_, T_pushed) : T_pushed;
-    correction_ = offset_;
+    const Pose T_guess = correction_ ? composed(*correction_, T_pushed) : T_pushed;
     Pose T_newest = T_guess;
     motion_.begin_scan(time);
     if (has_planes_) {
-      selected_.select(split, instances);
+      select_points(split, selected_);
       align(T_pushed, T_guess, T_newest);
       check_motion(T_newest);
     }
@@ -163,15 +159,12 @@ class PoseCorrection final : public MotionStage {
     T_origin_newest_ = Pose::Identity();
     T_origin_pushed_ = Pose::Identity();
     correction_.reset();
-    offset_.reset();
-    open_ = {};
     residual_.reset();
   }
 
-  // Aligns the newest scan from its pose `T_guess` with the lasting offset, and writes `T_newest`.
+  // Aligns the newest scan from its pose `T_guess` with the correction so far, and writes
+  // `T_newest`.
   void align(const Pose& T_pushed, const Pose& T_guess, Pose& T_newest) {
-    const PoseStep before = open_;
-    open_ = {};
     const Alignment alignment = aligner_.align(selected_, planes_, T_guess, is_exact_);
     if (alignment.matched < kMinMatches) return;
     if (static_cast<double>(alignment.inliers) <
@@ -179,15 +172,11 @@ class PoseCorrection final : public MotionStage {
       misfit_ = EpochReason::kMisfit;
       return;
     }
-    open_ = alignment.found;
     const Pose T_aligned = moved(T_guess, alignment.supported);
     if (alignment.change > tolerance_) {
       is_exact_ = false;
       T_newest = T_aligned;
       correction_ = composed(T_newest, inverted(T_pushed));
-      const PoseStep lasting = confirmed(alignment.supported, before);
-      offset_ = composed(moved(T_guess, lasting), inverted(T_pushed));
-      for (std::size_t i = 0; i < lasting.size(); ++i) open_[i] -= lasting[i];
     }
     const Pose T_motion = composed(inverted(T_origin_pushed_), T_pushed);
     residual_ = difference(composed(T_origin_newest_, T_motion), T_aligned);
@@ -221,9 +210,9 @@ class PoseCorrection final : public MotionStage {
     const bool is_impossible = motion_.is_impossible(error.translation);
     bool has_jumped = is_impossible && !motion_.repeats_rejected(T_motion);
     if (!has_jumped && (error.translation > kNear || error.rotation > kNearDegrees)) {
-      const double expected = aligner_.upright_fit(selected_.points(), planes_, *T_predicted);
-      has_jumped = expected > kMinPoints && aligner_.upright_fit(selected_.points(), planes_,
-                                                                 T_newest) < kMinRatio * expected;
+      const double expected = aligner_.upright_fit(selected_, planes_, *T_predicted);
+      has_jumped = expected > kMinPoints &&
+                   aligner_.upright_fit(selected_, planes_, T_newest) < kMinRatio * expected;
     }
     if (has_jumped) misfit_ = EpochReason::kJump;
     if (misfit_) {
@@ -232,23 +221,6 @@ class PoseCorrection final : public MotionStage {
     } else {
       motion_.end_scan(T_motion, is_impossible ? 0.0 : error.translation);
     }
-  }
-
-  // The part of a step that an earlier step confirms: the projection of the earlier one, at most
-  // the whole step. Translations and rotations on their own.
-  static PoseStep confirmed(const PoseStep& step, const PoseStep& before) {
-    PoseStep result = {};
-    for (std::size_t first = 0; first < step.size(); first += 3) {
-      double squared = 0.0, product = 0.0;
-      for (std::size_t i = first; i < first + 3; ++i) {
-        squared += step[i] * step[i];
-        product += step[i] * before[i];
-      }
-      if (product <= 0.0) continue;
-      const double ratio = std::min(product / squared, 1.0);
-      for (std::size_t i = first; i < first + 3; ++i) result[i] = ratio * step[i];
-    }
-    return result;
   }
 
   // Rotation and translation of the sensor from one pose to another.
@@ -269,17 +241,14 @@ class PoseCorrection final : public MotionStage {
   bool has_planes_ = false;  // whether a scan was inserted
   Pose T_world_origin_ = Pose::Identity();
   Pose T_origin_world_ = Pose::Identity();
-  // Corrections in the origin frame, multiplied from the left: of the newest scan, and the part
-  // that lasts.
-  std::optional<Pose> correction_, offset_;
-  PoseStep open_ = {};  // step that aligns the last scan, without the part that lasts
+  std::optional<Pose> correction_;           // in the origin frame, multiplied from the left
   Pose T_origin_newest_ = Pose::Identity();  // corrected
   Pose T_origin_pushed_ = Pose::Identity();  // as pushed
   std::optional<PoseResidual> residual_;
   std::optional<EpochReason> misfit_;
   MotionPrediction motion_;
   bool is_exact_ = true;  // whether all poses of the epoch are presumed to be exact
-  AlignmentPoints selected_;
+  PointBuffer selected_;
   PlaneAligner aligner_;
 };
 
