@@ -82,9 +82,10 @@ class ObjectTracks {
     Eigen::Vector2d first_velocity = Eigen::Vector2d::Zero();
     // In the newest scan:
     std::uint32_t points = 0;
-    Eigen::Vector2f along, place;        // direction; predicted centre along it and to its left, m
-    Eigen::Array2f half;                 // of its sizes, m
-    Eigen::AlignedBox<float, 1> height;  // m
+    Eigen::Vector2f along = Eigen::Vector2f::Zero();  // direction
+    Eigen::Vector2f place = Eigen::Vector2f::Zero();  // predicted centre along and left of it, m
+    Eigen::Array2f half = Eigen::Array2f::Zero();     // of its sizes, m
+    Eigen::AlignedBox<float, 1> height;               // m
     // Axes that its box may have, and extents along them and to their left, m from the sensor.
     std::array<Eigen::Vector2f, kAxes> axes;
     std::array<Eigen::AlignedBox2f, kAxes> extents;
@@ -253,6 +254,7 @@ class ObjectTracks {
 
   void begin_track(const ScanSlot& scan, std::uint32_t instance, const MovingObject& object) {
     Track track;
+    track.axes.fill(Eigen::Vector2f::Zero());
     const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(instance);
     const Track* const known = find(id) != nullptr ? nullptr : known_later(id);
     track.object = object;
