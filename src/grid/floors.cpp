@@ -53,7 +53,7 @@ void spread(const Columns& columns, std::int64_t reach, std::vector<std::uint32_
 
 }  // namespace
 
-void Floors::add(const Eigen::Vector3d& point, bool is_ground) {
+void Floors::add(const Eigen::Vector3d& point, bool is_ground, bool is_below) {
   const VoxelKey key =
       voxel_key(index(point.x(), kEdge), index(point.y(), kEdge), index(point.z(), kBin));
   const std::uint32_t number = numbers_.insert(key);
@@ -63,7 +63,9 @@ void Floors::add(const Eigen::Vector3d& point, bool is_ground) {
   }
   Bin& bin = bins_[number];
   ++(is_ground ? bin.ground : bin.others);
-  if (is_ground) bin.sum += point.z();
+  if (!is_ground) return;
+  bin.sum += point.z();
+  bin.is_seen_from_above = bin.is_seen_from_above || !is_below;
 }
 
 void Floors::add_map(const std::vector<Eigen::Vector3d>& points, double step) {
@@ -100,7 +102,7 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
   std::int64_t x = 0, y = 0, begin = 0, latest = 0;
   const auto end_span = [&] {
     if (lowest.ground == 0 || lowest.ground < lowest.others) return;
-    floors.push_back({x, y, lowest.sum / lowest.ground});
+    floors.push_back({x, y, lowest.sum / lowest.ground, lowest.is_seen_from_above});
   };
   for (const std::uint32_t i : order) {
     const Bin& bin = bins_[i];
@@ -118,12 +120,13 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
     lowest.ground += bin.ground;
     lowest.others += bin.others;
     lowest.sum += bin.sum;
+    lowest.is_seen_from_above = lowest.is_seen_from_above || bin.is_seen_from_above;
   }
   end_span();
   return floors;
 }
 
-/// The floors of surfaces that are large, or the largest ones there are.
+/// The floors of surfaces that are large, or the largest ones there are, and were seen from above.
 std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors,
                                                   double step) const {
   constexpr double kCell = 1.0;  // m: a gap without ground that does not end a surface
@@ -137,12 +140,19 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
     cell_of.push_back(numbers.insert(key));
     if (numbers.size() > keys.size()) keys.push_back(key);
   }
+  std::vector<bool> is_seen_from_above(keys.size());
+  for (std::size_t i = 0; i < floors.size(); ++i) {
+    if (floors[i].is_seen_from_above) is_seen_from_above[cell_of[i]] = true;
+  }
   std::vector<std::size_t> size(keys.size());
   ComponentSearch().for_each(keys, numbers, [&](const std::vector<std::uint32_t>& members) {
-    for (const std::uint32_t cell : members) size[cell] = members.size();
+    const bool is_seen = std::any_of(members.begin(), members.end(),
+                                     [&](std::uint32_t cell) { return is_seen_from_above[cell]; });
+    for (const std::uint32_t cell : members) size[cell] = is_seen ? members.size() : 0;
   });
   // The roof of a car is smaller than ten cells.
-  const std::size_t least = std::min<std::size_t>(10, *std::max_element(size.begin(), size.end()));
+  const std::size_t least = std::clamp<std::size_t>(
+      size.empty() ? 1 : *std::max_element(size.begin(), size.end()), 1, 10);
   std::vector<Floor> large;
   for (std::size_t i = 0; i < floors.size(); ++i) {
     if (size[cell_of[i]] >= least) large.push_back(floors[i]);
@@ -151,7 +161,7 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
 }
 
 void Floors::finish(double step, double resolution) {
-  const std::vector<Floor> all = lowest_of_spans();
+  const std::vector<Floor> all = large_surfaces(lowest_of_spans(), step);
   if (all.empty()) {
     throw IoError(place_ +
                   ": no ground was found; a grid needs static points of the ground, and a "
@@ -171,7 +181,7 @@ void Floors::finish(double step, double resolution) {
   is_seen_.assign(columns_.size(), false);
   source_.assign(columns_.size(), kNoIndex);
   std::size_t latest = columns_.size();
-  for (const Floor& floor : large_surfaces(all, step)) {
+  for (const Floor& floor : all) {
     const std::size_t column = column_of(floor);
     if (column != latest) {
       heights_.push_back(std::numeric_limits<float>::infinity());

@@ -24,8 +24,9 @@ class Floors {
   /// `place`: where the points come from, for messages.
   explicit Floors(std::string place) : place_(std::move(place)) {}
 
-  /// Adds a static point.
-  void add(const Eigen::Vector3d& point, bool is_ground);
+  /// Adds a static point. `is_below`: the sensor that saw it. No surface that was only seen from
+  /// below is a floor: ceilings are labelled as ground where no ground is in view.
+  void add(const Eigen::Vector3d& point, bool is_ground, bool is_below = false);
   /// Adds the points of a map whose ground is not known: the lowest points of each column, up to
   /// `step` (m) above the second one.
   void add_map(const std::vector<Eigen::Vector3d>& points, double step);
@@ -56,10 +57,12 @@ class Floors {
   struct Bin {
     std::uint32_t ground = 0, others = 0;  // points
     double sum = 0.0;                      // m, heights of the ground
+    bool is_seen_from_above = false;       // some of the ground
   };
   struct Floor {
     std::int64_t x, y;  // indices of its column: a multiple of kEdge
     double height;      // m
+    bool is_seen_from_above;
   };
 
   std::size_t column_of(const Floor& floor) const {

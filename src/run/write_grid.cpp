@@ -82,20 +82,24 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
     T_place_sensor.translation() -= place;
     return T_place_sensor;
   };
+  std::vector<Pose> sensors = recording.sensors();
+  if (sensors.empty()) sensors.push_back(Pose::Identity());
+  const auto sensor_at = [&](std::size_t i, std::size_t k) -> Eigen::Vector3d {
+    return pose(i) * sensors.at(k).translation();
+  };
   JudgedScans judged(read_labels, recording, keep_moving);
   grid::Floors floors(recording.folder().string());
   std::size_t done = 0;
   progress(done);
   for (const std::size_t i : scans) {
-    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t) {
-      if (label != PointLabel::kDynamic) floors.add(point, label == PointLabel::kGround);
+    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
+      if (label == PointLabel::kDynamic) return;
+      floors.add(point, label == PointLabel::kGround, point.z() > sensor_at(i, k).z());
     });
     if (!progress(++done)) return {};
   }
   floors.finish(config.min_height, config.resolution);
   grid::GridMaker maker(config, floors);
-  std::vector<Pose> sensors = recording.sensors();
-  if (sensors.empty()) sensors.push_back(Pose::Identity());
   std::vector<std::vector<Eigen::Vector3d>> ends(sensors.size());
   for (const std::size_t i : scans) {
     for (auto& of_sensor : ends) of_sensor.clear();
@@ -105,7 +109,7 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
       ends.at(k).push_back(point);
     });
     for (std::size_t k = 0; k < sensors.size(); ++k) {
-      maker.add_beams(pose(i) * sensors[k].translation(), ends[k]);
+      maker.add_beams(sensor_at(i, k), ends[k]);
     }
     if (!progress(++done)) return {};
   }

@@ -148,6 +148,23 @@ TEST_CASE("beams that cross low make cells free, high ones do not") {
   CHECK(state_at(high.grid(), 10.0, 2.01) == CellState::kFree);
 }
 
+TEST_CASE("a surface that was only seen from below is no floor") {
+  Floors floors("HALL"), ceiling("HALL");
+  for (int i = 0; i < 160; ++i) {
+    for (int k = 0; k < 40; ++k) {
+      const double x = 0.1 * i, y = 0.1 * k;
+      if (i < 80) floors.add({x, y, 0.0}, true);
+      floors.add({x, y, 2.0}, true, true);
+      ceiling.add({x, y, 2.0}, true, true);
+    }
+  }
+  floors.finish(0.1, 0.05);
+  CHECK(floors.is_seen({4.0, 2.0}));
+  CHECK_FALSE(floors.is_seen({12.0, 2.0}));
+  CHECK(floors.height_of({4.0, 2.0, 2.05}, 0.1, 1.8)->over_floor == Approx(2.05));
+  CHECK_THROWS_WITH(ceiling.finish(0.1, 0.05), StartsWith("HALL: no ground"));
+}
+
 TEST_CASE("a grid without ground, or of wrong heights, is refused by one line") {
   Floors floors("PLACE");
   floors.add({1.0, 2.0, 3.0}, false);
