@@ -214,6 +214,27 @@ TEST_CASE("the number of samples in each part of a supervoxel is proportional to
   CHECK(halves[0] < 2667 + 170);
 }
 
+TEST_CASE("beams pass within a quarter of the width of an instance at the height of a sample") {
+  SampledScan scan;
+  for (const float side : {-0.1F, 0.1F}) scan.add({6.0F - side, 8.0F + side, 0.5F}, 0);  // a pole
+  for (const float side : {-0.7F, 0.7F})
+    scan.add({6.0F - side, 8.0F + side, 4.1F}, 0);  // its lamps
+  InstanceSamples samples;
+  const auto reach_with = [&](double edge) {
+    InstanceSampler layered(edge, 80.0, 4);
+    layered.sample(scan.points, scan.instance_of, 1, samples);
+    layered.find_reach(samples);
+    std::map<float, float> reach;  // by height
+    for (std::size_t i = 0; i < samples.size(); ++i) reach[samples.points.z[i]] = samples.reach[i];
+    return reach;
+  };
+  // Across the direction (0.6, 0.8), sides of `side` along x and y are 1.4 `side` apart.
+  const auto layers = reach_with(1.0), one = reach_with(5.0);
+  CHECK(layers.at(0.5F) == Approx(0.25 * 0.28 + 0.05).margin(0.002));
+  CHECK(layers.at(4.1F) == Approx(0.25 * 1.96 + 0.05).margin(0.01));
+  CHECK(one.at(0.5F) == one.at(4.1F));
+}
+
 TEST_CASE("a point in another supervoxel than its predecessor is a change") {
   Random random(5);
   InstanceSampler sampler(0.5, 80.0, 1);

@@ -298,6 +298,14 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
       CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17 && !is_before));
     }
   }
+  // Of thin things.
+  const std::vector<float> reach(count + detail::kPackWidth, 0.12F);
+  visibility.clear(count);
+  detail::add_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
+                         visibility, Eigen::Vector3f::Zero(), reach.data());
+  for (std::size_t i = 0; i < count; ++i) {
+    CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.12));
+  }
   detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
                           visibility);
   // Another view of the same reference adds what it sees; its hits count more.

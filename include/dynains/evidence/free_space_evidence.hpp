@@ -207,6 +207,7 @@ class FreeSpaceEvidence {
     detail::InstanceEvidence& evidence = record.evidence;
     evidence.samples.group_of_point.swap(newest_group_of_point_);
     sampler_.sample(points, instance_of, instance_count, evidence.samples);
+    sampler_.find_reach(evidence.samples);
     newest_group_of_point_.swap(evidence.samples.group_of_point);
     record.group_of_point.assign(newest_group_of_point_);
     updater_.begin(evidence.samples, evidence.beliefs);
@@ -248,7 +249,7 @@ class FreeSpaceEvidence {
     detail::InstanceEvidence& evidence = record.evidence;
     const detail::Visibility& visibility =
         references_.test(evidence.samples.points, evidence.samples.size(), scan,
-                         record.T_world_sensor, reference, memory);
+                         record.T_world_sensor, reference, memory, evidence.samples.reach.data());
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_level);
     const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),

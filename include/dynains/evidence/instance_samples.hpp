@@ -22,7 +22,12 @@ namespace dynains::detail {
 /// The samples of one scan, ordered by instance, then by supervoxel: each instance and each
 /// supervoxel is one range of samples.
 struct InstanceSamples {
-  PointBuffer points;                           ///< samples, m, sensor frame; padded for packs
+  PointBuffer points;  ///< samples, m, sensor frame; padded for packs
+  /// By sample, padded for packs: largest lateral distance (m) at which a beam passes within its
+  /// instance rather than beside it. It is a quarter of the width of the instance at the height of
+  /// the sample (poles bear lamps and signs), across the direction from the sensor, and grows with
+  /// the distance, since edges lie between two beams.
+  std::vector<float> reach;
   std::vector<std::uint32_t> sample_begin;      ///< by supervoxel: first sample, and the end
   std::vector<VoxelKey> place;                  ///< by part: its voxel in the sensor frame
   std::vector<std::uint32_t> supervoxel_begin;  ///< by instance: first supervoxel, and the end
@@ -111,7 +116,55 @@ class InstanceSampler {
     order(points, instance_count, out);
   }
 
+  /// Computes InstanceSamples::reach.
+  void find_reach(InstanceSamples& samples) {
+    constexpr float kReach = 0.25F;        // ratio to the width
+    constexpr float kReachSlope = 0.005F;  // m/m
+    const PointBuffer& points = samples.points;
+    grow(samples.reach, samples.size() + kPackWidth);
+    for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
+      const std::uint32_t first = samples.supervoxel_begin[instance];
+      const std::uint32_t last = samples.supervoxel_begin[instance + 1];
+      if (first == last) continue;
+      // The direction of any sample serves for all.
+      const std::uint32_t any = samples.sample_begin[first];
+      const float x = points.x[any], y = points.y[any];
+      const float distance = std::max(std::sqrt(x * x + y * y), 1e-3F);
+      for_each_layer(samples, first, last, [&](Layer& layer, std::uint32_t i) {
+        const float aside = (x * points.y[i] - y * points.x[i]) / distance;
+        layer.left = std::max(layer.left, aside);
+        layer.right = std::min(layer.right, aside);
+      });
+      for_each_layer(samples, first, last, [&](const Layer& layer, std::uint32_t i) {
+        samples.reach[i] = kReach * (layer.left - layer.right) + kReachSlope * distance;
+      });
+      layers_.clear();
+    }
+  }
+
  private:
+  // Extent of an instance at a height, along the direction to the left, m.
+  struct Layer {
+    float left = -std::numeric_limits<float>::infinity();
+    float right = std::numeric_limits<float>::infinity();
+  };
+  // Calls `use(layer, sample)` for the samples of supervoxels [first, last) of an instance. Each
+  // height of its supervoxels has a layer.
+  template <class Use>
+  void for_each_layer(const InstanceSamples& samples, std::uint32_t first, std::uint32_t last,
+                      Use&& use) {
+    const auto height_of = [&](std::uint32_t s) { return voxel_index(samples.place[s], 2); };
+    std::int64_t lowest = height_of(first);
+    for (std::uint32_t s = first; s < last; ++s) lowest = std::min(lowest, height_of(s));
+    for (std::uint32_t s = first; s < last; ++s) {
+      const auto height = static_cast<std::size_t>(height_of(s) - lowest);
+      if (layers_.size() <= height) layers_.resize(height + 1);
+      for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
+        use(layers_[height], i);
+      }
+    }
+  }
+
   // Part of an instance in one voxel, or beyond the range. `xy` contains the voxel indices along x
   // and y, 16 bits each.
   struct Supervoxel {
@@ -275,6 +328,7 @@ class InstanceSampler {
   SupervoxelTable table_{4096};  // numbers of supervoxels
   // By point of a block.
   std::array<std::int32_t, kWordBits> xy_ = {}, z_ = {}, instance_ = {}, hash_ = {}, rank_ = {};
+  std::vector<Layer> layers_;        // of an instance, from the lowest one on
   std::size_t most_;                 // samples of a supervoxel
   std::vector<std::uint64_t> keys_;  // by number in the table: most_ ranks and indices of points
   std::vector<Supervoxel> supervoxels_;  // by number in the table; padded at the end

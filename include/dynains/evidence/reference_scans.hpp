@@ -197,10 +197,10 @@ class ReferenceScans {
   /// Replaces `out` by the visibility of the first `count` points (m, level frame; padded for
   /// packs) of scan number `scan` from a reference. If it has several scans, this scan and the
   /// adjacent ones are not used. The points of several sensors count as seen from the middle
-  /// between these.
+  /// between these. `reach`: as in add_visibility().
   const Visibility& test(const PointBuffer& points, std::size_t count, std::uint64_t scan,
                          const Pose& T_world_points, const ReferenceScan& reference,
-                         Visibility& out) const {
+                         Visibility& out, const float* reach = nullptr) const {
     out.clear(count);
     std::size_t tested = 0;
     for (std::size_t i = 0; i < reference.count; ++i) {
@@ -209,7 +209,7 @@ class ReferenceScans {
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
       const Eigen::Vector3d viewpoint = T_view_points * viewpoint_;
       add_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
-                     static_cast<float>(config_.margin_slope), out, viewpoint.cast<float>());
+                     static_cast<float>(config_.margin_slope), out, viewpoint.cast<float>(), reach);
       ++tested;
     }
     if (tested > 1) out.settle(count);

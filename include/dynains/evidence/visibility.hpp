@@ -175,10 +175,12 @@ class ImageTest {
   }
 
   /// Bits of the samples (m) that a beam passes near enough, of those in `cell`. The largest
-  /// lateral distance is the error of poses and points, and the width of a beam at its range. A
-  /// beam that passes between a sample and the viewpoint, farther from the sample than a part of
-  /// this distance, is no evidence: the beam that measured the sample crossed that space as well.
-  unsigned is_near(const Float& x, const Float& y, const Float& z, const std::int32_t* cell) const {
+  /// lateral distance is the error of poses and points, and the width of a beam at its range, at
+  /// most that of the pack in `reach_of` (m) unless this is null. A beam that passes between a
+  /// sample and the viewpoint, farther from the sample than a part of this distance, is no
+  /// evidence: the beam that measured the sample crossed that space as well.
+  unsigned is_near(const Float& x, const Float& y, const Float& z, const std::int32_t* cell,
+                   const float* reach_of) const {
     static constexpr PackConstant kReach(0.05F), kReachSlope(0.004F);  // m, m/m
     static constexpr PackConstant kBefore(0.25F), kOne(1.0F);
     static constexpr PackConstant kStep(1.0F / RangeImage::kPlaces),
@@ -195,7 +197,8 @@ class ImageTest {
       const Float aside = (within(beam >> 8) - at.column) * (horizontal * Float(cell_width_));
       const Float above =
           (within(beam & Int(RangeImage::kPlaces - 1)) - at.row) * (distance * Float(cell_height_));
-      const Float reach = distance * Float(kReachSlope) + Float(kReach);
+      Float reach = distance * Float(kReachSlope) + Float(kReach);
+      if (reach_of != nullptr) reach = min(reach, Float::load(reach_of));
       // Direction from the samples to the viewpoint, along the columns and the rows.
       const Float vx(viewpoint_[0]), vy(viewpoint_[1]), vz(viewpoint_[2]);
       const Float dx = p[0] - vx;
@@ -236,11 +239,12 @@ class ImageTest {
 /// were cleared. A sample may become both "free" in one image and "hit" in another: call
 /// Visibility::settle() after the last one. `T_image_sample`: rigid. `margin`, `slope`: see
 /// ImageTest. `viewpoint`: the place that the samples were measured from, frame of the image, m; if
-/// there are several, its origin.
+/// there are several, its origin. `reach`: by sample, as InstanceSamples::reach, or null.
 inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
                            const PointBuffer& samples, std::size_t count, float margin, float slope,
                            Visibility& visibility,
-                           const Eigen::Vector3f& viewpoint = Eigen::Vector3f::Zero()) {
+                           const Eigen::Vector3f& viewpoint = Eigen::Vector3f::Zero(),
+                           const float* reach = nullptr) {
   const PackTransform to_image(T_image_sample);
   with_packs([&](auto packs) {
     using Packs = decltype(packs);
@@ -273,8 +277,10 @@ inline void add_visibility(const RangeImage& image, const Pose& T_image_sample,
       }
       for (std::size_t k = 0; k < passed_count; ++k) {
         const auto& [i, compared] = passed[k];
-        const unsigned free = compared.before & test.is_near(Float::load(x + i), Float::load(y + i),
-                                                             Float::load(z + i), &cell[i - block]);
+        const unsigned free =
+            compared.before & test.is_near(Float::load(x + i), Float::load(y + i),
+                                           Float::load(z + i), &cell[i - block],
+                                           reach == nullptr ? nullptr : reach + i);
         bits.free[i / 8] = static_cast<std::uint8_t>(bits.free[i / 8] | free);
         bits.hit[i / 8] = static_cast<std::uint8_t>(bits.hit[i / 8] | (compared.at & ~free));
       }
