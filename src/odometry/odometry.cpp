@@ -122,10 +122,10 @@ class Odometry::Loop {
   /// Whether the scan fits worse beside its place, along the direction that surfaces determine
   /// worst. Their scatter seems to determine a motion along smooth walls, where any fits as well.
   bool is_held(const Registration& found) const {
-    constexpr double kAside = 0.5;    // m
+    constexpr double kAside = 0.1;    // m, scale of the weights: tilts of planes change less
     constexpr double kAsGood = 0.98;  // ratio of fits
     Pose T_beside = found.T_a_b;
-    T_beside.translation() += kAside * map_scale_ * found.uncertain[0];
+    T_beside.translation() += kAside * found.uncertain[0];
     return fit_of(map_, scan_.keypoints(), T_beside) < kAsGood * found.score;
   }
 

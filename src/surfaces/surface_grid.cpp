@@ -5,6 +5,20 @@
 #include <cmath>
 
 namespace dynains {
+namespace {
+
+/// Whether an upright line is the trace of a column of beams: on a wall that they graze, columns
+/// lie farther apart than a cell is wide. Range noise scatters the points of one along the beam,
+/// while those on a pole also lie beside each other. A column moves with the sensor.
+bool is_trace_of_column(const Eigen::Vector3d& beam, const Eigen::Vector3d& axis,
+                        const Eigen::Matrix3d& covariance) {
+  constexpr double kMinBeside = 0.02;  // m, standard deviation on a pole 7 cm thick
+  const Eigen::Vector3d beside = axis.cross(beam).normalized();
+  return beside.dot(covariance * beside) < kMinBeside * kMinBeside;
+}
+
+}  // namespace
+
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
   if (!adds(taken_, voxel_at(point, scale_ * kApart))) return;
@@ -70,6 +84,8 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   if (extent[1] < kNarrow * extent[2]) {
     // Rings of a sensor lie along lines on the ground that move with the sensor.
     if (std::hypot(axes(0, 2), axes(1, 2)) > kUpright) return surface;
+    if (with_clutter_ && is_trace_of_column(surface.mean - sensor_, axes.col(2), covariance))
+      return surface;
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {

@@ -109,6 +109,16 @@ std::vector<Eigen::Vector3f> scan_of_room(const Eigen::Vector3d& size, const Eig
   return points;
 }
 
+TEST_CASE("Columns of beams on the smooth walls of a corridor pretend no hold along it") {
+  Odometry odometry;
+  std::size_t count = 0;
+  for (int i = 0; i < 10; ++i) {
+    const auto points = scan_of_room({1000.0, 2.2, 2.6}, {0.1 * i, 0.0, 0.0}, 7 + unsigned(i));
+    count += odometry.push(points, {}, 0.1 * i).free_directions > 0 ? 1 : 0;
+  }
+  CHECK(count == 9);
+}
+
 TEST_CASE("In rooms of 2.2 to 15 m, poses are found to 2 cm, standing and driving") {
   const Eigen::Vector3d size =
       GENERATE(Eigen::Vector3d(2.2, 2.2, 2.4), Eigen::Vector3d(5.0, 4.0, 2.6),
