@@ -11,6 +11,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/ray_origin.hpp"
+#include "dynains/poses/turns.hpp"
 #include "dynains/surfaces/landmarks.hpp"
 #include "dynains/surfaces/motion_size.hpp"
 #include "dynains/surfaces/scan_registration.hpp"
@@ -304,17 +305,30 @@ bool are_enough(const std::vector<RegisteredMotion>& motions, std::size_t steps)
          std::count_if(motions.begin(), motions.end(), is_step) >= std::ptrdiff_t(steps);
 }
 
+/// Adds the error of clouds of more than a turn to that of their registrations. From cloud to cloud
+/// most points come a whole turn later, which is shorter than the time between the clouds by the
+/// overlap; within the overlap they come two turns later. Each shifts the motion by the overlap.
+/// Returns whether there is one.
+bool add_overlap(const Recording& recording, std::vector<RegisteredMotion>& motions) {
+  const double overlap = overlap_of_turns(recording, 0, recording.size() - 1);
+  for (RegisteredMotion& motion : motions) {
+    motion.deviation = std::max(motion.deviation, 2.0 * overlap * extent_of(motion.T_first_second));
+  }
+  return overlap > 0.0;
+}
+
 /// What scans show: landmarks of pairs, and registered motions.
 struct Evidence {
   const Recording& recording;
   Pairs pairs;
   std::vector<RegisteredMotion> motions;
   Agreement as_given, standing;
+  bool overlaps = false;  ///< whether clouds are more than a turn
 
   /// The pairs and motions for which `motion` has poses. Shifted poses are missing for scans at one
   /// end of the recording.
   Evidence where_known(const BodyMotion& motion) const {
-    Evidence known{recording, {}, {}, as_given, standing};
+    Evidence known{recording, {}, {}, as_given, standing, overlaps};
     for (const Pair& pair : pairs) {
       if (motion(motion_of_pair(pair))) known.pairs.push_back(pair);
     }
@@ -468,9 +482,11 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
   const bool are_inexact = measure_errors(evidence, d);
   if (!is_exact(all)) d.flaws = flaws_of(recording);
   const bool is_flawed = d.flaws.has_equal_orientations || d.flaws.step > 0.0;
-  if (all.at_points > kExact && !is_flawed) {
+  // What overlaps do to motions is no proof of another reading, and fits would absorb it.
+  const bool may_differ = evidence.overlaps ? !is_exact(all) : all.at_points > kExact;
+  if (may_differ && !is_flawed) {
     std::vector<Reading> readings = usual_readings(recording);
-    if (!is_exact(all)) {
+    if (!is_exact(all) && !evidence.overlaps) {
       for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);
     }
     const auto reading = best_reading(evidence, readings, all.at_points);
@@ -530,7 +546,9 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   d.as_given = agreement_under(given, sampled.pairs);
   d.standing = agreement_under(no_motion, sampled.pairs);
   if (d.as_given.points < kMinCompared) return d;
-  const Evidence evidence{recording, sampled.pairs, std::move(motions), d.as_given, d.standing};
+  const bool overlaps = !motions.empty() && !are_exact(motions) && add_overlap(recording, motions);
+  const Evidence evidence{recording,  sampled.pairs, std::move(motions),
+                          d.as_given, d.standing,    overlaps};
   d.as_given = agreement_under(given, sampled.pairs, true);
   d.standing = agreement_under(no_motion, sampled.pairs, true);
   if (is_world) {

@@ -6,9 +6,11 @@
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/io/kitti.hpp"
+#include "dynains/io/trajectory.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/surfaces/scan_registration.hpp"
 #include "dynains/threads/in_two_threads.hpp"
@@ -122,6 +124,54 @@ TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexac
   const Drive drive(skewed_world(21077));
   CHECK(diagnosis_with(drive, 0.0).verdict == PoseVerdict::kAgree);
   CHECK(diagnosis_with(drive, 0.1).verdict == PoseVerdict::kInexact);
+}
+
+/// Writes the drive as clouds of this many turns, with the poses at their begin.
+void write_turns(const Drive& drive, double turns, const std::filesystem::path& folder) {
+  const double period = 0.1 * turns;  // s
+  std::filesystem::create_directories(folder / "velodyne");
+  std::vector<std::pair<double, Eigen::Vector4f>> points;  // by their time, s
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    const simulation::SimulatedScan& scan = drive.scan(i);
+    for (std::size_t k = 0; k < scan.times.size(); ++k) {
+      points.emplace_back(scan.time + static_cast<double>(scan.times[k]),
+                          Eigen::Vector4f::Map(&scan.xyzi[4 * k]));
+    }
+  }
+  std::stable_sort(points.begin(), points.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<Pose> poses;
+  std::vector<double> times;
+  auto point = points.begin();
+  for (std::size_t i = 0; i + 1 < drive.size(); ++i) {
+    const double time = period * static_cast<double>(i), at = time / 0.1;
+    const auto before = static_cast<std::size_t>(at);
+    if (before + 2 >= drive.size()) break;
+    std::vector<float> xyzi;
+    for (; point->first < time + period; ++point) {
+      xyzi.insert(xyzi.end(), point->second.data(), point->second.data() + 4);
+    }
+    write_scan(folder / "velodyne" / (simulation::scan_name(i) + ".bin"), xyzi);
+    poses.push_back(
+        interpolate(drive.pose(before), drive.pose(before + 1), at - static_cast<double>(before)));
+    times.push_back(time);
+  }
+  write_poses(folder / "poses.txt", poses);
+  write_times(folder / "times.txt", times);
+}
+
+TEST_CASE("Right poses of clouds of more than a turn are given no other reading") {
+  simulation::Config config =
+      drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 40, 82);
+  config.ego_speed = 9.0;
+  config.rolling_shutter = true;
+  config.deskewed = 0.0;
+  const Drive drive(config);
+  const auto turns = GENERATE(1.008, 1.04, 1.09);
+  CAPTURE(turns);
+  const TemporaryFolder folder;
+  write_turns(drive, turns, folder.path());
+  CHECK(diagnose(Recording(folder.path())).sound());
 }
 
 TEST_CASE("Traces of beams on the persons of a crowd do not make right poses inexact") {
