@@ -32,7 +32,7 @@ class BinReader final : public ScanReader {
     return columns;
   }
   std::uint64_t point_count(const ScanEntry& scan) const override {
-    return count_bin_points(scan.file, layout_, !has_ring_);
+    return count_bin_points(scan.file, layout_);
   }
   void read(const ScanEntry& scan, const FileTransform* T_target_file,
             RecordedScan& points) const override {

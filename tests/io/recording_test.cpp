@@ -507,8 +507,7 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   }
   write_text(file, raw_scan<float>(5, 21));
   CHECK_THAT(message_of<IoError>([&] { Recording(folder.path()).point_count(0); }),
-             ContainsSubstring("truncated at byte 420: expected a multiple of 16 bytes") &&
-                 ContainsSubstring("21 points of 5 columns of float32 by --bin-columns 5"));
+             ContainsSubstring("truncated at byte 420: expected a multiple of 16 bytes"));
   for (const char* wrong : {"", "d", "2", "65", "4.5", "4f", "4:15", "4:"}) {
     CHECK_THAT(message_of<ConfigError>([&] { parse_bin_layout(wrong); }),
                ContainsSubstring(": expected 3 to 64"));

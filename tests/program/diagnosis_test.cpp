@@ -343,7 +343,7 @@ TEST_CASE("check verifies the size of every scan file") {
   CHECK(start({"check", seq, "--accept-missing"}).code == 0);
   CHECK_THAT(three.err,
              StartsWith(first) && ContainsSubstring("; 2 more scan files are broken; "
-                                                    "--accept-missing leaves them out\n"));
+                                                    "--accept-missing leaves such files out\n"));
 }
 
 TEST_CASE("check and run report scans that are too far apart in time to be compared") {

@@ -129,21 +129,13 @@ std::string to_text(const BinLayout& layout) {
   return std::to_string(layout.columns) + " columns of " + type;
 }
 
-std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout,
-                               bool names_others) {
+std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout) {
   std::error_code error;
   const std::uint64_t bytes = std::filesystem::file_size(file, error);
   if (error) fail(file, "cannot be read: " + error.message());
   if (bytes % point_size(layout) == 0) return bytes / point_size(layout);
-  std::string fitting;
-  for (const BinLayout& other : kOthers) {
-    if (!names_others || bytes % point_size(other) != 0) continue;
-    fitting += (fitting.empty() ? "; if it is whole: " : ", ") +
-               std::to_string(bytes / point_size(other)) + " points of " + to_text(other) + " by " +
-               option_of(other);
-  }
   fail(file, "truncated at byte " + std::to_string(bytes) + ": expected a multiple of " +
-                 std::to_string(point_size(layout)) + " bytes (" + to_text(layout) + ")" + fitting);
+                 std::to_string(point_size(layout)) + " bytes (" + to_text(layout) + ")");
 }
 
 void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,

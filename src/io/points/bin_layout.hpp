@@ -26,10 +26,9 @@ inline bool is_usual(const BinLayout& layout) {
 /// "float32 x y z intensity", "5 columns of float32".
 std::string to_text(const BinLayout& layout);
 
-/// Number of points by the size of the file. Throws IoError, which names other layouts that fit if
-/// `names_others`, unless the size is a multiple of that of a point.
-std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout,
-                               bool names_others = true);
+/// Number of points by the size of the file. Throws IoError unless that is a multiple of the size of
+/// a point.
+std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout);
 
 /// Reads x y z intensity of each point, interleaved; without a fourth column, intensities are 0.
 /// `ring`: the fifth column, if it is one.

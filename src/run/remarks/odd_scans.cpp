@@ -117,7 +117,7 @@ std::vector<ScanCounts> count_points(const Recording& recording, const ScanRange
   }
   const std::size_t others = range.size() - counts.size() - (first.empty() ? 0 : 1);
   if (others > 0) first += "; " + std::to_string(others) + " more scan files are broken";
-  if (!first.empty()) throw IoError(first + "; --accept-missing leaves them out");
+  if (!first.empty()) throw IoError(first + "; --accept-missing leaves such files out");
   return counts;
 }
 
