@@ -28,6 +28,22 @@ std::uint64_t checksum(const char* data, std::size_t size) {
 Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 Eigen::Vector3d vector_of(const Json& json) { return Eigen::Vector3d(json.get<Vector>().data()); }
 
+/// Calls `field(name, value)` for all that JSON holds as it is.
+template <class Session, class Field>
+void visit(Session& session, Field&& field) {
+  field("begin", session.begin);
+  field("recording", session.recording);
+  field("fingerprint", session.fingerprint);
+  field("configuration", session.config);
+  field("margin", session.evidence.margin);
+  field("margin_slope", session.evidence.margin_slope);
+  field("lateral_margin", session.evidence.lateral_margin);
+  field("map_voxel", session.grid.map_voxel);
+  field("tile", session.grid.tile);
+  field("scans", session.scans);
+  field("points", session.points);
+}
+
 Json json_of(const SessionAlignment& alignment) {
   return {{"T_city_session", rows_of(alignment.T_city_session)},
           {"T_city_start", rows_of(alignment.T_city_start)},
@@ -62,38 +78,20 @@ Json json_of(const SessionInfo& session) {
     references.push_back(
         {reference.scan, json_of(reference.sensor), reference.block.offset, reference.block.size});
   }
-  Json json = {{"begin", session.begin},
-               {"recording", session.recording},
-               {"fingerprint", session.fingerprint},
-               {"configuration", session.config},
-               {"margin", session.evidence.margin},
-               {"margin_slope", session.evidence.margin_slope},
-               {"lateral_margin", session.evidence.lateral_margin},
-               {"map_voxel", session.grid.map_voxel},
-               {"tile", session.grid.tile},
-               {"scans", session.scans},
-               {"points", session.points},
-               {"lowest", json_of(session.lowest)},
-               {"highest", json_of(session.highest)},
-               {"image_grid", json_of(session.image_grid)},
-               {"tiles", tiles},
-               {"references", references}};
+  Json json;
+  visit(session, [&](const char* name, const auto& value) { json[name] = value; });
+  json["lowest"] = json_of(session.lowest);
+  json["highest"] = json_of(session.highest);
+  json["image_grid"] = json_of(session.image_grid);
+  json["tiles"] = tiles;
+  json["references"] = references;
   if (session.alignment) json["alignment"] = json_of(*session.alignment);
   return json;
 }
 
 SessionInfo session_of(const Json& json) {
   SessionInfo session;
-  session.begin = json.at("begin");
-  session.recording = json.at("recording");
-  session.fingerprint = json.at("fingerprint");
-  session.config = json.at("configuration");
-  session.evidence.margin = json.at("margin");
-  session.evidence.margin_slope = json.at("margin_slope");
-  session.evidence.lateral_margin = json.at("lateral_margin");
-  session.grid = {json.at("map_voxel"), json.at("tile")};
-  session.scans = json.at("scans");
-  session.points = json.at("points");
+  visit(session, [&](const char* name, auto& value) { json.at(name).get_to(value); });
   session.lowest = vector_of(json.at("lowest"));
   session.highest = vector_of(json.at("highest"));
   session.image_grid = image_grid_of(json.at("image_grid"));
