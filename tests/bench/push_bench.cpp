@@ -15,6 +15,7 @@
 #endif
 
 #include "dynains/compiled_remover.hpp"
+#include "dynains/median.hpp"
 #include "support/scene.hpp"
 
 namespace dynains::bench {
@@ -60,12 +61,6 @@ class InstructionCounter {
  private:
   [[maybe_unused]] int file_ = -1;  // open until the program ends
 };
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 using Rows = std::vector<std::pair<std::string, double>>;
 
