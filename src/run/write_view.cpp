@@ -110,13 +110,10 @@ void check_run_is_finished(const fs::path& folder) {
 }
 
 ResultFolder open_finished_run(const fs::path& folder) {
-  const fs::path report = folder / run_output_kind().marker;
-  std::error_code error;
-  if (!fs::exists(report, error)) {
-    throw IoError(report.string() +
-                  ": not found; expected the folder that `dynains run` wrote, not a recording");
-  }
   ResultFolder out(Folder(folder), run_output_kind());
+  if (!out.has_results()) {
+    throw IoError(out.marker_path().string() + ": not found; expected a folder of `dynains run`");
+  }
   check_run_is_finished(folder);
   return out;
 }
