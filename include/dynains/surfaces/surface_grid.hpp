@@ -36,6 +36,8 @@ struct CellSurface {
   std::size_t direction_count = 0;                 ///< 0: nothing, 1: plane, 2: pole or clutter
   double variance = 0.0;                           ///< m^2, of clutter across its longest extent
   bool is_upright = false;
+  bool is_line = false;  ///< a pole
+  bool is_flat = false;  ///< its points lie in a plane, whether or not this counts
 
   /// m^2, of a point (m) along the directions.
   double squared_distance(const Eigen::Vector3d& point) const {
@@ -87,6 +89,11 @@ class SurfaceGrid {
   };
 
   CellSurface surface_of(const Cell& cell) const;
+  const CellSurface* fitted(std::size_t level, const Eigen::Vector3d& point) const;
+  /// Whether an upright line through `point` in a cell of this level is a part of a wall in a
+  /// larger cell: on a wall that beams graze, the columns of a sensor lie farther apart than a cell
+  /// is wide, and move with it.
+  bool is_on_wall(std::size_t level, const Eigen::Vector3d& point) const;
 
   bool with_clutter_;
   double scale_;
