@@ -75,6 +75,7 @@ std::vector<Comparison> compare(const Recording& recording, std::size_t i,
 /// others in all scans.
 Pose register_to_others(const std::vector<Comparison>& scans) {
   std::vector<Overlap> overlaps;
+  overlaps.reserve(scans.size());
   for (const Comparison& scan : scans) overlaps.push_back({&scan.others, &scan.points});
   Pose T = Pose::Identity();
   for (const FitStage& stage : {FitStage{1, 0.2, 8}, FitStage{2, 0.1, 12}, FitStage{2, 0.05, 8}}) {

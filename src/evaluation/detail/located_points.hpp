@@ -23,7 +23,7 @@ class RangeGate {
   /// False for points that are not finite and for "no return" (all zero).
   bool passes(const LabelledScan& scan, std::size_t i) const {
     const Eigen::Vector3d p = scan.point(i);
-    const bool is_return = (p.x() != 0) | (p.y() != 0) | (p.z() != 0);
+    const bool is_return = p.x() != 0 || p.y() != 0 || p.z() != 0;
     double x = p.x(), y = p.y();
     if (!scan.origins.empty()) {
       const Eigen::Vector3d& origin = scan.origins[scan.sensors == nullptr ? 0 : scan.sensors[i]];

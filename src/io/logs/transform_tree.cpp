@@ -173,7 +173,7 @@ std::optional<Pose> TransformTree::find(const std::string& target, const std::st
 std::optional<std::string> TransformTree::conflict(const std::string& target,
                                                    const std::string& source) const {
   const std::vector<std::string> ways[] = {frames_above(target), frames_above(source)};
-  for (const std::size_t i : {0, 1}) {
+  for (std::size_t i = 0; i < 2; ++i) {
     for (const std::string& frame : ways[i]) {
       const std::vector<std::string>& other = ways[1 - i];
       const auto edge = edges_.find(frame);

@@ -97,7 +97,8 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
   visit_columns(columns, {}, [&](const std::string& name, auto value) {
     fields += ' ' + name;
     sizes += ' ' + std::to_string(sizeof(value));
-    types += std::is_floating_point_v<decltype(value)> ? " F" : " U";
+    const bool is_float = std::is_floating_point_v<decltype(value)>;
+    types += is_float ? " F" : " U";
     counts += " 1";
   });
   const std::string size = std::to_string(count);
