@@ -42,7 +42,8 @@ const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& p
   for (std::size_t k = level + 1; k-- > coarsest;) {
     const CellSurface* const surface = fitted(k, point);
     if (surface == nullptr || surface->direction_count == 0) continue;
-    if (with_clutter_ && surface->is_line && is_on_wall(k, surface->mean)) continue;
+    const bool is_pole = surface->direction_count == 2 && surface->is_upright;
+    if (with_clutter_ && is_pole && is_on_wall(k, surface->mean)) continue;
     return surface;
   }
   return nullptr;
@@ -62,7 +63,7 @@ bool SurfaceGrid::is_on_wall(std::size_t level, const Eigen::Vector3d& point) co
   constexpr double kNear = 0.1;  // m
   for (std::size_t k = level; k-- > 0;) {
     const CellSurface* const around = fitted(k, point);
-    if (around == nullptr || !around->is_flat || !around->is_upright) continue;
+    if (around == nullptr || around->direction_count == 2 || !around->is_upright) continue;
     if (std::abs(around->directions[0].dot(point - around->mean)) < scale_ * kNear) return true;
   }
   return false;
@@ -73,7 +74,6 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
   constexpr double kThin = 0.15;    // ratio of the extents across and along a plane
   constexpr double kNarrow = 0.2;   // ratio of the extents of a line
   constexpr double kUpright = 0.5;  // most sine of the tilt of what is upright
-  constexpr double kAlong = 0.1;    // sine of the angle between a plane and a beam
   CellSurface surface;
   const detail::PlaneMoments& sums = cell.sums;
   if (sums.count < kMin) return surface;
@@ -90,15 +90,14 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     // Rings of a sensor lie along lines on the ground that move with the sensor.
     if (std::hypot(axes(0, 2), axes(1, 2)) > kUpright) return surface;
     surface.direction_count = 2;
-    surface.is_upright = surface.is_line = true;
+    surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
-    surface.is_flat = true;
     surface.is_upright = std::abs(axes(2, 0)) < kUpright;
     const Eigen::Vector3d beam = surface.mean - sensor_;
-    // A map has seen distant ground from nearer: there, a plane nearly along a beam is its trace.
-    if (with_clutter_ && std::abs(beam.dot(axes.col(0))) < kAlong * beam.norm()) return surface;
+    // One scan needs distant ground, which a map has seen from nearer.
+    const double edge_on = with_clutter_ ? 0.1 : 0.04;
     if (detail::is_trace_of_beam({beam[0], beam[1], beam[2]}, {axes(0, 0), axes(1, 0), axes(2, 0)},
-                                 sums))
+                                 sums, edge_on))
       return surface;
     surface.direction_count = 1;
   } else if (with_clutter_) {

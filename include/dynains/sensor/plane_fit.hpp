@@ -47,16 +47,16 @@ inline double variance_along(const PlaneMoments& m, const double (&u)[3]) {
 /// Whether a plane with the unit normal `n` is the trace of a beam: the points of one beam in
 /// foliage, on persons or on a rough wall spread over a plane that contains the beam, and so does
 /// the noise of its ranges. Such a plane moves with the sensor. A surface at a small angle to the
-/// beams is longer along them than the noise. `beam`: from the sensor to the points, m.
+/// beams is longer along them than the noise. `beam`: from the sensor to the points, m. `edge_on`:
+/// sine of the angle below which a plane contains the beam.
 inline bool is_trace_of_beam(const double (&beam)[3], const double (&n)[3],
-                             const PlaneMoments& points) {
+                             const PlaneMoments& points, double edge_on = 0.04) {
   constexpr double kGrazing = 0.3;    // sine of the angle between beam and plane
-  constexpr double kEdgeOn = 0.04;    // the same, of a plane that contains the beam
   constexpr double kMinLength = 0.2;  // m, standard deviation along the beam
   const double range = std::sqrt(beam[0] * beam[0] + beam[1] * beam[1] + beam[2] * beam[2]);
   const double across = beam[0] * n[0] + beam[1] * n[1] + beam[2] * n[2];
   if (std::abs(across) >= kGrazing * range) return false;
-  if (std::abs(across) < kEdgeOn * range) return true;
+  if (std::abs(across) < edge_on * range) return true;
   const double length = std::sqrt(range * range - across * across);
   double along[3];
   for (std::size_t k = 0; k < 3; ++k) along[k] = (beam[k] - across * n[k]) / length;

@@ -35,9 +35,7 @@ struct CellSurface {
   std::array<Eigen::Vector3d, 2> directions;       ///< orthonormal; it determines places along them
   std::size_t direction_count = 0;                 ///< 0: nothing, 1: plane, 2: pole or clutter
   double variance = 0.0;                           ///< m^2, of clutter across its longest extent
-  bool is_upright = false;
-  bool is_line = false;  ///< a pole
-  bool is_flat = false;  ///< its points lie in a plane, whether or not this counts
+  bool is_upright = false;  ///< a pole or wall; also of a wall that does not count
 
   /// m^2, of a point (m) along the directions.
   double squared_distance(const Eigen::Vector3d& point) const {
