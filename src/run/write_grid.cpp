@@ -84,17 +84,21 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
   };
   std::vector<Pose> sensors = recording.sensors();
   if (sensors.empty()) sensors.push_back(Pose::Identity());
-  const auto sensor_at = [&](std::size_t i, std::size_t k) -> Eigen::Vector3d {
-    return pose(i) * sensors.at(k).translation();
+  const auto places_of_sensors = [&](std::size_t i) {
+    std::vector<Eigen::Vector3d> places;
+    places.reserve(sensors.size());
+    for (const Pose& T : sensors) places.emplace_back(pose(i) * T.translation());
+    return places;
   };
   JudgedScans judged(read_labels, recording, keep_moving);
   grid::Floors floors(recording.folder().string());
   std::size_t done = 0;
   progress(done);
   for (const std::size_t i : scans) {
+    const std::vector<Eigen::Vector3d> places = places_of_sensors(i);
     judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
       if (label == PointLabel::kDynamic) return;
-      floors.add(point, label == PointLabel::kGround, point.z() > sensor_at(i, k).z());
+      floors.add(point, label == PointLabel::kGround, point.z() > places.at(k).z());
     });
     if (!progress(++done)) return {};
   }
@@ -108,9 +112,8 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
       maker.add(point, label == PointLabel::kDynamic);
       ends.at(k).push_back(point);
     });
-    for (std::size_t k = 0; k < sensors.size(); ++k) {
-      maker.add_beams(sensor_at(i, k), ends[k]);
-    }
+    const std::vector<Eigen::Vector3d> places = places_of_sensors(i);
+    for (std::size_t k = 0; k < sensors.size(); ++k) maker.add_beams(places[k], ends[k]);
     if (!progress(++done)) return {};
   }
   return {maker.grid(), place.head<2>()};
