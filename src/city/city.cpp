@@ -13,6 +13,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "io/failure.hpp"
+#include "io/folder.hpp"
 #include "io/text.hpp"
 #include "session_file.hpp"
 
@@ -70,9 +71,7 @@ City::City(const fs::path& folder) : City(folder, SessionGrid()) {
 
 City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
   grid.validate();
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) fail_by_system(folder, "cannot be created", error.value());
+  create_folder(folder);
   City city(folder, grid);
   city.reload();
   if (!city.sessions_.empty()) {
