@@ -482,7 +482,7 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
   const bool are_inexact = measure_errors(evidence, d);
   if (!is_exact(all)) d.flaws = flaws_of(recording);
   const bool is_flawed = d.flaws.has_equal_orientations || d.flaws.step > 0.0;
-  // What overlaps do to motions is no proof of another reading, and fits would absorb it.
+  // Overlaps shift motions. This does not prove another reading, but a fit would explain it by one.
   const bool may_differ = evidence.overlaps ? !is_exact(all) : all.at_points > kExact;
   if (may_differ && !is_flawed) {
     std::vector<Reading> readings = usual_readings(recording);

@@ -114,7 +114,7 @@ class Builder {
   bool walker(std::vector<Vec2> goals, double pace, double start, double stop);
   void add_thing(double s, int side);
   void add_wires(int side);
-  /// Adds an object unless it would stand on a street or in the way of the sensor.
+  /// Adds an object unless it overlaps a street or the path of the sensor.
   void put(const Model& model, const Waypoint& at, double half_length, double half_width);
 
   Config config_;

@@ -67,7 +67,7 @@ struct Solution {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-/// `a`: tells what determines a direction.
+/// `a`: its lever and least eigenvalue decide which directions are determined.
 Solution solve(const Equations& equations, const SurfaceGrid& a) {
   const auto unit = [&](std::size_t i) { return i < 3 ? 1.0 : 1.0 / a.lever(); };
   Matrix6 hessian;

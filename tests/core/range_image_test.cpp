@@ -298,7 +298,7 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
       CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17 && !is_before));
     }
   }
-  // Of thin things.
+  // Samples of objects so thin that a beam must pass within 0.12 m.
   const std::vector<float> reach(count + detail::kPackWidth, 0.12F);
   visibility.clear(count);
   detail::add_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,

@@ -154,8 +154,8 @@ TEST_CASE("run and check name scans at the places of others, and none in a right
   swap(8, 20);
   const std::string told = "2 scans from 000008 to 000020" + misplaced;
   const std::string outputs = words();
-  CHECK_THAT(outputs, ContainsSubstring("note: " + told));     // of check
-  CHECK_THAT(outputs, ContainsSubstring("warning: " + told));  // of run
+  CHECK_THAT(outputs, ContainsSubstring("note: " + told));     // by check
+  CHECK_THAT(outputs, ContainsSubstring("warning: " + told));  // by run
   for (const std::size_t i : {8U, 20U}) write_scan(drive.file_of(i), drive.scan(i).xyzi);
 
   std::vector<float> noise = drive.scan(12).xyzi;

@@ -55,8 +55,8 @@ inline evaluation::EvaluationConfig within_50_m() {
   return config;
 }
 
-/// Bit k of `in_map` tells the static points of estimate k, which has name k. `mounts`: those of
-/// the simulator.
+/// A point is static by estimate k, called `names[k]`, if bit k of `in_map` is 1. `mounts`: those
+/// of the simulator.
 inline evaluation::Evaluation evaluate(const std::vector<simulation::SimulatedScan>& scans,
                                        const StaticPoints& in_map,
                                        const std::vector<std::string>& names,

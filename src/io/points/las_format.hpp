@@ -9,7 +9,7 @@
 
 namespace dynains::las {
 
-/// What marks a file and its record of extra bytes.
+/// Signature of a file, and user and number of its record of extra bytes.
 struct Marks {
   std::string_view magic = "LASF", spec_user = "LASF_Spec";
   std::uint16_t extra_bytes_record = 4;
