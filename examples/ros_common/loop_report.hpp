@@ -76,7 +76,7 @@ inline const char* text_of(dynains::Suspicion suspicion) {
     case dynains::Suspicion::kPoses:
       return "scans do not fit to each other: check the transforms";
     case dynains::Suspicion::kRays:
-      return "beams pass through what stands still: check the origin of the sensor and the "
+      return "beams pass through what is static: check the origin of the sensor and the "
              "times of points";
     default:
       return "";

@@ -23,7 +23,7 @@
 
 namespace dynains {
 
-/// Writes the file of a session to a stream, whose state tells errors.
+/// Writes the file of a session to a stream. Errors set the state of the stream.
 class SessionFileWriter {
  public:
   explicit SessionFileWriter(std::ostream& stream);

@@ -1,4 +1,4 @@
-// A number that tells two inputs apart, with a probability that is enough against mistakes.
+// A number that differs for two different inputs, except with a negligible probability.
 #pragma once
 
 #include <array>

@@ -51,9 +51,9 @@ class Folder {
   /// file system without locks of folders, such as some network file systems, always. Throws
   /// UsageError for a conflicting lock.
   void lock(Lock how = Lock::kExclusive) const;
-  /// Throws unless entries can be made and removed, as far as permissions tell.
+  /// Throws unless the permissions allow to make and remove entries.
   void check_changeable() const;
-  /// Throws unless entry `name` can be replaced, as far as its attributes tell.
+  /// Throws unless entry `name` can be replaced according to its attributes.
   void check_replaceable(const std::string& name) const;
 
   /// Makes the folder `name`. False if there is an entry of that name already.

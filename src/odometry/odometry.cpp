@@ -160,7 +160,7 @@ class Odometry::Loop {
     return OdometryLoss::kNone;
   }
 
-  /// Traffic that moves with the sensor fits to it without a motion. Then landmarks tell the way
+  /// Traffic that moves with the sensor fits without a motion. Then landmarks determine the way
   /// along the direction that surfaces determine worst.
   void search_first_motion(Registration& best, double period) {
     const Landmarks first = first_->landmarks(), second = scan_.landmarks();

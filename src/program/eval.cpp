@@ -119,7 +119,7 @@ void add_eval_command(CLI::App& app) {
   ScanWindow::visit(options->window, SettingFlags{command});
   command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
   command.add_flag("--errors", options->errors,
-                   "also tell where the first run went wrong: by class, instance, range and cause");
+                   "also report where the first run is wrong: by class, instance, range and cause");
   command.add_flag("--unfinished", options->unfinished,
                    "also judge runs, and maps of runs, whose report.json says \"complete\": false");
   command.add_option("--json", options->json, "write everything to this file, errors included");

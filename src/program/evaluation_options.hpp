@@ -27,7 +27,7 @@ class EvaluationOptions {
   std::string unlabeled_;
 };
 
-/// A file for text that takes long to compute. Opening it tells beforehand whether it can be
+/// A file for text that takes long to compute. Opening it shows beforehand whether it can be
 /// written.
 class TextFile {
  public:

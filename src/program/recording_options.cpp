@@ -50,7 +50,7 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
         "--pose-frame", "--left-handed-poses", "--pose-shift", "--extrinsic", "--time-offset",
         "--pose-gap", "--pose-topic", "--pose-frame-id"}) {
     if (!settings.flags.contains(flag)) continue;
-    throw ConfigError(std::string(flag) + " tells of given poses, which the odometry does not use");
+    throw ConfigError(std::string(flag) + " is about given poses, which the odometry does not use");
   }
   RecordingOptions options = settings.checked();
   options.without_poses = true;

@@ -28,7 +28,7 @@ struct RecordingFlags {
   /// names no others. `command`: the command line without SEQ, for messages. Throws IoError.
   Recording open_of_run(const run::ResultFolder& out, const std::string& command);
   /// Opens the recording without poses, for the odometry. `is_compensated`: see RecordingOptions.
-  /// Throws ConfigError if a flag tells of poses.
+  /// Throws ConfigError if a flag is about poses.
   Recording open_without_poses(bool is_compensated) const;
 
   std::string folder;

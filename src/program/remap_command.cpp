@@ -197,7 +197,7 @@ void check_poses(const Recording& recording, const std::vector<std::size_t>& sca
   }
 }
 
-/// The flags that tell how the points of the run are stored.
+/// The flags that state how the points of the run are stored.
 Json point_flags(const ResultFolder& out) {
   Json flags = Json::object();
   const Json of_run = out.marker().value("sequence_flags", Json::object());

@@ -297,7 +297,8 @@ void bind_remover(py::module_& module) {
             for (std::size_t i = 0; i < 6; ++i) supported[i] = residual.is_supported(i);
             return supported;
           },
-          "Six bools, as the axes of `covariance`: whether the surfaces tell the error to 10 cm.")
+          "Six bools, as the axes of `covariance`: whether the surfaces determine the error to 10 "
+          "cm.")
       .def_readonly("previous_scan", &PoseResidual::previous_scan,
                     "Number of the previous scan, the last one that was taken, from 0.")
       .def_readonly("previous_time", &PoseResidual::previous_time, "s, of that scan")

@@ -1,4 +1,4 @@
-// Ctrl-C as a request that a loop looks at.
+// Ctrl-C as a request that a loop polls.
 #pragma once
 
 namespace dynains::run {

@@ -134,7 +134,8 @@ void complete_grid(RunOutputs& outputs) {
 /// Throws ConfigError.
 void check_passes(const RunSettings& settings) {
   if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
-    throw ConfigError("--static last needs --passes 2: one pass does not know what stands at last");
+    throw ConfigError(
+        "--static last needs --passes 2: one pass does not know what is there at the end");
   }
 }
 

@@ -20,7 +20,7 @@ struct RunPlan {
   OutputListing listing;  ///< of the results
   InputFiles inputs;
   nlohmann::ordered_json configuration;  ///< parameter name -> value
-  nlohmann::ordered_json request;        ///< what determines the results, and no other field tells
+  nlohmann::ordered_json request;        ///< what determines the results and is in no other field
   SessionRequest session;
 };
 

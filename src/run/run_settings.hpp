@@ -121,9 +121,9 @@ void RunSettings::visit_common(Self& self, Visitor&& visitor) {
                      "static map, .ply, .pcd or .las [static_map.ply in the folder of results]"));
   visitor(Parameter{"passes", self.passes, closed(1, 2), "",
                     "2: after the last scan, scans of the whole recording remove what came or went "
-                    "at any time, and bring back what stands; 1: the verdicts of the stream"});
+                    "at any time, and restore what is static; 1: the verdicts of the stream"});
   visitor(Parameter{"static", self.static_policy, Bounds(), "",
-                    "with two passes: what never came or went, or what stands at last, as a car "
+                    "with two passes: what never moved, or what is there at the end, as a car "
                     "that has parked"});
   visitor(Parameter{"view", self.outputs.write_page, Bounds(), "",
                     "also write the page view.html, which shows the results, and the folder "

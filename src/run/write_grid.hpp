@@ -14,7 +14,7 @@ namespace dynains::run {
 
 /// Warning about the scans of a grid.
 inline constexpr const char* kGridOfOneScan =
-    "the grid is of one scan: nothing tells what in it moves";
+    "the grid is of one scan: nothing shows what in it moves";
 
 /// The description of a grid, by whole_path(). Throws ConfigError unless the name ends in .yaml.
 std::filesystem::path grid_file(const std::filesystem::path& name);

@@ -137,7 +137,7 @@ TEST_CASE("Times from 0 to 1 are shares of a scan, unless scans may be missing")
     const PointClockFinding unknown = find(share, period);
     CHECK_FALSE(unknown.clock);
     CHECK_THAT(unknown.text, ContainsSubstring("found times of points from 0.04") &&
-                                 ContainsSubstring("--point-time-unit tells the unit"));
+                                 ContainsSubstring("give the unit with --point-time-unit"));
     CHECK(find(share, period, 0.1).clock->unit == 0.1);
   }
 }

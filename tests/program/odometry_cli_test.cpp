@@ -165,7 +165,7 @@ TEST_CASE("The odometry refuses what it cannot use") {
   CHECK_THAT(error({"--start", "1", "--end", "1"}), StartsWith("2"));
   CHECK_THAT(error({"--start", "1", "--end", "1"}), ContainsSubstring("two scans or more"));
   CHECK_THAT(error({"--invert-poses"}), StartsWith("2"));
-  CHECK_THAT(error({"--invert-poses"}), ContainsSubstring("--invert-poses tells of given poses"));
+  CHECK_THAT(error({"--invert-poses"}), ContainsSubstring("--invert-poses is about given poses"));
   CHECK_THAT(error({"--frame", "world"}), ContainsSubstring("frame of the world"));
   const Outcome outcome =
       start({"run", recording.sequence(), "--no-deskew", "--out", recording / "out"});

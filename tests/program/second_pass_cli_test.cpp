@@ -97,7 +97,7 @@ TEST_CASE(
         read_text(recording.path("two") / "static_map_remapped.ply"));
 }
 
-TEST_CASE("passes are one or two, and the policy of what stands needs two") {
+TEST_CASE("passes are one or two, and the policy of static points needs two") {
   const TemporaryFolder folder;
   for (const char* const passes : {"0", "3"}) {
     CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);

@@ -205,7 +205,7 @@ TEST_CASE("a car beside one that leaves stays, though the first pass took both f
   CHECK(stays.removed == 0);
 }
 
-TEST_CASE("a car that parks and stays is static if what stands at last is, and since it stands") {
+TEST_CASE("a car that parks and stays is static under the policy last, since it parked") {
   const Recorded recording = there_and_back(false, true);
   const Counts always = sum(count(recording, kCar));
   CHECK(always.removed > 9 * always.kept);
@@ -267,7 +267,7 @@ TEST_CASE("a second pass that was interrupted changes nothing") {
   CHECK(sum(count(with_parked_car(), kCar, false)).removed == 0);
 }
 
-TEST_CASE("what the first pass removed for a while comes back if what stands at last is static") {
+TEST_CASE("what the first pass removed for a while comes back under the policy last") {
   const Recorded recording = there_and_back(false, true);
   const std::size_t turn = recording.scans.size() / 2;
   const auto removes = [turn](std::size_t scan, std::uint32_t label) {

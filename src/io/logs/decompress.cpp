@@ -114,7 +114,7 @@ std::string decompress_frame(std::vector<std::uint8_t>& bytes, std::vector<std::
 #if defined(DYNAINS_HAS_ZSTD)
   const auto size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
   if (size == ZSTD_CONTENTSIZE_ERROR) return "expected a frame of zstd";
-  if (size == ZSTD_CONTENTSIZE_UNKNOWN) return "expected a frame of zstd that tells its size";
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN) return "expected a frame of zstd that states its size";
   const std::uint64_t most = max_decompressed(bytes.size());
   if (size > most) {
     return "expected a frame of zstd of at most " + std::to_string(most) + " bytes, found " +

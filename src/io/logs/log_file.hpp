@@ -108,7 +108,7 @@ class LogFile {
 
 /// Whether `path` is a log by its name: *.mcap, *.bag, *.bag.active, *.db3, one of these compressed
 /// as a whole (which open_log() refuses), or a folder with metadata.yaml and one or more of these.
-/// Throws IoError if the system cannot tell.
+/// Throws IoError if the system does not report it.
 bool is_log(const std::filesystem::path& path);
 
 /// Whether files with the name of a log lie directly in a folder. Throws IoError.

@@ -189,7 +189,7 @@ void check_bin_content(const std::filesystem::path& file) {
   fail(file, "does not seem to hold float32 x y z intensity: values of one column differ by " +
                  std::to_string(std::lround(100.0 * (1.0 - least / spread))) +
                  " % less if points have " + to_text(*best) + ", " + option_of(*best) +
-                 "; --bin-columns tells which");
+                 "; give them with --bin-columns");
 }
 
 }  // namespace dynains

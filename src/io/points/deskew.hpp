@@ -19,7 +19,7 @@ namespace dynains {
 /// kMaxPoseGap, and continued with constant velocity by at most kMaxScan. `stamp`: s,
 /// `T_world_sensor`: the pose at that time.
 ///
-/// `clock` tells the seconds from the stamp to the time of a point. Points whose time cannot be
+/// `clock` gives the seconds from the stamp to the time of a point. Points whose time cannot be
 /// that of the scan (see times_of_scan()) keep their place.
 ///
 /// Throws IoError that begins with `place` for scans without a time for each point, for times that

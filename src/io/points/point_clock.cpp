@@ -231,7 +231,8 @@ std::string PointClockSearch::duration_text(double unit) const {
 PointClockFinding PointClockSearch::result() const {
   if (samples_.empty()) return {std::nullopt, "found no point with a return and a finite time"};
   const std::string option =
-      "; --point-time-unit tells the unit: s, ms, us, ns, or seconds, such as 0.1 for times from 0 "
+      "; give the unit with --point-time-unit: s, ms, us, ns, or seconds, such as 0.1 for times "
+      "from 0 "
       "to 1 in scans of 0.1 s";
   constexpr std::size_t kFewPoints = 3;  // in a scan; they may have one time by chance
   if (duration(1.0) == 0.0) {

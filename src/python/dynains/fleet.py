@@ -4,7 +4,7 @@
 
 A recording is a task. Its results go to OUT/NAME, as `dynains run` writes them, so they do not
 depend on the workers, their number, or the order. A task of a worker that dies is given to another
-worker. A recording that fails does not stop the others; OUT/fleet.json tells the reason. The same
+worker. A recording that fails does not stop the others; OUT/fleet.json has the reason. The same
 command again runs over those that have no results yet.
 """
 
@@ -59,7 +59,7 @@ def _clean_one(recording: str, out: str, arguments: Dict[str, Any]) -> Dict[str,
 
 
 def _finished(out: Path, arguments: Dict[str, Any]) -> Optional[Dict[str, Any]]:
-    """The report of a finished run; None without one. Raises ConfigError if it tells of others."""
+    """The report of a finished run; None without one. Raises ConfigError if it is about others."""
     try:
         report = json.loads((out / "report.json").read_text())
     except (OSError, ValueError):

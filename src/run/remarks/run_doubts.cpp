@@ -62,7 +62,7 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
   }
   const bool may_be_skewed = recording.columns().time && !recording.is_deskewed();
   return since + "beams pass through " + percent(worst.ground_free) + " of the ground and " +
-         percent(worst.instance_free) + " of what stands above it: " +
+         percent(worst.instance_free) + " of the points above it: " +
          (may_be_skewed ? "points may keep the frames of their times (--deskew), or " : "") +
          "rays may not begin at the origin of the clouds (--sensor-origin), poses be inexact, or "
          "many points be noise; see: dynains check";

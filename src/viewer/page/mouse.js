@@ -1,4 +1,4 @@
-// Moves a camera by mouse or finger, and tells clicks.
+// Moves a camera by mouse or finger, and reports clicks.
 
 // isMoved() is called after a change of the camera, isClicked(x, y) with a position in pixels of
 // the page.
