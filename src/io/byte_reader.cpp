@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <string>
 #include <system_error>
@@ -12,11 +13,8 @@
 
 namespace dynains {
 
-ByteReader::ByteReader(const std::filesystem::path& path) : path_(path), file_(open_input(path)) {
-  std::error_code error;
-  size_ = std::filesystem::file_size(path, error);
-  if (error) fail(path, "cannot be read: " + error.message());
-}
+ByteReader::ByteReader(const std::filesystem::path& path)
+    : path_(path), file_(open_input(path)), size_(size_of_file(path)) {}
 
 bool ByteReader::read_line(std::string& text) {
   text.clear();
@@ -68,6 +66,22 @@ void ByteReader::skip(std::uint64_t count, const char* purpose) {
     file_.ignore(static_cast<std::streamsize>(count));
   }
   position_ += count;
+}
+
+void ByteReader::read_at(std::uint64_t position, std::uint64_t count, const char* purpose,
+                         std::vector<std::uint8_t>& bytes) {
+  const std::uint64_t available = size_ - std::min(position, size_);
+  if (count > available || position > size_) {
+    fail_at_byte(path_, position,
+                 "expected " + std::to_string(count) + " bytes of " + purpose + ", the file has " +
+                     std::to_string(available));
+  }
+  bytes.resize(static_cast<std::size_t>(count));
+  if (position != position_) file_.seekg(static_cast<std::streamoff>(position));
+  errno = 0;
+  file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count));
+  position_ = position + count;
+  if (!file_) fail_to_read(file_, path_, position, size_);
 }
 
 std::uint64_t ByteReader::whole_number(std::string_view token, const std::string& what) const {

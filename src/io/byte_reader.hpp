@@ -1,4 +1,4 @@
-// Sequential reader of a file with position and size.
+// Reader of a file with position and size.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dynains {
 
@@ -15,6 +16,8 @@ class ByteReader {
   /// Throws IoError unless `path` is a regular file that opens.
   explicit ByteReader(const std::filesystem::path& path);
 
+  const std::filesystem::path& path() const { return path_; }
+  std::uint64_t size() const { return size_; }
   std::uint64_t position() const { return position_; }
   std::uint64_t remaining() const { return size_ - position_; }
   /// Number of the last line that was read, from 1.
@@ -34,6 +37,17 @@ class ByteReader {
   std::string read_block(std::uint64_t count, const char* purpose);
   void skip(std::uint64_t count, const char* purpose);
 
+  /// Replaces `bytes` by `count` bytes from `position` on, which become memory only if the file has
+  /// them. Throws IoError with the byte.
+  void read_at(std::uint64_t position, std::uint64_t count, const char* purpose,
+               std::vector<std::uint8_t>& bytes);
+  std::vector<std::uint8_t> read_at(std::uint64_t position, std::uint64_t count,
+                                    const char* purpose) {
+    std::vector<std::uint8_t> bytes;
+    read_at(position, count, purpose, bytes);
+    return bytes;
+  }
+
   /// The number that `token` of the last line is. Throws IoError that expects `what`, or a number
   /// for `name`.
   std::uint64_t whole_number(std::string_view token, const std::string& what) const;
@@ -50,7 +64,7 @@ class ByteReader {
   std::filesystem::path path_;
   std::ifstream file_;
   std::uint64_t size_ = 0;
-  std::uint64_t position_ = 0;
+  std::uint64_t position_ = 0;  // of the stream; a seek drops what it has buffered
   std::uint64_t line_ = 0;
 };
 

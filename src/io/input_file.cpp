@@ -27,6 +27,24 @@ bool is_folder(const fs::path& path) { return fs::is_directory(status_of(path));
 
 bool is_file(const fs::path& path) { return fs::is_regular_file(status_of(path)); }
 
+std::uint64_t size_of_file(const fs::path& path) {
+  std::error_code error;
+  const std::uint64_t size = fs::file_size(path, error);
+  if (error) fail(path, "cannot be read: " + error.message());
+  return size;
+}
+
+std::vector<fs::path> paths_in(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    paths.push_back(entry->path());
+  }
+  if (error) fail(folder, "cannot be listed: " + error.message());
+  return paths;
+}
+
 std::ifstream open_input(const fs::path& path) {
   const fs::file_status status = status_of(path);
   if (!fs::exists(status)) fail_by_system(path, "cannot be read", ENOENT);
@@ -52,7 +70,7 @@ void fail_to_read(const std::ifstream& file, const fs::path& path, std::uint64_t
 
 std::string read_text_file(const std::filesystem::path& path) {
   std::ifstream file = open_input(path);
-  const std::uintmax_t size = std::filesystem::file_size(path);
+  const std::uint64_t size = size_of_file(path);
   if (size > kMaxTextBytes) {
     fail(path,
          "has " + std::to_string(size) + " bytes, more than " + std::to_string(kMaxTextBytes));

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace dynains {
 
@@ -13,6 +14,12 @@ namespace dynains {
 bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
+
+/// Bytes of a file. Throws IoError.
+std::uint64_t size_of_file(const std::filesystem::path& path);
+
+/// All that lies directly in a folder, in no order. Throws IoError.
+std::vector<std::filesystem::path> paths_in(const std::filesystem::path& folder);
 
 /// Opens a regular file to read. Throws IoError, also for folders, and for devices and pipes, whose
 /// reading may never end.

@@ -4,7 +4,6 @@
 #include <fstream>
 #include <set>
 #include <string_view>
-#include <system_error>
 #include <unordered_map>
 
 #include "dynains/io/trajectory.hpp"
@@ -32,27 +31,19 @@ class TableRow {
       : table_(table), index_(index), values_(values) {}
 
   std::string text(const char* name) const {
-    const auto found = values_.find(name);
-    if (found == values_.end() || !found->is_string()) {
-      fail(std::string("expected a text \"") + name + '"');
-    }
-    return found->get<std::string>();
+    return value(name, &Json::is_string, "a text").get<std::string>();
   }
   double number(const char* name) const {
-    const auto found = values_.find(name);
-    if (found == values_.end() || !found->is_number()) {
-      fail(std::string("expected a number \"") + name + '"');
-    }
-    return found->get<double>();
+    return value(name, &Json::is_number, "a number").get<double>();
   }
   std::vector<double> list(const char* name, std::size_t size) const {
-    const auto found = values_.find(name);
-    const auto is_number = [](const Json& value) { return value.is_number(); };
-    if (found == values_.end() || !found->is_array() || found->size() != size ||
-        !std::all_of(found->begin(), found->end(), is_number)) {
-      fail("expected " + std::to_string(size) + " numbers \"" + name + '"');
+    const std::string expected = std::to_string(size) + " numbers";
+    const Json& list = value(name, &Json::is_array, expected);
+    const auto is_number = [](const Json& one) { return one.is_number(); };
+    if (list.size() != size || !std::all_of(list.begin(), list.end(), is_number)) {
+      fail("expected " + expected + " \"" + name + '"');
     }
-    return found->get<std::vector<double>>();
+    return list.get<std::vector<double>>();
   }
   /// `translation` and `rotation` (w x y z).
   Pose pose() const {
@@ -67,6 +58,13 @@ class TableRow {
   }
 
  private:
+  const Json& value(const char* name, bool (Json::*is_valid)() const noexcept,
+                    const std::string& expected) const {
+    const auto found = values_.find(name);
+    if (found != values_.end() && ((*found).*is_valid)()) return *found;
+    fail("expected " + expected + " \"" + name + '"');
+  }
+
   const fs::path& table_;
   std::size_t index_;
   const Json& values_;
@@ -167,10 +165,7 @@ Poses read_poses_by_token(const fs::path& table, const std::set<std::string>& wa
 
 std::optional<fs::path> nuscenes_tables(const fs::path& folder) {
   if (is_file(folder / "sample_data.json")) return folder;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const fs::path& path = entry->path();
+  for (const fs::path& path : paths_in(folder)) {
     if (path.filename().string().rfind("v1.0", 0) == 0 && is_file(path / "sample_data.json")) {
       return path;
     }

@@ -13,6 +13,7 @@
 #include "input_file.hpp"
 #include "io/poses/recording_poses.hpp"
 #include "points/deskew.hpp"
+#include "points/finite_points.hpp"
 #include "points/point_clock.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"
@@ -24,21 +25,18 @@ namespace fs = std::filesystem;
 
 /// Beams without a return stay at the origin.
 void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * i);
+  for_each_position(scan, [&](auto p) {
     if (!p.isZero(0.0F)) p -= origin;
-  }
+  });
 }
 
 /// Points of the own vehicle become beams without a return.
 void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& scan) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    Eigen::Map<Eigen::Vector3f> p(scan.xyzi.data() + 4 * i);
-    const auto holds = [&](const Eigen::AlignedBox3d& box) {
-      return box.contains(p.cast<double>());
-    };
+  for_each_position(scan, [&](auto p) {
+    const Eigen::Vector3d at = p.template cast<double>();
+    const auto holds = [&](const Eigen::AlignedBox3d& box) { return box.contains(at); };
     if (std::any_of(boxes.begin(), boxes.end(), holds)) p.setZero();
-  }
+  });
 }
 
 fs::path label_file(const fs::path& folder, const std::string& scan) {

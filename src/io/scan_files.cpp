@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
-#include <system_error>
 
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
-#include "failure.hpp"
+#include "input_file.hpp"
 #include "text.hpp"
 
 namespace dynains {
@@ -129,17 +128,13 @@ std::optional<ScanFormat> scan_format_of(const fs::path& path) {
 
 std::vector<fs::path> scan_files(const fs::path& folder) {
   std::vector<fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const fs::path& path = entry->path();
+  for (const fs::path& path : paths_in(folder)) {
     const std::string name = path.filename().string();
     const bool has_poses =
         std::find(kPoseFiles.begin(), kPoseFiles.end(), name) != kPoseFiles.end();
     if (!scan_format_of(path) || name.front() == '.' || has_poses) continue;
     files.push_back(path);
   }
-  if (error) fail(folder, "cannot be listed: " + error.message());
   const auto is_scan = [](const fs::path& path) {
     return is_for_scans_only(*scan_format_of(path));
   };
@@ -158,11 +153,9 @@ std::string name_of_scan(const fs::path& file) {
 }
 
 std::optional<std::string> conversion_of_scans(const fs::path& folder) {
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const auto conversion = conversion_of(entry->path());
-    if (conversion) return entry->path().filename().string() + ": " + *conversion;
+  for (const fs::path& path : paths_in(folder)) {
+    const auto conversion = conversion_of(path);
+    if (conversion) return path.filename().string() + ": " + *conversion;
   }
   return std::nullopt;
 }

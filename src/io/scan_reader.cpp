@@ -8,16 +8,16 @@
 #include "failure.hpp"
 #include "logs/log_scans.hpp"
 #include "points/bin_layout.hpp"
+#include "points/finite_points.hpp"
 
 namespace dynains {
 namespace {
 
 void transform(const FileTransform* T_target_file, RecordedScan& points) {
   if (T_target_file == nullptr) return;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    Eigen::Map<Eigen::Vector3f> p(points.xyzi.data() + 4 * k);
-    p = (*T_target_file * p.cast<double>()).cast<float>();
-  }
+  for_each_position(points, [&](auto p) {
+    p = (*T_target_file * p.template cast<double>()).template cast<float>();
+  });
 }
 
 /// .bin: float32 x y z intensity, or other columns; .pcd.bin of nuScenes has a ring behind them.

@@ -41,8 +41,7 @@ std::optional<std::vector<double>> numbers_in(std::string text, std::string_view
   const auto is_separator = [&](char c) { return separators.find(c) != std::string_view::npos; };
   std::replace_if(text.begin(), text.end(), is_separator, ' ');
   std::vector<double> numbers;
-  std::string_view rest = text;
-  for (auto token = next_token(rest); !token.empty(); token = next_token(rest)) {
+  for (const std::string_view token : tokens(text)) {
     const auto number = parse_number(token);
     if (!number) return std::nullopt;
     numbers.push_back(*number);
@@ -52,12 +51,8 @@ std::optional<std::vector<double>> numbers_in(std::string text, std::string_view
 
 std::vector<std::string> names_in(std::string text) {
   std::replace(text.begin(), text.end(), ',', ' ');
-  std::string_view rest = text;
-  std::vector<std::string> names;
-  for (auto name = next_token(rest); !name.empty(); name = next_token(rest)) {
-    names.emplace_back(name);
-  }
-  return names;
+  const std::vector<std::string_view> names = tokens(text);
+  return {names.begin(), names.end()};
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -88,6 +83,14 @@ std::optional<double> parse_number(std::string_view token) {
 std::string_view trimmed(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
   return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+}
+
+std::vector<std::string_view> tokens(std::string_view line) {
+  std::vector<std::string_view> all;
+  for (auto token = next_token(line); !token.empty(); token = next_token(line)) {
+    all.push_back(token);
+  }
+  return all;
 }
 
 std::string_view next_token(std::string_view& line) {

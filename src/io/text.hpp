@@ -17,6 +17,9 @@ std::optional<double> parse_number(std::string_view token);
 /// Removes the next token, separated by blanks, from the front of `line`; empty at the end.
 std::string_view next_token(std::string_view& line);
 
+/// All tokens of a line.
+std::vector<std::string_view> tokens(std::string_view line);
+
 /// Without blanks at its ends.
 std::string_view trimmed(std::string_view text);
 

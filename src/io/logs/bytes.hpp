@@ -6,7 +6,10 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
 
 namespace dynains {
@@ -36,6 +39,9 @@ class Bytes {
   std::string rest_as_text() const {
     return std::string(reinterpret_cast<const char*>(here()), remaining());
   }
+  bool begins_with(std::string_view text) const {
+    return remaining() >= text.size() && std::memcmp(here(), text.data(), text.size()) == 0;
+  }
   /// The next `size` bytes as a block of their own.
   Bytes block(std::uint64_t size, const char* purpose) {
     const std::uint64_t origin = origin_ + position_;
@@ -63,6 +69,18 @@ class Bytes {
   const std::uint8_t* data_;
   std::size_t size_;
   std::size_t position_ = 0;
+};
+
+/// `size` bytes of a file from `position` on, and the reader of their fields. The file outlives it.
+struct FilePart {
+  FilePart(ByteReader& file, std::uint64_t position, std::uint64_t size, const char* purpose)
+      : bytes(file.read_at(position, size, purpose)),
+        fields(file.path(), position, bytes.data(), bytes.size()) {}
+  FilePart(const FilePart&) = delete;
+  FilePart& operator=(const FilePart&) = delete;
+
+  const std::vector<std::uint8_t> bytes;
+  Bytes fields;
 };
 
 }  // namespace dynains

@@ -14,14 +14,9 @@ constexpr std::size_t kMaxChunks = 16;  // that are kept if their messages alter
 }  // namespace
 
 void ChunkedLog::read_index(const std::string& magic, const std::string& expectation) {
-  const auto begin =
-      file_.read(0, std::min<std::uint64_t>(file_.size(), magic.size()), "magic bytes");
-  const auto is_equal = [](std::uint8_t byte, char expected) {
-    return byte == static_cast<std::uint8_t>(expected);
-  };
-  if (!std::equal(begin.begin(), begin.end(), magic.begin(), magic.end(), is_equal)) {
-    fail_at_byte(path_, 0, expectation);
-  }
+  const FilePart begin(file_, 0, std::min<std::uint64_t>(file_.size(), magic.size()),
+                       "magic bytes");
+  if (!begin.fields.begins_with(magic)) begin.fields.fail(expectation);
   std::uint64_t position = magic.size();
   bool goes_on = true;
   while (goes_on && position < file_.size()) {
@@ -127,7 +122,7 @@ MessageStamp ChunkedLog::read(const LogMessage& message, std::vector<std::uint8_
   const auto chunk = chunks_.find(message.block);
   const bool is_lone = chunk == chunks_.end();
   if (is_lone) {
-    file_.read(message.block, record_size(message.block).value_or(0), "a message", compressed_);
+    file_.read_at(message.block, record_size(message.block).value_or(0), "a message", compressed_);
   }
   const std::vector<std::uint8_t>& records = is_lone ? compressed_ : load(message.block);
   Bytes rest(is_lone ? path_ : chunk_place_, is_lone ? message.block : 0, records.data(),
@@ -186,7 +181,7 @@ void ChunkedLog::decompress_to(std::uint64_t chunk, std::vector<std::uint8_t>& r
   }
   const std::uint64_t before = std::exchange(header.decompression, decompressions_);
   if (before != 0 && decompressions_ - before <= kMaxChunks) wanted_chunks_ = kMaxChunks;
-  file_.read(header.content, header.compressed_size, "a chunk", compressed_);
+  file_.read_at(header.content, header.compressed_size, "a chunk", compressed_);
   if (header.compression.empty()) {
     records.swap(compressed_);
     if (records.size() != header.uncompressed_size) {

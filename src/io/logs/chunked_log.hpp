@@ -10,7 +10,6 @@
 
 #include "bytes.hpp"
 #include "log_file.hpp"
-#include "raw_file.hpp"
 
 namespace dynains {
 
@@ -78,7 +77,7 @@ class ChunkedLog : public LogFile {
   /// Bytes from which the fields before the data of a record are read: names are short.
   static constexpr std::uint64_t kMaxHead = 4096;
 
-  RawFile file_;
+  ByteReader file_;
 
  private:
   /// A message before all channels are known.

@@ -1,5 +1,6 @@
 #include "log_copy.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <limits>
@@ -19,13 +20,6 @@ namespace {
 constexpr const char* kLabelField = "label";
 constexpr std::uint32_t kLabelBytes = 4;  // of a point, for a label and padding
 
-void skip_header(MessageReader& in) {
-  if (in.is_ros1()) in.number<std::uint32_t>("a sequence number");
-  in.number<std::uint32_t>("seconds");
-  in.number<std::uint32_t>("nanoseconds");
-  in.string("a frame id");
-}
-
 void check_count(const MessageReader& in, std::size_t points, std::size_t values) {
   if (points == values) return;
   in.fail("expected " + std::to_string(values) + " points, found " + std::to_string(points));
@@ -36,91 +30,27 @@ void put(std::size_t at, std::uint32_t value, std::string& bytes) {
   std::memcpy(bytes.data() + at, &value, sizeof(value));
 }
 
-/// Bytes of a serialised PointCloud2.
-class CloudBytes {
- public:
-  explicit CloudBytes(const SerialisedMessage& message)
-      : message_(message), in_(message), cloud_(behind_header()) {
-    find_fields();
-    data_ = static_cast<std::size_t>(cloud_.data() - message.data);
-  }
+std::string part(const SerialisedMessage& message, std::size_t begin, std::size_t end) {
+  return std::string(reinterpret_cast<const char*>(message.data) + begin, end - begin);
+}
 
-  const MessageReader& reader() const { return in_; }
-  const PointCloud2& cloud() const { return cloud_; }
-  bool has_labels() const { return has_labels_; }
-
-  /// Everything before the points, with another number of their bytes.
-  std::string head(std::size_t size) const {
-    std::string bytes = part(0, data_);
-    put(data_ - 4, static_cast<std::uint32_t>(size), bytes);
-    return bytes;
-  }
-  void put_rows(std::uint32_t height, std::uint32_t width, std::string& head) const {
-    put(height_, height, head);
-    put(height_ + 4, width, head);
-  }
-  void put_steps(std::uint32_t point, std::uint32_t row, std::string& head) const {
-    put(data_ - 12, point, head);
-    put(data_ - 8, row, head);
-  }
-  /// Adds the field of labels to what put_rows() and put_steps() have completed.
-  void add_label_field(std::string& head) const {
-    MessageWriter field(message_.encoding);
-    const std::size_t begin = field.bytes().size();
-    field.string(kLabelField);
-    field.number(cloud_.point_step());
-    field.number(datatype_of(Scalar::kUint8));
-    field.number(std::uint32_t{1});
-    put(height_ + 8, fields_ + 1, head);
-    head.insert(fields_end_, field.bytes(), begin);
-  }
-  /// Everything behind the points.
-  std::string tail() const {
-    std::uint32_t size = 0;
-    std::memcpy(&size, message_.data + data_ - 4, sizeof(size));
-    return part(data_ + size, message_.size);
-  }
-
- private:
-  MessageReader& behind_header() {
-    skip_header(in_);
-    return in_;
-  }
-  std::string part(std::size_t begin, std::size_t end) const {
-    return std::string(reinterpret_cast<const char*>(message_.data) + begin, end - begin);
-  }
-  void find_fields() {
-    MessageReader in(message_);
-    skip_header(in);
-    in.number<std::uint32_t>("a height");
-    height_ = message_.size - in.remaining() - 4;
-    in.number<std::uint32_t>("a width");
-    fields_ = in.number<std::uint32_t>("a number of fields");
-    for (std::uint32_t i = 0; i < fields_; ++i) {
-      has_labels_ = in.string("a field name") == kLabelField || has_labels_;
-      in.number<std::uint32_t>("a field offset");
-      in.number<std::uint8_t>("a field datatype");
-      in.number<std::uint32_t>("a field count");
-    }
-    fields_end_ = message_.size - in.remaining();
-  }
-
-  const SerialisedMessage& message_;
-  MessageReader in_;
-  PointCloud2 cloud_;
-  // Bytes of the message.
-  std::size_t height_ = 0;  ///< of the height; the width and the number of fields follow
-  std::size_t fields_end_ = 0;
-  std::size_t data_ = 0;
-  std::uint32_t fields_ = 0;
-  bool has_labels_ = false;
-};
+/// The message with other points, behind their steps and the number of their bytes.
+std::string with_points(const SerialisedMessage& message, const PointCloud2& cloud,
+                        const std::string& points, std::uint32_t point_step, std::size_t row_step) {
+  const PointCloud2::Places& at = cloud.places();
+  std::string bytes = part(message, 0, at.data);
+  put(at.data - 12, point_step, bytes);
+  put(at.data - 8, static_cast<std::uint32_t>(row_step), bytes);
+  put(at.data - 4, static_cast<std::uint32_t>(points.size()), bytes);
+  return bytes + points + part(message, at.data_end, message.size);
+}
 
 std::string without_points_of_cloud(const SerialisedMessage& message,
                                     Span<const std::uint8_t> keep) {
-  const CloudBytes bytes(message);
-  const PointCloud2& cloud = bytes.cloud();
-  check_count(bytes.reader(), cloud.size(), keep.size());
+  MessageReader in(message);
+  in.header();
+  const PointCloud2 cloud(in);
+  check_count(in, cloud.size(), keep.size());
   std::string points;
   std::uint32_t count = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) {
@@ -128,37 +58,32 @@ std::string without_points_of_cloud(const SerialisedMessage& message,
     points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_step());
     ++count;
   }
-  std::string result = bytes.head(points.size());
-  bytes.put_rows(1, count, result);
-  bytes.put_steps(cloud.point_step(), static_cast<std::uint32_t>(points.size()), result);
-  return result + points + bytes.tail();
+  std::string result = with_points(message, cloud, points, cloud.point_step(), points.size());
+  put(cloud.places().height, 1, result);
+  put(cloud.places().height + 4, count, result);
+  return result;
 }
 
 std::string without_points_of_livox(const SerialisedMessage& message,
                                     Span<const std::uint8_t> keep) {
   MessageReader in(message);
-  skip_header(in);
-  const auto here = [&] { return message.size - in.remaining(); };
-  in.number<std::uint64_t>("a time base");
-  in.number<std::uint32_t>("a number of points");
-  const std::size_t number_of_points = here() - 4;
-  in.take(4, "a lidar id and reserved bytes");
-  check_count(in, in.length(kLivoxPoint, "points"), keep.size());
-  const std::size_t begin = here();
-  std::string result(reinterpret_cast<const char*>(message.data), begin);
+  in.header();
+  check_count(in, read_livox_head(in).points, keep.size());
+  const std::size_t begin = in.position();
+  std::string result = part(message, 0, begin);
   std::uint32_t count = 0;
   for (std::size_t i = 0; i < keep.size(); ++i) {
     in.number<std::uint32_t>("an offset time");
-    const std::uint8_t* const point = message.data + here() - 4;
+    const std::size_t point = in.position() - 4;
     in.take(kLivoxPoint - 4, "a point");
     if (keep[i] == 0) continue;
     while (!in.is_ros1() && (result.size() - begin) % 4 != 0) result += '\0';
-    result.append(reinterpret_cast<const char*>(point), kLivoxPoint);
+    result += part(message, point, in.position());
     ++count;
   }
-  put(number_of_points, count, result);
+  put(begin - 12, count, result);  // the number of points, before a lidar id and reserved bytes
   put(begin - 4, count, result);
-  return result.append(reinterpret_cast<const char*>(message.data) + here(), in.remaining());
+  return result + part(message, in.position(), message.size);
 }
 
 }  // namespace
@@ -176,10 +101,14 @@ std::string with_labels(const std::string& type, const SerialisedMessage& messag
   if (!can_have_labels(type)) {
     throw IoError(message.place + ": expected a PointCloud2, for other types have no labels");
   }
-  const CloudBytes bytes(message);
-  const PointCloud2& cloud = bytes.cloud();
-  check_count(bytes.reader(), cloud.size(), labels.size());
-  if (bytes.has_labels()) bytes.reader().fail("expected no field \"label\", which is to be added");
+  MessageReader in(message);
+  in.header();
+  const PointCloud2 cloud(in);
+  check_count(in, cloud.size(), labels.size());
+  const std::vector<std::string>& names = cloud.field_names();
+  if (std::find(names.begin(), names.end(), kLabelField) != names.end()) {
+    in.fail("expected no field \"label\", which is to be added");
+  }
   std::string points;
   for (std::size_t i = 0; i < labels.size(); ++i) {
     points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_step());
@@ -187,10 +116,13 @@ std::string with_labels(const std::string& type, const SerialisedMessage& messag
     points.append(kLabelBytes - 1, '\0');
   }
   const std::uint32_t step = cloud.point_step() + kLabelBytes;
-  std::string result = bytes.head(points.size());
-  bytes.put_steps(step, cloud.width() * step, result);
-  bytes.add_label_field(result);
-  return result + points + bytes.tail();
+  std::string result = with_points(message, cloud, points, step, cloud.width() * step);
+  MessageWriter field(message.encoding);
+  const std::size_t begin = field.bytes().size();
+  field.string(kLabelField).number(cloud.point_step()).number(datatype_of(Scalar::kUint8));
+  field.number(std::uint32_t{1});
+  put(cloud.places().height + 8, static_cast<std::uint32_t>(names.size() + 1), result);
+  return result.insert(cloud.places().fields_end, field.bytes(), begin);
 }
 
 void copy_log(LogFile& log, const std::filesystem::path& target, const EditMessage& edit) {

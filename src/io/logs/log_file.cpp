@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <set>
 #include <string_view>
-#include <system_error>
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
@@ -39,12 +38,9 @@ std::string log_extension(const fs::path& path) {
 /// decompressed form is left out.
 std::vector<fs::path> logs_in_folder(const fs::path& folder) {
   std::vector<fs::path> logs;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (!log_extension(entry->path()).empty()) logs.push_back(entry->path());
+  for (const fs::path& path : paths_in(folder)) {
+    if (!log_extension(path).empty()) logs.push_back(path);
   }
-  if (error) fail(folder, "cannot be listed: " + error.message());
   std::sort(logs.begin(), logs.end());
   const std::vector<fs::path> all = logs;
   logs.erase(std::remove_if(logs.begin(), logs.end(),
@@ -87,12 +83,12 @@ std::vector<std::string> listed_files(const fs::path& metadata) {
   bool is_inside = false;
   for (std::string line; reader.read_line(line);) {
     std::string_view rest = line;
-    std::string_view first = text::next_token(rest);
+    const std::string_view first = text::next_token(rest);
     const bool is_begin = first == "relative_file_paths:";
     if (is_inside && !is_begin && first != "-") break;
     if (!is_begin && !is_inside) continue;
     is_inside = true;
-    for (auto token = text::next_token(rest); !token.empty(); token = text::next_token(rest)) {
+    for (const std::string_view token : text::tokens(rest)) {
       const std::string name = without_quotes(token);
       if (!name.empty()) names.push_back(plain_name(fs::path(name).filename()));
     }

@@ -47,8 +47,8 @@ class McapFile final : public ChunkedLog {
   void copy_others(McapWriter& writer) override {
     for (const std::uint64_t position : others_) {
       const std::uint64_t size = record_size(position).value_or(0);
-      const auto begin = file_.read(position, std::min(size, kMaxHead), "a record");
-      Bytes fields(path_, position, begin.data(), begin.size());
+      FilePart record(file_, position, std::min(size, kMaxHead), "a record");
+      Bytes& fields = record.fields;
       const auto opcode = fields.number<std::uint8_t>("an opcode");
       fields.skip(kRecordHead - 1, "a length");
       if (opcode == mcap::kAttachment) {
@@ -64,18 +64,17 @@ class McapFile final : public ChunkedLog {
  private:
   std::optional<std::uint64_t> record_size(std::uint64_t position) override {
     if (file_.size() - position < kRecordHead) return std::nullopt;
-    const auto head = file_.read(position, kRecordHead, "a record");
-    Bytes fields(path_, position, head.data(), head.size());
-    const auto opcode = fields.number<std::uint8_t>("an opcode");
-    const auto size = fields.number<std::uint64_t>("a length");
+    FilePart head(file_, position, kRecordHead, "a record");
+    const auto opcode = head.fields.number<std::uint8_t>("an opcode");
+    const auto size = head.fields.number<std::uint64_t>("a length");
     // Some file systems fill the end of a file with zeros after a crash.
     if (opcode == mcap::kNone || size > file_.size() - position - kRecordHead) return std::nullopt;
     return kRecordHead + size;
   }
 
   bool take_record(std::uint64_t position, std::uint64_t size) override {
-    const auto head = file_.read(position, std::min(size, kMaxHead), "a record");
-    Bytes fields(path_, position, head.data(), head.size());
+    FilePart head(file_, position, std::min(size, kMaxHead), "a record");
+    Bytes& fields = head.fields;
     const auto opcode = fields.number<std::uint8_t>("an opcode");
     if (opcode == mcap::kMessageIndex) {
       take_message_index(position, size);
@@ -90,9 +89,8 @@ class McapFile final : public ChunkedLog {
       add_message(channel, fields.number<std::uint64_t>("a log time"), position);
     }
     if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
-      const auto record = file_.read(position, size, "a record");
-      Bytes bytes(path_, position, record.data(), record.size());
-      parse_record(bytes);
+      FilePart record(file_, position, size, "a record");
+      parse_record(record.fields);
     }
     if (opcode == mcap::kAttachment || opcode == mcap::kMetadata || opcode >= 0x80) {
       others_.push_back(position);
@@ -103,15 +101,14 @@ class McapFile final : public ChunkedLog {
   }
 
   void take_header(std::uint64_t position, std::uint64_t size) {
-    const auto record = file_.read(position, size, "a header");
-    Bytes fields(path_, position, record.data(), record.size());
-    fields.skip(kRecordHead, "a record");
-    profile_ = fields.string("a profile");
+    FilePart record(file_, position, size, "a header");
+    record.fields.skip(kRecordHead, "a record");
+    profile_ = record.fields.string("a profile");
   }
 
   void take_chunk(std::uint64_t position, std::uint64_t size) {
-    const auto head = file_.read(position, std::min(size, kMaxHead), "a chunk");
-    Bytes fields(path_, position, head.data(), head.size());
+    FilePart head(file_, position, std::min(size, kMaxHead), "a chunk");
+    Bytes& fields = head.fields;
     Chunk chunk;
     fields.skip(kRecordHead + 16, "the times of a chunk");
     chunk.uncompressed_size = fields.number<std::uint64_t>("the size of a chunk");
@@ -123,8 +120,8 @@ class McapFile final : public ChunkedLog {
   }
 
   void take_message_index(std::uint64_t position, std::uint64_t size) {
-    const auto record = file_.read(position, size, "a message index");
-    Bytes fields(path_, position, record.data(), record.size());
+    FilePart record(file_, position, size, "a message index");
+    Bytes& fields = record.fields;
     fields.skip(kRecordHead, "a record");
     const auto channel = fields.number<std::uint16_t>("a channel id");
     Bytes pairs =

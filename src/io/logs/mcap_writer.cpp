@@ -124,7 +124,7 @@ void McapWriter::finish_chunk() {
   index_.clear();
 }
 
-void McapWriter::copy_record(RawFile& source, std::uint64_t position, std::uint64_t size,
+void McapWriter::copy_record(ByteReader& source, std::uint64_t position, std::uint64_t size,
                              std::optional<mcap::Opcode> index_opcode, const std::string& index) {
   finish_chunk();
   if (index_opcode) {
@@ -134,7 +134,7 @@ void McapWriter::copy_record(RawFile& source, std::uint64_t position, std::uint6
   constexpr std::uint64_t kPart = std::uint64_t{1} << 20;  // bytes
   for (std::uint64_t done = 0; done < size; done += kPart) {
     const auto part =
-        source.read(position + done, std::min(kPart, size - done), "a part of a record");
+        source.read_at(position + done, std::min(kPart, size - done), "a part of a record");
     append(std::string(part.begin(), part.end()));
   }
 }

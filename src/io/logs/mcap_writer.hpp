@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "../byte_reader.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/points.hpp"
 #include "log_file.hpp"
-#include "raw_file.hpp"
 
 namespace dynains {
 
@@ -64,7 +64,7 @@ class McapWriter {
   }
   /// Copies a record that belongs to no channel. `index` is what its entry in the summary has
   /// behind its place; without `index_opcode`, it has none.
-  void copy_record(RawFile& source, std::uint64_t position, std::uint64_t size,
+  void copy_record(ByteReader& source, std::uint64_t position, std::uint64_t size,
                    std::optional<mcap::Opcode> index_opcode, const std::string& index);
   void commit();
 

@@ -12,6 +12,12 @@
 
 namespace dynains {
 
+/// std_msgs/Header.
+struct MessageHeader {
+  double time = 0.0;  ///< s
+  std::string frame;
+};
+
 /// Reads the fields of a message of ROS 1, or of ROS 2 by CDR with its alignment.
 class MessageReader {
  public:
@@ -33,6 +39,8 @@ class MessageReader {
 
   bool is_ros1() const { return encoding_ == MessageEncoding::kRos1; }
   std::size_t remaining() const { return bytes_.remaining(); }
+  /// Bytes from the begin of the message.
+  std::size_t position() const { return bytes_.position(); }
 
   template <class Number>
   Number number(const char* purpose) {
@@ -57,6 +65,21 @@ class MessageReader {
     const std::uint8_t* const result = bytes_.here();
     bytes_.skip(size, purpose);
     return result;
+  }
+
+  /// Names of frames in old bags begin with a slash, which is left out.
+  std::string frame(const char* purpose) {
+    std::string name = string(purpose);
+    if (!name.empty() && name.front() == '/') name.erase(0, 1);
+    return name;
+  }
+  MessageHeader header() {
+    if (is_ros1()) number<std::uint32_t>("a sequence number");
+    // ROS 1 has an unsigned and ROS 2 a signed number of seconds.
+    const double seconds = is_ros1() ? static_cast<double>(number<std::uint32_t>("seconds"))
+                                     : static_cast<double>(number<std::int32_t>("seconds"));
+    const double part = 1e-9 * static_cast<double>(number<std::uint32_t>("nanoseconds"));
+    return {seconds + part, frame("a frame id")};
   }
 
   [[noreturn]] void fail(const std::string& what) const {

@@ -18,13 +18,17 @@ std::optional<Scalar> scalar_of(std::uint8_t datatype) {
 
 PointCloud2::PointCloud2(MessageReader& in) {
   height_ = in.number<std::uint32_t>("a height");
+  places_.height = in.position() - sizeof(height_);
   width_ = in.number<std::uint32_t>("a width");
   read_fields(in);
+  places_.fields_end = in.position();
   const bool is_big_endian = in.number<std::uint8_t>("is_bigendian") != 0;
   for (Field& field : fields_) field.is_big_endian = is_big_endian;
   point_step_ = in.number<std::uint32_t>("a point step");
   row_step_ = in.number<std::uint32_t>("a row step");
   const std::uint32_t bytes = in.length(1, "data");
+  places_.data = in.position();
+  places_.data_end = places_.data + bytes;
   data_ = in.take(bytes, "data");
   if (size() == 0) return;
   check_fields(in);
@@ -42,9 +46,9 @@ PointColumns PointCloud2::columns() const {
 
 void PointCloud2::read_fields(MessageReader& in) {
   // Each has 13 bytes or more: length of the name, offset, datatype, count.
-  const std::uint32_t count = in.length(13, "fields");
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::string name = in.string("a field name");
+  field_names_.resize(in.length(13, "fields"));
+  for (std::string& name : field_names_) {
+    name = in.string("a field name");
     const auto offset = in.number<std::uint32_t>("a field offset");
     const auto datatype = in.number<std::uint8_t>("a field datatype");
     in.number<std::uint32_t>("a field count");

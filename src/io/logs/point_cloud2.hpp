@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "../points/point_sink.hpp"
 #include "../scalar.hpp"
@@ -35,13 +37,21 @@ class PointCloud2 {
   std::size_t size() const { return static_cast<std::size_t>(height_) * width_; }
   std::uint32_t width() const { return width_; }
   std::uint32_t point_step() const { return static_cast<std::uint32_t>(point_step_); }
-  /// The points of all rows.
-  const std::uint8_t* data() const { return data_; }
   /// Point i < size().
   const std::uint8_t* point(std::size_t i) const {
     return data_ + i / width_ * row_step_ + i % width_ * point_step_;
   }
   PointColumns columns() const;
+
+  /// Bytes from the begin of the message.
+  struct Places {
+    std::size_t height = 0;  ///< the width and the number of fields follow
+    std::size_t fields_end = 0;
+    std::size_t data = 0, data_end = 0;  ///< steps and the size of the data lie before them
+  };
+  const Places& places() const { return places_; }
+  /// Of all fields, in their order.
+  const std::vector<std::string>& field_names() const { return field_names_; }
 
   /// By its name.
   const Field& field(Role role) const { return fields_[static_cast<std::size_t>(role)]; }
@@ -57,6 +67,8 @@ class PointCloud2 {
   std::uint64_t point_step_ = 0;  // bytes
   std::uint64_t row_step_ = 0;    // bytes
   const std::uint8_t* data_ = nullptr;
+  std::vector<std::string> field_names_;
+  Places places_;
 };
 
 }  // namespace dynains

@@ -76,9 +76,8 @@ class RosBag final : public ChunkedLog {
     std::uint64_t size = 0;
     for (const char* const purpose : {"the length of a header", "the length of data"}) {
       if (file_.size() - position - size < sizeof(std::uint32_t)) return std::nullopt;
-      const auto bytes = file_.read(position + size, sizeof(std::uint32_t), purpose);
-      Bytes length(path_, position + size, bytes.data(), bytes.size());
-      size += sizeof(std::uint32_t) + length.number<std::uint32_t>(purpose);
+      FilePart length(file_, position + size, sizeof(std::uint32_t), purpose);
+      size += sizeof(std::uint32_t) + length.fields.number<std::uint32_t>(purpose);
       if (size > file_.size() - position) return std::nullopt;
     }
     return size;
@@ -86,8 +85,8 @@ class RosBag final : public ChunkedLog {
 
   bool take_record(std::uint64_t position, std::uint64_t size) override {
     // The data of a chunk are not read here.
-    const auto bytes = file_.read(position, std::min(size, kMaxHead), "a record");
-    Bytes rest(path_, position, bytes.data(), bytes.size());
+    FilePart head(file_, position, std::min(size, kMaxHead), "a record");
+    Bytes& rest = head.fields;
     const Bytes header = next_header(rest);
     const auto opcode = number_in<std::uint8_t>(header, "op");
     if (opcode == bag::kIndexData) {
@@ -103,9 +102,8 @@ class RosBag final : public ChunkedLog {
       add_message(number_in<std::uint32_t>(header, "conn"), read_time(time), position);
     }
     if (opcode == bag::kConnection) {
-      const auto record = file_.read(position, size, "a connection");
-      Bytes connection(path_, position, record.data(), record.size());
-      parse_record(connection);
+      FilePart record(file_, position, size, "a connection");
+      parse_record(record.fields);
     }
     return true;
   }
@@ -130,8 +128,8 @@ class RosBag final : public ChunkedLog {
   }
 
   void take_index(std::uint64_t position, std::uint64_t size) {
-    const auto record = file_.read(position, size, "an index");
-    Bytes rest(path_, position, record.data(), record.size());
+    FilePart record(file_, position, size, "an index");
+    Bytes& rest = record.fields;
     const Bytes header = next_header(rest);
     if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
     const auto connection = number_in<std::uint32_t>(header, "conn");

@@ -10,33 +10,6 @@
 namespace dynains {
 namespace {
 
-struct Header {
-  double time = 0.0;  // s
-  std::string frame;
-};
-
-double read_stamp(MessageReader& in) {
-  // ROS 1 has an unsigned and ROS 2 a signed number of seconds.
-  const double seconds = in.is_ros1() ? static_cast<double>(in.number<std::uint32_t>("seconds"))
-                                      : static_cast<double>(in.number<std::int32_t>("seconds"));
-  return seconds + 1e-9 * static_cast<double>(in.number<std::uint32_t>("nanoseconds"));
-}
-
-/// Names of frames in old bags begin with a slash.
-std::string read_frame(MessageReader& in, const char* purpose) {
-  std::string frame = in.string(purpose);
-  if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
-  return frame;
-}
-
-Header read_header(MessageReader& in) {
-  Header header;
-  if (in.is_ros1()) in.number<std::uint32_t>("a sequence number");
-  header.time = read_stamp(in);
-  header.frame = read_frame(in, "a frame id");
-  return header;
-}
-
 /// Position and quaternion, as in geometry_msgs/Pose and geometry_msgs/Transform.
 Pose read_pose(MessageReader& in) {
   Eigen::Vector3d position;
@@ -49,13 +22,9 @@ Pose read_pose(MessageReader& in) {
 }
 
 StampedPose read_transform(MessageReader& in) {
-  const Header header = read_header(in);
-  std::string child = read_frame(in, "a child frame id");
+  const MessageHeader header = in.header();
+  std::string child = in.frame("a child frame id");
   return {header.time, header.frame, std::move(child), read_pose(in)};
-}
-
-std::uint16_t ring_of(double value) {
-  return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
 }
 
 void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns) {
@@ -77,7 +46,7 @@ void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
       xyzi[k] = field.is_there ? static_cast<float>(field.value(point)) : 0.0F;
     }
     const PointCloud2::Field &ring = cloud.field(Role::kRing), &time = cloud.field(Role::kTime);
-    if (ring.is_there) scan.ring[i] = ring_of(ring.value(point));
+    if (ring.is_there) scan.ring[i] = ring_number(ring.value(point));
     if (time.is_there) scan.time[i] = time.value(point);
     if (sensor.is_there) scan.sensor[i] = sensor_number(sensor.value(point));
   }
@@ -91,24 +60,8 @@ PointColumns livox_columns() {
   return columns;
 }
 
-struct LivoxCloud {
-  std::uint8_t lidar = 0;
-  std::uint32_t points = 0;
-};
-
-/// The part of a CustomMsg behind its header: the number of points is checked against its size.
-LivoxCloud read_livox_cloud(MessageReader& in) {
-  LivoxCloud cloud;
-  in.number<std::uint64_t>("a time base");
-  in.number<std::uint32_t>("a number of points");
-  cloud.lidar = in.number<std::uint8_t>("a lidar id");
-  in.take(3, "reserved bytes");
-  cloud.points = in.length(kLivoxPoint, "points");
-  return cloud;
-}
-
 void read_livox(MessageReader& in, RecordedScan& scan) {
-  const auto [lidar, points] = read_livox_cloud(in);
+  const auto [lidar, points] = read_livox_head(in);
   scan.sensor.assign(points, lidar);
   resize(scan, points, livox_columns());
   for (std::uint32_t i = 0; i < points; ++i) {
@@ -127,6 +80,16 @@ bool is_livox(const std::string& type) {
 }
 
 }  // namespace
+
+LivoxHead read_livox_head(MessageReader& in) {
+  LivoxHead head;
+  in.number<std::uint64_t>("a time base");
+  in.number<std::uint32_t>("a number of points");
+  head.lidar = in.number<std::uint8_t>("a lidar id");
+  in.take(3, "reserved bytes");
+  head.points = in.length(kLivoxPoint, "points");
+  return head;
+}
 
 bool is_cloud_type(const std::string& type) {
   return type == "sensor_msgs/PointCloud2" || is_livox(type);
@@ -153,9 +116,9 @@ bool is_pose_type(const std::string& type) {
 
 CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& message) {
   MessageReader in(message);
-  const Header header = read_header(in);
+  const MessageHeader header = in.header();
   if (is_livox(type)) {
-    return {header.time, header.frame, read_livox_cloud(in).points, livox_columns()};
+    return {header.time, header.frame, read_livox_head(in).points, livox_columns()};
   }
   const PointCloud2 cloud(in);
   return {header.time, header.frame, cloud.size(), cloud.columns()};
@@ -163,14 +126,14 @@ CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& messag
 
 void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan) {
   MessageReader in(message);
-  read_header(in);
+  in.header();
   is_livox(type) ? read_livox(in, scan) : read_point_cloud2(in, scan);
 }
 
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
                                              const SerialisedMessage& message) {
   MessageReader in(message);
-  read_header(in);
+  in.header();
   if (is_livox(type)) in.fail("expected a field \"label\", which CustomMsg cannot have");
   const PointCloud2 cloud(in);
   const PointCloud2::Field& label_field = cloud.field(Role::kLabel);
@@ -187,12 +150,12 @@ std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
 Concatenation read_concatenation(const SerialisedMessage& message) {
   MessageReader in(message);
   Concatenation result;
-  result.time = read_header(in).time;
+  result.time = in.header().time;
   in.take(2, "a success and a strategy");
   in.take(in.length(1, "a configuration"), "a configuration");
   result.parts.resize(in.length(25, "sources"));  // bytes of the smallest one
   for (Concatenation::Part& part : result.parts) {
-    part.frame = read_header(in).frame;
+    part.frame = in.header().frame;
     in.string("a topic");
     in.number<std::uint8_t>("a status");
     part.begin = in.number<std::uint32_t>("a begin");
@@ -210,9 +173,9 @@ std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMes
   } else if (type == "geometry_msgs/TransformStamped") {
     poses.push_back(read_transform(in));
   } else {
-    const Header header = read_header(in);
+    const MessageHeader header = in.header();
     std::string child;
-    if (type == "nav_msgs/Odometry") child = read_frame(in, "a child frame id");
+    if (type == "nav_msgs/Odometry") child = in.frame("a child frame id");
     poses.push_back({header.time, header.frame, std::move(child), read_pose(in)});
   }
   return poses;

@@ -10,10 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
+#include "../input_file.hpp"
 #include "log_file.hpp"
 #include "message_writer.hpp"
-#include "raw_file.hpp"
 
 namespace dynains {
 namespace {
@@ -63,9 +64,9 @@ void refuse_journal(const std::filesystem::path& path) {
 /// Whether the file has fewer bytes than the pages that its header counts.
 bool is_shorter_than_announced(const std::filesystem::path& path) {
   constexpr std::uint64_t kHeader = 100;  // bytes
-  RawFile file(path);
+  ByteReader file(path);
   if (file.size() < kHeader) return false;
-  const auto header = file.read(0, kHeader, "a header");
+  const auto header = file.read_at(0, kHeader, "a header");
   const auto big_endian = [&](std::size_t at, std::size_t size) {
     std::uint64_t value = 0;
     for (std::size_t i = at; i < at + size; ++i) value = value << 8U | header[i];
@@ -110,7 +111,7 @@ class SqliteBag final : public LogFile {
     const bool is_cut_off = is_shorter_than_announced(path);
     refuse_journal(path);
     database_ = open_database(path);
-    limit(RawFile(path).size());
+    limit(size_of_file(path));
     // Lets SQLite read a database that is shorter than its header says. Nothing is written.
     step(prepare("PRAGMA writable_schema = ON").get());
     const auto columns = columns_of("messages");

@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <string_view>
-#include <system_error>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../logs/raw_file.hpp"
+#include "../input_file.hpp"
+#include "../scalar.hpp"
 #include "../text.hpp"
 #include "dynains/errors.hpp"
+#include "point_sink.hpp"
 
 namespace dynains {
 namespace {
@@ -20,16 +21,9 @@ constexpr BinLayout kOthers[] = {{3, false}, {5, false}, {6, false}, {8, false}}
 /// Column `column` of point `point`; the bytes of both lie in `bytes`.
 double value_at(const std::vector<std::uint8_t>& bytes, const BinLayout& layout, std::size_t point,
                 std::size_t column) {
-  const std::uint8_t* const at =
-      bytes.data() + point * point_size(layout) + column * value_size(layout);
-  if (layout.is_double) {
-    double value = 0.0;
-    std::memcpy(&value, at, sizeof(value));
-    return value;
-  }
-  float value = 0.0F;
-  std::memcpy(&value, at, sizeof(value));
-  return static_cast<double>(value);
+  const std::size_t at = point * point_size(layout) + column * value_size(layout);
+  return load_scalar(layout.is_double ? Scalar::kDouble : Scalar::kFloat,
+                     reinterpret_cast<const char*>(bytes.data()) + at, false);
 }
 
 /// Ratio of points whose coordinates, and the next column of mixed ones, are as those of a sensor,
@@ -130,9 +124,7 @@ std::string to_text(const BinLayout& layout) {
 }
 
 std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayout& layout) {
-  std::error_code error;
-  const std::uint64_t bytes = std::filesystem::file_size(file, error);
-  if (error) fail(file, "cannot be read: " + error.message());
+  const std::uint64_t bytes = size_of_file(file);
   if (bytes % point_size(layout) == 0) return bytes / point_size(layout);
   fail(file, "truncated at byte " + std::to_string(bytes) + ": expected a multiple of " +
                  std::to_string(point_size(layout)) + " bytes (" + to_text(layout) + ")");
@@ -141,25 +133,22 @@ std::uint64_t count_bin_points(const std::filesystem::path& file, const BinLayou
 void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
                      std::vector<float>& xyzi, std::vector<std::uint16_t>* ring) {
   const std::uint64_t count = count_bin_points(file, layout);
-  const auto bytes = RawFile(file).read(0, count * point_size(layout), "points");
+  const auto bytes = ByteReader(file).read_at(0, count * point_size(layout), "points");
   const auto columns = std::min<std::size_t>(4, static_cast<std::size_t>(layout.columns));
   xyzi.assign(4 * static_cast<std::size_t>(count), 0.0F);
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t column = 0; column < columns; ++column) {
       xyzi[4 * i + column] = static_cast<float>(value_at(bytes, layout, i, column));
     }
-    if (ring == nullptr) continue;
-    const double value = value_at(bytes, layout, i, columns);
-    ring->push_back(value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value)
-                                                     : std::uint16_t{0});
+    if (ring != nullptr) ring->push_back(ring_number(value_at(bytes, layout, i, columns)));
   }
 }
 
 void check_bin_content(const std::filesystem::path& file) {
   const BinLayout usual;
-  RawFile raw(file);
+  ByteReader raw(file);
   // A multiple of the size of every point.
-  const auto bytes = raw.read(0, std::min<std::uint64_t>(raw.size(), 240 * 1024), "points");
+  const auto bytes = raw.read_at(0, std::min<std::uint64_t>(raw.size(), 240 * 1024), "points");
   if (bytes.size() < 100 * point_size(usual)) return;
   if (plausible_share(bytes, usual) < 0.9) {
     const std::string text = "does not hold float32 x y z intensity, but ";

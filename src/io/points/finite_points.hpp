@@ -1,6 +1,7 @@
 // Measured points of a scan.
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
 
@@ -9,6 +10,20 @@
 
 namespace dynains {
 
+/// Whether a beam has a return (x y z): finite, and not at the origin.
+inline bool is_measured(const float* p) {
+  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]) &&
+         (p[0] != 0.0F || p[1] != 0.0F || p[2] != 0.0F);
+}
+
+/// Calls `change(p)` with the position of each point of a scan, to change it in place.
+template <class Change>
+void for_each_position(RecordedScan& scan, Change&& change) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    change(Eigen::Map<Eigen::Vector3f>(scan.xyzi.data() + 4 * i));
+  }
+}
+
 /// Copies every `step`-th point (m, sensor frame) of a scan, but leaves out points that are not
 /// finite or lie at the origin.
 inline PointBuffer finite_points(const RecordedScan& scan, std::size_t step = 1) {
@@ -16,9 +31,7 @@ inline PointBuffer finite_points(const RecordedScan& scan, std::size_t step = 1)
   for (auto* const axis : {&points.x, &points.y, &points.z}) axis->reserve(scan.size() / step + 1);
   for (std::size_t i = 0; i < scan.size(); i += step) {
     const float* p = scan.xyzi.data() + 4 * i;
-    const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
-    if (!finite || (p[0] == 0.0F && p[1] == 0.0F && p[2] == 0.0F)) continue;
-    points.push_back(p[0], p[1], p[2]);
+    if (is_measured(p)) points.push_back(p[0], p[1], p[2]);
   }
   return points;
 }

@@ -4,6 +4,7 @@
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
+#include "../input_file.hpp"
 #include "../text.hpp"
 #include "bin_layout.hpp"
 #include "dynains/io/atomic_file.hpp"
@@ -43,9 +44,7 @@ void read_scan(const fs::path& file, std::vector<float>& xyzi) {
 }
 
 std::vector<std::uint32_t> read_labels(const fs::path& file, std::size_t count) {
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(file, error);
-  if (error) fail(file, "cannot be read: " + error.message());
+  const std::uint64_t size = size_of_file(file);
   if (size != count * sizeof(std::uint32_t)) {
     fail(file, "has " + std::to_string(size) + " bytes, expected " +
                    std::to_string(count * sizeof(std::uint32_t)) + " (uint32 for each of " +

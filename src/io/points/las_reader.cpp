@@ -6,7 +6,6 @@
 
 #include "../failure.hpp"
 #include "../logs/bytes.hpp"
-#include "../logs/raw_file.hpp"
 #include "las_format.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
@@ -31,11 +30,10 @@ struct LasHeader {
   std::vector<LasColumn> columns;
 };
 
-std::uint64_t read_count(RawFile& file, std::uint8_t minor, std::uint32_t legacy_count) {
+std::uint64_t read_count(ByteReader& file, std::uint8_t minor, std::uint32_t legacy_count) {
   if (minor < 4) return legacy_count;
-  const auto bytes = file.read(las::kSizes.before_count, 8, "the number of points");
-  return Bytes(file.path(), las::kSizes.before_count, bytes.data(), bytes.size())
-      .number<std::uint64_t>("the number of points");
+  return FilePart(file, las::kSizes.before_count, 8, "the number of points")
+      .fields.number<std::uint64_t>("the number of points");
 }
 
 void add_column(PointSink& sink, LasHeader& header, LasColumn column) {
@@ -81,11 +79,11 @@ void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
   }
 }
 
-void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
+void read_vlrs(ByteReader& file, PointSink& sink, LasHeader& header) {
   std::uint64_t position = header.vlr_begin;
   for (std::uint32_t i = 0; i < header.vlr_count; ++i) {
-    const auto head = file.read(position, las::kSizes.record_header, "a variable length record");
-    Bytes fields(file.path(), position, head.data(), head.size());
+    FilePart head(file, position, las::kSizes.record_header, "a variable length record");
+    Bytes& fields = head.fields;
     fields.skip(2, "reserved bytes");
     const auto* const text = reinterpret_cast<const char*>(fields.here());
     const std::string user(text, std::find(text, text + 16, '\0'));
@@ -94,19 +92,18 @@ void read_vlrs(RawFile& file, PointSink& sink, LasHeader& header) {
     const auto size = fields.number<std::uint16_t>("the size of a record");
     position += las::kSizes.record_header;
     if (user == las::kMarks.spec_user && record == las::kMarks.extra_bytes_record) {
-      const auto content = file.read(position, size, "a variable length record");
-      add_extra_columns(sink, header, Bytes(file.path(), position, content.data(), content.size()));
+      const FilePart content(file, position, size, "a variable length record");
+      add_extra_columns(sink, header, content.fields);
     }
     position += size;
   }
 }
 
-LasHeader read_header(RawFile& file, PointSink& sink) {
-  const auto head = file.read(0, std::min<std::uint64_t>(file.size(), las::kSizes.header_1_2),
-                              "the header of LAS");
-  Bytes fields(file.path(), 0, head.data(), head.size());
-  if (head.size() < las::kMarks.magic.size() ||
-      !std::equal(las::kMarks.magic.begin(), las::kMarks.magic.end(), head.begin())) {
+LasHeader read_header(ByteReader& file, PointSink& sink) {
+  FilePart head(file, 0, std::min<std::uint64_t>(file.size(), las::kSizes.header_1_2),
+                "the header of LAS");
+  Bytes& fields = head.fields;
+  if (!fields.begins_with(las::kMarks.magic)) {
     fields.fail("expected LASF, the magic bytes of LAS");
   }
   fields.skip(24, "the header of LAS");
@@ -147,7 +144,7 @@ LasHeader read_header(RawFile& file, PointSink& sink) {
   return header;
 }
 
-void check_size(const RawFile& file, const LasHeader& header) {
+void check_size(const ByteReader& file, const LasHeader& header) {
   const std::uint64_t available = file.size() - std::min(file.size(), header.points_begin);
   if (header.point_count <= available / header.point_size) return;
   fail_at_byte(file.path(), header.points_begin,
@@ -160,7 +157,7 @@ void check_size(const RawFile& file, const LasHeader& header) {
 
 std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool with_points) {
   constexpr std::uint64_t kBlock = 1U << 14U;  // points
-  RawFile file(path);
+  ByteReader file(path);
   const LasHeader header = read_header(file, sink);
   check_size(file, header);
   if (!with_points) return header.point_count;
@@ -169,7 +166,7 @@ std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool 
   for (std::uint64_t first = 0; first < header.point_count; first += kBlock) {
     const std::uint64_t count = std::min(kBlock, header.point_count - first);
     const std::uint64_t position = header.points_begin + first * header.point_size;
-    file.read(position, count * header.point_size, "points", block);
+    file.read_at(position, count * header.point_size, "points", block);
     for (std::size_t i = 0; i < count; ++i) {
       const auto* const record =
           reinterpret_cast<const char*>(block.data()) + i * header.point_size;

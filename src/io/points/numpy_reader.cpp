@@ -11,7 +11,6 @@
 
 #include "../failure.hpp"
 #include "../logs/bytes.hpp"
-#include "../logs/raw_file.hpp"
 #include "../scalar.hpp"
 #include "point_readers.hpp"
 #include "point_sink.hpp"
@@ -200,11 +199,7 @@ void read_npy_description(NpyLiteral& literal, NpyArray& array) {
 /// within `size`.
 NpyArray parse_npy_header(Bytes in, std::uint64_t size) {
   const Bytes begin = in;
-  if (in.remaining() < kNpyMagic.size() ||
-      !std::equal(kNpyMagic.begin(), kNpyMagic.end(), in.here(),
-                  [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; })) {
-    in.fail("expected the magic bytes of an array of NumPy");
-  }
+  if (!in.begins_with(kNpyMagic)) in.fail("expected the magic bytes of an array of NumPy");
   in.skip(kNpyMagic.size(), "magic bytes");
   const auto major = in.number<std::uint8_t>("a version");
   in.skip(1, "a version");
@@ -302,17 +297,17 @@ void require_xyz(const std::filesystem::path& path, const PointSink& sink) {
 }  // namespace
 
 std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool with_points) {
-  RawFile raw(path);
+  ByteReader raw(path);
   const std::uint64_t wanted = with_points ? raw.size() : kMaxNpyHeader + 16;
-  const auto bytes = raw.read(0, std::min(raw.size(), wanted), "an array");
-  const Bytes place(raw.path(), 0, bytes.data(), bytes.size());
+  const FilePart content(raw, 0, std::min(raw.size(), wanted), "an array");
+  const Bytes& place = content.fields;
   const NpyArray array = parse_npy_header(place, raw.size());
   const NpyPoints points = points_of_array(place, array, sink);
   require_xyz(path, sink);
   if (!with_points) return points.count;
   sink.resize(static_cast<std::size_t>(points.count));
   for (const NpyColumn& column : points.columns) {
-    store_column(place, column, points.count, bytes.data(), sink);
+    store_column(place, column, points.count, content.bytes.data(), sink);
   }
   return points.count;
 }

@@ -6,6 +6,7 @@
 
 #include "../poses/kitti_files.hpp"
 #include "../text.hpp"
+#include "finite_points.hpp"
 
 namespace dynains {
 namespace {
@@ -13,17 +14,12 @@ namespace {
 constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
 constexpr double kNoGap = 0.125;  // s; scans that are farther apart may be some of all scans
 
-bool has_return(const float* xyz) {
-  const float sum = std::abs(xyz[0]) + std::abs(xyz[1]) + std::abs(xyz[2]);
-  return std::isfinite(sum) && sum > 0.0F;
-}
-
 /// Finite times of the points with a return.
 std::vector<double> times_with_return(const RecordedScan& scan) {
   std::vector<double> times;
   times.reserve(scan.time.size());
   for (std::size_t k = 0; k < scan.time.size(); ++k) {
-    if (std::isfinite(scan.time[k]) && has_return(scan.xyzi.data() + 4 * k)) {
+    if (std::isfinite(scan.time[k]) && is_measured(scan.xyzi.data() + 4 * k)) {
       times.push_back(scan.time[k]);
     }
   }
@@ -54,7 +50,7 @@ std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
   std::vector<DirectedTime> times;
   for (std::size_t k = 0; k < scan.time.size(); ++k) {
     const float* const xyz = scan.xyzi.data() + 4 * k;
-    if (!std::isfinite(scan.time[k]) || !has_return(xyz)) continue;
+    if (!std::isfinite(scan.time[k]) || !is_measured(xyz)) continue;
     times.push_back({std::atan2(xyz[1], xyz[0]), scan.time[k]});
   }
   std::sort(times.begin(), times.end(),

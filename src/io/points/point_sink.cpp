@@ -52,6 +52,10 @@ Role role_of(std::string_view name) {
   return Role::kNone;
 }
 
+std::uint16_t ring_number(double value) {
+  return value >= 0.0 && value <= 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+}
+
 std::uint8_t sensor_number(double value) {
   std::uint8_t number = 0;
   return store_number(value, number) ? number : std::uint8_t{255};

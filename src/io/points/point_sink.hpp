@@ -21,6 +21,8 @@ inline constexpr Role kUsualRoles[] = {Role::kX, Role::kY, Role::kZ, Role::kInte
 /// Meaning of a column with this name; case is ignored.
 Role role_of(std::string_view name);
 
+/// Number of a beam; 0 for a value that is none.
+std::uint16_t ring_number(double value);
 /// Number of a sensor; 255 for a value that is none.
 std::uint8_t sensor_number(double value);
 

@@ -17,14 +17,6 @@ void use_blanks(std::string& line) {
   }
 }
 
-std::vector<std::string_view> tokens_of(std::string_view line) {
-  std::vector<std::string_view> tokens;
-  for (auto token = text::next_token(line); !token.empty(); token = text::next_token(line)) {
-    tokens.push_back(token);
-  }
-  return tokens;
-}
-
 std::string_view without_marks(std::string_view token) {
   while (!token.empty() && (token.front() == '#' || token.front() == '/' || token.front() == '"')) {
     token.remove_prefix(1);
@@ -93,46 +85,29 @@ class XyzColumns {
   std::vector<Role> roles_;
 };
 
-/// Calls `take(tokens, row)` for each line of a point. Returns the number of points.
-template <class Take>
-std::size_t read_lines(ByteReader& reader, XyzColumns& columns, Take&& take) {
+}  // namespace
+
+std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool with_points) {
+  ByteReader reader(path);
+  XyzColumns columns(reader, sink);
   std::string line;
-  std::size_t row = 0;
+  std::size_t count = 0;
   bool is_first = true;
   while (reader.read_line(line)) {
     use_blanks(line);
-    const std::vector<std::string_view> tokens = tokens_of(line);
+    const std::vector<std::string_view> tokens = text::tokens(line);
     if (tokens.empty()) continue;
     const bool may_be_names = is_first && !text::parse_number(tokens.front());
     is_first = false;
     if (may_be_names && columns.take_names(tokens)) continue;
     if (is_comment(line)) continue;
     if (!columns.are_known()) columns.take_default(tokens.size());
-    take(tokens, row++);
+    ++count;
+    if (!with_points) continue;
+    sink.resize(count);
+    columns.store(tokens, count - 1);
   }
   if (!columns.are_known()) reader.fail_on_line("file ends, expected at least one point");
-  return row;
-}
-
-std::size_t count_points(const std::filesystem::path& path, PointSink& sink) {
-  ByteReader reader(path);
-  XyzColumns columns(reader, sink);
-  return read_lines(reader, columns, [](const auto&, std::size_t) {});
-}
-
-}  // namespace
-
-std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool with_points) {
-  PointSink counted;
-  const std::size_t count = count_points(path, with_points ? counted : sink);
-  if (!with_points) return count;
-  ByteReader reader(path);
-  XyzColumns columns(reader, sink);
-  read_lines(reader, columns, [&](const std::vector<std::string_view>& tokens, std::size_t row) {
-    if (row == 0) sink.resize(count);
-    if (row >= count) reader.fail_on_line("expected no more points than before");
-    columns.store(tokens, row);
-  });
   return count;
 }
 

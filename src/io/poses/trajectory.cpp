@@ -35,17 +35,11 @@ struct Columns {
   }
 };
 
-bool is_separated(std::string_view line) {
-  return line.find_first_of(",;") != std::string_view::npos;
-}
-
 /// Cells of a line; empty cells count if commas or semicolons separate them.
 std::vector<std::string> split(std::string_view line) {
   std::vector<std::string> cells;
-  if (!is_separated(line)) {
-    for (auto token = text::next_token(line); !token.empty(); token = text::next_token(line)) {
-      cells.emplace_back(token);
-    }
+  if (line.find_first_of(",;") == std::string_view::npos) {
+    for (const std::string_view token : text::tokens(line)) cells.emplace_back(token);
     return cells;
   }
   for (;;) {
