@@ -1,4 +1,5 @@
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,11 +31,9 @@ enum class PcdEncoding : std::uint8_t { kAscii, kBinary, kCompressed };
 
 struct PcdHeader {
   std::vector<Field> fields;
-  std::uint64_t width = 0;
+  std::optional<std::uint64_t> width, stated_points;
   std::uint64_t height = 1;
   std::uint64_t points = 0;
-  bool has_width = false;
-  bool has_points = false;
   PcdEncoding encoding = PcdEncoding::kAscii;
 
   std::size_t record_bytes() const {
@@ -43,25 +42,6 @@ struct PcdHeader {
     return bytes;
   }
 };
-
-/// Calls `parse(field, token)` for each field; the line must have a token for each.
-template <class Parse>
-void for_each_field(const ByteReader& reader, PcdHeader& header, std::string_view line,
-                    Parse&& parse) {
-  if (header.fields.empty()) reader.fail_on_line("expected FIELDS before this line");
-  for (Field& field : header.fields) {
-    const std::string_view token = text::next_token(line);
-    if (token.empty()) {
-      reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
-                          " values, one for each field");
-    }
-    parse(field, token);
-  }
-  if (!text::next_token(line).empty()) {
-    reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
-                        " values, one for each field");
-  }
-}
 
 Pose parse_viewpoint(const ByteReader& reader, std::string_view line) {
   const std::string expected = "expected VIEWPOINT tx ty tz qw qx qy qz with a rotation";
@@ -100,11 +80,9 @@ Scalar scalar_of(const ByteReader& reader, const Field& field) {
 
 void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& header) {
   if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
-  for (auto name = text::next_token(line); !name.empty(); name = text::next_token(line)) {
+  for (const std::string_view name : text::tokens(line)) {
     if (header.fields.size() == kMaxHeaderItems) reader.fail_on_line("expected fewer fields");
-    Field field;
-    field.name = name;
-    header.fields.push_back(std::move(field));
+    header.fields.emplace_back().name = name;
   }
   if (header.fields.empty()) reader.fail_on_line("expected the names of the fields");
 }
@@ -130,31 +108,37 @@ void parse_count(const ByteReader& reader, Field& field, std::string_view token)
   field.count = static_cast<std::size_t>(count);
 }
 
+/// The line of a property that each field has.
+void parse_properties(const ByteReader& reader, std::string_view keyword, std::string_view line,
+                      PcdHeader& header) {
+  if (header.fields.empty()) reader.fail_on_line("expected FIELDS before this line");
+  const std::vector<std::string_view> tokens = text::tokens(line);
+  if (tokens.size() != header.fields.size()) {
+    reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
+                        " values, one for each field");
+  }
+  const auto parse = keyword == "SIZE" ? parse_size : keyword == "TYPE" ? parse_type : parse_count;
+  for (std::size_t i = 0; i < tokens.size(); ++i) parse(reader, header.fields[i], tokens[i]);
+}
+
 void parse_header_line(const ByteReader& reader, std::string_view keyword, std::string_view line,
                        PcdHeader& header, PointSink& sink) {
+  const auto number = [&](const char* what) {
+    return reader.whole_number(text::next_token(line), what);
+  };
   if (keyword == "VERSION") return;
   if (keyword == "FIELDS" || keyword == "COLUMNS") {
     parse_fields(reader, line, header);
-  } else if (keyword == "SIZE") {
-    for_each_field(reader, header, line,
-                   [&](Field& field, std::string_view token) { parse_size(reader, field, token); });
-  } else if (keyword == "TYPE") {
-    for_each_field(reader, header, line,
-                   [&](Field& field, std::string_view token) { parse_type(reader, field, token); });
-  } else if (keyword == "COUNT") {
-    for_each_field(reader, header, line, [&](Field& field, std::string_view token) {
-      parse_count(reader, field, token);
-    });
+  } else if (keyword == "SIZE" || keyword == "TYPE" || keyword == "COUNT") {
+    parse_properties(reader, keyword, line, header);
   } else if (keyword == "WIDTH") {
-    header.width = reader.whole_number(text::next_token(line), "WIDTH as a whole number");
-    header.has_width = true;
+    header.width = number("WIDTH as a whole number");
   } else if (keyword == "HEIGHT") {
-    header.height = reader.whole_number(text::next_token(line), "HEIGHT as a whole number");
+    header.height = number("HEIGHT as a whole number");
   } else if (keyword == "VIEWPOINT") {
     sink.file().viewpoint = parse_viewpoint(reader, line);
   } else if (keyword == "POINTS") {
-    header.points = reader.whole_number(text::next_token(line), "POINTS as a whole number");
-    header.has_points = true;
+    header.stated_points = number("POINTS as a whole number");
   } else {
     reader.fail_on_line("expected a line of a PCD header (FIELDS, SIZE, ... DATA), found \"" +
                         std::string(keyword.substr(0, 40)) + "\"");
@@ -170,17 +154,16 @@ void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink)
     if (role != Role::kNone && sink.claim(role)) field.role = role;
   }
   if (const auto name = sink.missing()) reader.fail_on_line("expected a field " + *name);
-  if (!header.has_width && !header.has_points) {
+  if (!header.width && !header.stated_points) {
     reader.fail_on_line("expected WIDTH or POINTS before DATA");
   }
-  const std::uint64_t product = header.width * header.height;
+  const std::uint64_t width = header.width.value_or(0), product = width * header.height;
   // Some programs write POINTS alone, others also WIDTH 0.
-  if (header.has_points && product == 0) return;
-  const bool overflows = header.height != 0 && product / header.height != header.width;
-  if (overflows || (header.has_points && header.points != product)) {
+  header.points = product == 0 ? header.stated_points.value_or(0) : product;
+  const bool overflows = header.height != 0 && product / header.height != width;
+  if (overflows || header.stated_points.value_or(header.points) != header.points) {
     reader.fail_on_line("expected POINTS to be WIDTH * HEIGHT");
   }
-  header.points = product;
 }
 
 PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
@@ -201,7 +184,12 @@ PcdHeader parse_pcd_header(ByteReader& reader, PointSink& sink) {
   reader.fail_on_line("expected a line DATA before this line");
 }
 
-[[noreturn]] void fail_value(const Field& field, std::size_t i, const ByteReader& reader) {
+/// Stores the value of point `i` that lies at `bytes`.
+void store(const ByteReader& reader, const Field& field, std::size_t i, const char* bytes,
+           PointSink& sink) {
+  if (field.role == Role::kNone || sink.set(i, field.role, load_scalar(field.type, bytes, false))) {
+    return;
+  }
   reader.fail_here("expected a whole number that " + field.name + " can have, at point " +
                    std::to_string(i));
 }
@@ -270,10 +258,7 @@ void read_binary(ByteReader& reader, const PcdHeader& header, PointSink& sink) {
     reader.read(record.data(), record.size(), "a point");
     const char* bytes = record.data();
     for (const Field& field : header.fields) {
-      if (field.role != Role::kNone &&
-          !sink.set(i, field.role, load_scalar(field.type, bytes, false))) {
-        fail_value(field, i, reader);
-      }
+      store(reader, field, i, bytes, sink);
       bytes += field.bytes();
     }
   }
@@ -298,9 +283,7 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
   const char* column = plain.data();
   for (const Field& field : header.fields) {
     for (std::size_t i = 0; field.role != Role::kNone && i < count; ++i) {
-      if (!sink.set(i, field.role, load_scalar(field.type, column + i * field.size, false))) {
-        fail_value(field, i, reader);
-      }
+      store(reader, field, i, column + i * field.size, sink);
     }
     column += field.bytes() * count;
   }

@@ -1,6 +1,9 @@
+#include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "../byte_reader.hpp"
@@ -33,8 +36,14 @@ struct Element {
 enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
 
 struct PlyHeader {
-  PlyEncoding encoding = PlyEncoding::kAscii;
-  std::vector<Element> elements;  ///< up to and with the vertices
+  std::optional<PlyEncoding> stated_encoding;
+  std::vector<Element> elements;  ///< up to and with the vertices: later ones are not read
+
+  PlyEncoding encoding() const { return *stated_encoding; }
+  bool has_vertices() const {
+    return std::any_of(elements.begin(), elements.end(),
+                       [](const Element& element) { return element.is_vertex; });
+  }
 };
 
 Scalar parse_type(const ByteReader& reader, std::string_view name) {
@@ -79,31 +88,14 @@ Property parse_property(const ByteReader& reader, std::string_view line) {
   return property;
 }
 
-/// The lines of a header so far.
-struct HeaderProgress {
-  PlyHeader header;
-  bool has_format = false;
-  bool has_vertices = false;
-  bool past_vertices = false;  ///< later elements are not read
-};
-
-void parse_element(const ByteReader& reader, std::string_view line, HeaderProgress& progress) {
-  progress.past_vertices = progress.has_vertices;
+Element parse_element(const ByteReader& reader, std::string_view line) {
   Element element;
   element.is_vertex = text::next_token(line) == "vertex";
   element.count = reader.whole_number(text::next_token(line), kElementCount);
-  progress.has_vertices = progress.has_vertices || element.is_vertex;
-  if (!progress.past_vertices) progress.header.elements.push_back(std::move(element));
+  return element;
 }
 
-void add_property(const ByteReader& reader, std::string_view line, HeaderProgress& progress,
-                  PointSink& sink) {
-  if (progress.header.elements.empty()) {
-    reader.fail_on_line("expected an element before a property");
-  }
-  Property property = parse_property(reader, line);
-  if (progress.past_vertices) return;
-  Element& element = progress.header.elements.back();
+void add_property(Property property, Element& element, PointSink& sink) {
   if (element.is_vertex && !property.is_list) {
     const Role role = role_of(property.name);
     if (role != Role::kNone && sink.claim(role)) property.role = role;
@@ -116,33 +108,36 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   if (!reader.read_line(line) || line != "ply") {
     reader.fail_on_line("expected \"ply\" as first line");
   }
-  HeaderProgress progress;
-  std::size_t items = 0;
-  for (;;) {
+  PlyHeader header;
+  bool is_past = false;  // the vertices
+  for (std::size_t items = 0;; ++items) {
     if (!reader.read_line(line)) reader.fail_on_line("file ends, expected end_header");
-    if (++items > kMaxHeaderItems) reader.fail_on_line("expected end_header before this line");
+    if (items == kMaxHeaderItems) reader.fail_on_line("expected end_header before this line");
     std::string_view rest = line;
     const std::string_view keyword = text::next_token(rest);
     if (keyword == "end_header") break;
     if (keyword == "comment" || keyword == "obj_info") continue;
     if (keyword == "format") {
-      progress.header.encoding = parse_format(reader, rest);
-      progress.has_format = true;
+      header.stated_encoding = parse_format(reader, rest);
     } else if (keyword == "element") {
-      parse_element(reader, rest, progress);
+      Element element = parse_element(reader, rest);
+      is_past = header.has_vertices();
+      if (!is_past) header.elements.push_back(std::move(element));
     } else if (keyword == "property") {
-      add_property(reader, rest, progress, sink);
+      if (header.elements.empty()) reader.fail_on_line("expected an element before a property");
+      Property property = parse_property(reader, rest);
+      if (!is_past) add_property(std::move(property), header.elements.back(), sink);
     } else {
       reader.fail_on_line("expected element, property, comment or end_header, found \"" +
                           std::string(keyword.substr(0, 40)) + "\"");
     }
   }
-  if (!progress.has_format) reader.fail_on_line("expected a line \"format\" before end_header");
-  if (!progress.has_vertices) reader.fail_on_line("expected \"element vertex\" before end_header");
+  if (!header.stated_encoding) reader.fail_on_line("expected a line \"format\" before end_header");
+  if (!header.has_vertices()) reader.fail_on_line("expected \"element vertex\" before end_header");
   if (const auto name = sink.missing()) {
     reader.fail_on_line("expected a number property " + *name + " of the vertices");
   }
-  return std::move(progress.header);
+  return header;
 }
 
 /// Reads one element. Calls `store(property, value)` for values that are not in lists.
@@ -237,8 +232,8 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   for (const Property& property : vertex.properties) {
     if (property.is_list) reader.fail_here("expected vertices without the list " + property.name);
   }
-  const bool is_text = header.encoding == PlyEncoding::kAscii;
-  const std::uint64_t size = is_text ? 0 : min_bytes(vertex, header.encoding);
+  const bool is_text = header.encoding() == PlyEncoding::kAscii;
+  const std::uint64_t size = is_text ? 0 : min_bytes(vertex, header.encoding());
   copy_records(reader, static_cast<std::size_t>(size), "a vertex", keep, target);
 }
 
@@ -246,9 +241,9 @@ std::uint64_t read_ply(const std::filesystem::path& path, PointSink& sink, bool 
   ByteReader reader(path);
   const PlyHeader header = parse_ply_header(reader, sink);
   for (const Element& element : header.elements) {
-    reader.check_room(element.count, "elements", min_bytes(element, header.encoding),
-                      header.encoding == PlyEncoding::kAscii);
-    if (with_points) read_element(reader, element, header.encoding, sink);
+    reader.check_room(element.count, "elements", min_bytes(element, header.encoding()),
+                      header.encoding() == PlyEncoding::kAscii);
+    if (with_points) read_element(reader, element, header.encoding(), sink);
   }
   return header.elements.back().count;
 }
