@@ -15,28 +15,36 @@
 namespace dynains {
 namespace {
 
-using Topics = std::vector<LogTopic>;
+using Topics = std::vector<std::uint32_t>;  // of a log, by index
 
 bool is_readable(const LogTopic& topic) {
   return topic.encoding != MessageEncoding::kOther && topic.message_count > 0;
 }
 
-/// "/points (sensor_msgs/PointCloud2, 120 messages), ..."
-std::string list(const Topics& topics) {
-  std::string text;
-  for (const LogTopic& topic : topics) {
-    text += (text.empty() ? "" : ", ") + topic.name + " (" + topic.type + ", " +
-            std::to_string(topic.message_count) + " messages)";
+/// The readable topics of some types.
+template <class Condition>
+Topics filter(const LogFile& log, Condition&& is_wanted) {
+  Topics result;
+  for (std::uint32_t i = 0; i < log.topics().size(); ++i) {
+    if (is_readable(log.topics()[i]) && is_wanted(log.topics()[i].type)) result.push_back(i);
   }
-  return text.empty() ? "no topic" : text;
+  return result;
 }
 
-template <class Condition>
-Topics filter(const Topics& topics, Condition&& is_wanted) {
-  Topics result;
-  std::copy_if(topics.begin(), topics.end(), std::back_inserter(result),
-               [&](const LogTopic& topic) { return is_readable(topic) && is_wanted(topic.type); });
-  return result;
+/// "/points (sensor_msgs/PointCloud2, 120 messages), ..."
+std::string text_of(const LogTopic& topic) {
+  return topic.name + " (" + topic.type + ", " + std::to_string(topic.message_count) + " messages)";
+}
+std::string list(const LogFile& log) {
+  std::string text;
+  for (const LogTopic& topic : log.topics()) text += (text.empty() ? "" : ", ") + text_of(topic);
+  return text.empty() ? "no topic" : text;
+}
+std::string list(const LogFile& log, const Topics& topics) {
+  std::string text;
+  for (const std::uint32_t i : topics)
+    text += (text.empty() ? "" : ", ") + text_of(log.topics()[i]);
+  return text;
 }
 
 /// Whether messages hold what a sensor sent, as a driver records it.
@@ -48,17 +56,11 @@ bool has_packets(const std::string& type) {
   });
 }
 
-bool has(const Topics& topics, const std::string& name) {
-  return std::any_of(topics.begin(), topics.end(),
-                     [&](const LogTopic& topic) { return topic.name == name; });
-}
-
-/// Index of the topic `chosen` by name and type.
-std::uint32_t index_of(const Topics& topics, const LogTopic& chosen) {
-  const auto found = std::find_if(topics.begin(), topics.end(), [&](const LogTopic& topic) {
-    return topic.name == chosen.name && topic.type == chosen.type;
-  });
-  return static_cast<std::uint32_t>(found - topics.begin());
+std::optional<std::uint32_t> find(const LogFile& log, const Topics& topics,
+                                  const std::string& name) {
+  const auto found = std::find_if(topics.begin(), topics.end(),
+                                  [&](std::uint32_t i) { return log.topics()[i].name == name; });
+  return found == topics.end() ? std::nullopt : std::optional(*found);
 }
 
 /// "/robot1" of "/robot1/tf", "" of "/tf".
@@ -75,11 +77,6 @@ TransformSource source_of(const std::string& topic, const std::string& cloud_top
   const bool holds_clouds = name.empty() || cloud_topic.rfind(name + '/', 0) == 0;
   const bool is_chosen = !pose_topic.empty() && name == namespace_of(pose_topic);
   return {name, is_chosen ? std::string::npos : holds_clouds ? name.size() + 1 : 0};
-}
-
-LogTopic named(const Topics& topics, const std::string& name) {
-  return *std::find_if(topics.begin(), topics.end(),
-                       [&](const LogTopic& topic) { return topic.name == name; });
 }
 
 }  // namespace
@@ -113,28 +110,29 @@ LogScans::LogScans(const std::filesystem::path& path, const RecordingOptions& op
 }
 
 void LogScans::choose_cloud_topics() {
-  const Topics clouds = filter(log_->topics(), is_cloud_type);
+  const Topics clouds = filter(*log_, is_cloud_type);
   if (clouds.empty()) {
     std::string end = log_->early_end() ? "; " + *log_->early_end() : "";
-    if (!filter(log_->topics(), has_packets).empty()) {
+    if (!filter(*log_, has_packets).empty()) {
       end +=
           "; packets of a sensor are not read: play the log through the ROS driver of the "
           "sensor, and record sensor_msgs/PointCloud2";
     }
-    fail(log_->path(), "expected a topic with clouds; found " + list(log_->topics()) + end);
+    fail(log_->path(), "expected a topic with clouds; found " + list(*log_) + end);
   }
   std::vector<std::string> wanted = text::names_in(options_.cloud_topic);
   if (wanted.empty() && clouds.size() > 1) {
-    fail(log_->path(), "expected one topic with clouds, or --cloud-topic; found " + list(clouds));
+    fail(log_->path(),
+         "expected one topic with clouds, or --cloud-topic; found " + list(*log_, clouds));
   }
-  if (wanted.empty()) wanted.push_back(clouds.front().name);
+  if (wanted.empty()) wanted.push_back(log_->topics()[clouds.front()].name);
   for (const std::string& name : wanted) {
-    if (!has(clouds, name)) {
-      fail(log_->path(), "expected clouds on topic " + name + "; found " + list(clouds));
+    const auto topic = find(*log_, clouds, name);
+    if (!topic) {
+      fail(log_->path(), "expected clouds on topic " + name + "; found " + list(*log_, clouds));
     }
-    const std::uint32_t topic = index_of(log_->topics(), named(clouds, name));
-    if (has_topic(topic)) fail(log_->path(), "expected each topic once, found " + name + " twice");
-    sources_.emplace_back().topic = topic;
+    if (has_topic(*topic)) fail(log_->path(), "expected each topic once, found " + name + " twice");
+    sources_.emplace_back().topic = *topic;
     notes_.push_back("clouds from topic " + name);
   }
 }
@@ -146,32 +144,31 @@ bool LogScans::has_topic(std::uint32_t topic) const {
 
 /// A topic of poses comes before transforms.
 void LogScans::choose_pose_topic() {
-  const Topics poses = filter(log_->topics(), is_pose_type);
-  const Topics direct = filter(log_->topics(), [](const auto& type) {
-    return is_pose_type(type) && !is_transform_type(type);
-  });
+  const Topics poses = filter(*log_, is_pose_type);
+  const Topics direct = filter(
+      *log_, [](const auto& type) { return is_pose_type(type) && !is_transform_type(type); });
   const std::string& wanted = options_.pose_topic;
   if (poses.empty()) {
     fail(log_->path(), "expected a topic with poses, or a file of poses by --poses; found " +
-                           list(log_->topics()) +
-                           "; without poses, dynains run --odometry estimates them");
+                           list(*log_) + "; without poses, dynains run --odometry estimates them");
   }
-  if (!wanted.empty() && !has(poses, wanted)) {
-    fail(log_->path(), "expected poses on topic " + wanted + "; found " + list(poses));
+  std::optional<std::uint32_t> chosen = find(*log_, poses, wanted);
+  if (!wanted.empty() && !chosen) {
+    fail(log_->path(), "expected poses on topic " + wanted + "; found " + list(*log_, poses));
   }
-  const bool by_frame = wanted.empty() && !options_.pose_frame.empty();
-  if (wanted.empty() && !by_frame && direct.size() > 1) {
-    fail(log_->path(), "expected one topic with poses, or --pose-topic; found " + list(poses));
+  if (wanted.empty() && options_.pose_frame.empty()) {
+    if (direct.size() > 1) {
+      fail(log_->path(),
+           "expected one topic with poses, or --pose-topic; found " + list(*log_, poses));
+    }
+    if (!direct.empty()) chosen = direct.front();
   }
-  LogTopic chosen;
-  if (!wanted.empty()) chosen = named(poses, wanted);
-  if (wanted.empty() && !by_frame && !direct.empty()) chosen = direct.front();
-  if (chosen.name.empty() || is_transform_type(chosen.type)) {
+  if (!chosen || is_transform_type(log_->topics()[*chosen].type)) {
     notes_.push_back("poses from transforms (tf)");
     return;
   }
-  pose_topic_ = index_of(log_->topics(), chosen);
-  notes_.push_back("poses from topic " + chosen.name);
+  pose_topic_ = *chosen;
+  notes_.push_back("poses from topic " + log_->topics()[*chosen].name);
 }
 
 void LogScans::read_log() {

@@ -78,19 +78,23 @@ Pose pose_of(const RecordingContents& r, const PoseConvention& convention,
                   apply(convention, r.trajectory.poses[match.after], order), match.share));
 }
 
-fs::path find_poses(const RecordingContents& r) {
-  if (!r.options.poses.empty()) return r.options.poses;
-  std::vector<fs::path> folders = {r.folder};
-  if (r.scan_folder != r.folder) {
-    folders.push_back(r.scan_folder);
-  } else {
-    folders.push_back(fs::absolute(r.folder).lexically_normal() / "..");
-  }
+/// The first existing file of `names` in `folders`; empty if there is none.
+template <class Names>
+fs::path first_file(const std::vector<fs::path>& folders, const Names& names) {
   for (const fs::path& folder : folders) {
-    for (const char* name : kPoseFiles) {
-      if (is_file(folder / name)) return (folder / name).lexically_normal();
+    for (const char* name : names) {
+      if (is_file(folder / name)) return folder / name;
     }
   }
+  return {};
+}
+
+fs::path find_poses(const RecordingContents& r) {
+  if (!r.options.poses.empty()) return r.options.poses;
+  const fs::path other =
+      r.scan_folder == r.folder ? fs::absolute(r.folder).lexically_normal() / ".." : r.scan_folder;
+  const fs::path file = first_file({r.folder, other}, kPoseFiles);
+  if (!file.empty()) return file.lexically_normal();
   fail(r.folder / "poses.txt",
        "not found: expected a pose for each scan, there (12 numbers a row, or time x y z qx qy qz "
        "qw), in VIEWPOINT of .pcd scans, or in a file given by --poses; without poses, dynains run "
@@ -117,12 +121,7 @@ fs::path find_beside(const RecordingContents& r, const fs::path& poses_file,
                      const std::vector<const char*>& names) {
   std::vector<fs::path> folders = {r.folder};
   if (!poses_file.empty()) folders.push_back(poses_file.parent_path());
-  for (const fs::path& folder : folders) {
-    for (const char* name : names) {
-      if (is_file(folder / name)) return folder / name;
-    }
-  }
-  return {};
+  return first_file(folders, names);
 }
 
 /// Reads calib.txt, which poses of a camera need.
