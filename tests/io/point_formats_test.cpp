@@ -214,7 +214,7 @@ TEST_CASE("Text: malformed lines are refused with their number") {
   check("x,y,z,label\n1,2,3,-1\n", ":2: expected a number that the column can have, found \"-1\"");
 }
 
-TEST_CASE("Scans of a recording can be LAS, NumPy or text; poses.csv is none") {
+TEST_CASE("Scans of a recording can be LAS, NumPy or text, and poses.csv is none") {
   const TemporaryFolder folder;
   const LasParts parts{4, 6, "", 33, 1};
   const auto write = [&](const std::string& kind, const std::string& content) {

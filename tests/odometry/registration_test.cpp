@@ -106,7 +106,7 @@ TEST_CASE("The best of several guesses counts") {
   CHECK(error_from({Pose::Identity(), motion({3.0, 0.0, 0.0}, 0.0)}) < 0.005);
 }
 
-TEST_CASE("An upright pole is a surface; a ring of the sensor is none") {
+TEST_CASE("An upright pole is a surface, a ring of the sensor is none") {
   SurfaceGrid map;
   for (int i = 0; i < 20; ++i) map.insert({5.0, 0.0, 0.125 * i});
   for (int i = 0; i < 20; ++i) map.insert({0.0, 20.0 + 0.125 * i, 0.0});
