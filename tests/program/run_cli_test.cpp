@@ -11,6 +11,7 @@
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
+#include "run/verdict_files.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
@@ -139,6 +140,51 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   const std::string timing = read_text(fixture.out + "/timing.csv");
   CHECK_THAT(timing, StartsWith("scan,points,ingest_ms,"));
   CHECK(count_lines(timing) == 13);
+}
+
+TEST_CASE("Labels, causes and moving points of a run are those of the remover, scan by scan") {
+  const Fixture fixture;
+  const Eigen::Vector3d place(100.0, 200.0, 300.0);
+  write_tiny_sequence(fixture.seq, 12, place);
+  const std::string preset = GENERATE("default", "paper");  // scans are read again, or wait
+  succeed(fixture.run({"--preset", preset, "--passes", "1", "--write-online", "--start", "1"}));
+  std::vector<Eigen::Vector3d> moving;
+  const auto check = [&](const ScanVerdict& verdict, const std::string& folder) {
+    const std::size_t i = verdict.scan + 1;
+    std::vector<std::uint32_t> expected;
+    for (std::size_t k = 0; k < verdict.labels.size(); ++k) {
+      expected.push_back(run::mos_label(verdict.labels[k], verdict.instances[k]));
+      if (folder == "online" || verdict.labels[k] != PointLabel::kDynamic) continue;
+      const std::vector<float> scan = tiny_scan(i);
+      moving.push_back(place + Eigen::Map<const Eigen::Vector3f>(&scan[4 * k]).cast<double>());
+    }
+    const std::string file = fixture.out + '/' + folder + '/' + scan_name(i) + ".label";
+    CHECK(read_labels(file, expected.size()) == expected);
+    if (folder == "online") return;
+    std::string causes;
+    for (const Cause cause : verdict.causes) causes += static_cast<char>(cause);
+    CHECK(read_text(fixture.out + "/causes/" + scan_name(i) + ".cause") == causes);
+  };
+  DynaInsRemover remover(preset == "paper" ? DynaInsRemover::Config::paper()
+                                           : DynaInsRemover::Config());
+  Pose pose = Pose::Identity();
+  pose.translation() = place;
+  for (std::size_t i = 1; i < 12; ++i) {
+    const std::vector<float> scan = tiny_scan(i);
+    const RawPoints<float> points{scan.data(), scan.size() / 4, 4};
+    const FrameResult frame = remover.push(points, pose, 0.1 * static_cast<double>(i));
+    check(frame.newest(), "online");
+    if (frame.finished) check(*frame.finished, "labels");
+  }
+  remover.flush([&](const ScanVerdict& verdict) { check(verdict, "labels"); });
+  CHECK_FALSE(fs::exists(fixture.out + "/labels/000000.label"));
+  const PointFile written = read_points(fixture.out + "/dynamic_points.ply");
+  REQUIRE(written.positions.size() == moving.size());
+  CHECK(moving.size() > 100);
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    CHECK_FALSE((written.positions[k] - moving[k]).norm() > 1e-4);
+  }
+  CHECK(written.intensity.front() == 0.5F);
 }
 
 TEST_CASE("The flag --objects writes a row of tracks.csv for each object of each scan") {
