@@ -6,7 +6,6 @@
 # tests/long.sh coverage            lines of include/ and src/ that the tests reach
 # tests/long.sh disturbed STARTS    every state after a power cut, every error of every call, and so
 #                                   many random starts of the program
-# tests/long.sh kills COUNT         runs that are killed and repeated
 # tests/long.sh endurance SCANS     scans in one remover
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -62,16 +61,12 @@ case "${1:-}" in
     TMPDIR=/dev/shm DYNAINS_PROGRAM_STARTS=$2 \
       build/tests/reliability/test_disturbed "the program is started at random"
     ;;
-  kills)
-    build build
-    bash tests/reliability/faults.sh build/bin/dynains "$2"
-    ;;
   endurance)
     build build
     DYNAINS_ENDURANCE_SCANS=$2 build/tests/reliability/test_reliability "[endurance]"
     ;;
   *)
-    sed -n '4,11s/^# //p' "$0" >&2
+    sed -n '4,10s/^# //p' "$0" >&2
     exit 2
     ;;
 esac

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# faults.sh PROGRAM [KILLS]: `dynains run` with kill -9, with a full disk, without write permission
-# and with input that vanishes. The results are absent or complete, the earlier ones stay until then,
-# and one more run gives the bytes of an undisturbed one.
+# faults.sh PROGRAM: `dynains run` on disks that are full, read-only or locked, by the system itself;
+# crash_test.cpp and fault_test.cpp have the moments of a kill and the errors of each call. The results
+# are absent or complete, the earlier ones stay until then, and one more run gives the bytes of an
+# undisturbed one.
 set -euo pipefail
 program=$1
-kills=${2:-12}
 work=$(mktemp -d)
 disk=$work/disk
 cleanup() {
@@ -21,66 +21,12 @@ same() {
   diff <(results "$1") <(results "$2") &&
     while read -r file; do cmp "$1/$file" "$2/$file" || return 1; done < <(results "$2")
 }
-# Returns when the folder is there, or after ten seconds.
-await() { local i; for ((i = 0; i < 2000; ++i)); do [[ -d $1 ]] && break; sleep 0.005; done; }
-complete() { grep -q '"complete": true' "$1/report.json" 2>/dev/null; }
 
 seq=$work/seq
 "${program}_simulate" "$seq" --scans 8 --sensor vlp16 --quiet
-begin=$(date +%s%N)
 "$program" run "$seq" --out "$work/expected" --quiet
-span=$((($(date +%s%N) - begin) / 1000))  # us
-RANDOM=7
-
-# kill_run [FLAG...]: a run that is killed at a random moment, or while its results are put in place.
-kill_run() {
-  "$program" run "$seq" --out "$work/out" --quiet "$@" &
-  pid=$!
-  delay=$(((RANDOM * 32768 + RANDOM) % span))
-  sleep "$((delay / 1000000)).$(printf %06d $((delay % 1000000)))"
-  if ((RANDOM % 2)); then
-    while [[ -d $work/out.partial ]] && ! complete "$work/out.partial"; do :; done
-  fi
-  kill -9 "$pid" 2>/dev/null || true
-  wait "$pid" 2>/dev/null || true
-}
-# as NAME: whether the results are those of $work/NAME.
-as() { complete "$work/out" && same "$work/$1" "$work/out"; }
 
 "$program" run "$seq" --out "$work/earlier" --end 4 --write-online --quiet
-echo "--- kill -9, $kills times within $((span / 1000)) ms: the earlier results or the new ones, whole"
-left=0
-for ((i = 0; i < kills || (left == 0 && i < kills + 20); ++i)); do
-  rm -rf "$work"/out*
-  # Every second run replaces earlier results.
-  ((i % 2)) || cp -r "$work/earlier" "$work/out"
-  kill_run --force
-  [[ ! -d $work/out.partial ]] || left=$((left + 1))
-  [[ ! -d $work/out ]] || as earlier >/dev/null || as expected || fail "kill $i left a part"
-  [[ -d $work/out ]] || ((i % 2)) || fail "kill $i: the earlier results are lost"
-  "$program" run "$seq" --out "$work/out" --force --quiet || fail "kill $i: again"
-  as expected || fail "kill $i: other bytes"
-  [[ ! -d $work/out/online && $(ls "$work") != *partial* ]] || fail "kill $i: leftovers"
-done
-echo "$left of them left a folder"
-((left > 0)) || fail "no kill hit a run"
-
-echo "--- input that vanishes in the middle"
-cp -r "$seq" "$work/vanishing"
-"$program" run "$work/vanishing" --out "$work/vanished" --quiet 2>"$work/err" &
-pid=$!
-await "$work/vanished.partial/labels"
-rm -rf "$work/vanishing/velodyne"
-code=0
-wait "$pid" || code=$?
-if [[ $code == 0 ]]; then
-  echo "it was read before it vanished"
-else
-  [[ $code == 1 ]] || fail "vanishing input: exit code $code"
-  grep -q 'dynains: error: .*bin' "$work/err" || fail "vanishing input: $(cat "$work/err")"
-  [[ $(ls "$work") != *vanished* ]] || fail "vanishing input: leftovers"
-fi
-
 echo "--- a result that cannot be removed"
 if chattr +i "$work/earlier/report.json" 2>/dev/null; then
   cp -r "$work/earlier" "$work/locked"
