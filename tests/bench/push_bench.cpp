@@ -1,18 +1,11 @@
-// Cost of a push by stage, on one thread: milliseconds, and instructions where the system lets a
-// program count its own. `bench_core [PUSHES [BEAMS]]`, for each preset.
+// Cost of a push by stage, on one thread, in milliseconds. `bench_core [PUSHES [BEAMS]]`, for each
+// preset.
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
-
-#if defined(__linux__)
-#include <linux/perf_event.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-#endif
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/median.hpp"
@@ -34,34 +27,6 @@ std::vector<test::Scan> street_scans(int beams) {
   return test::drive(scene, 16, 10.0, 0.0, beams);
 }
 
-// Counts the instructions of this program, in user space.
-class InstructionCounter {
- public:
-  InstructionCounter() {
-#if defined(__linux__)
-    perf_event_attr what = {};
-    what.size = sizeof(what);
-    what.type = PERF_TYPE_HARDWARE;
-    what.config = PERF_COUNT_HW_INSTRUCTIONS;
-    what.exclude_kernel = 1;
-    what.exclude_hv = 1;
-    file_ = static_cast<int>(syscall(SYS_perf_event_open, &what, 0, -1, -1, 0));
-#endif
-  }
-
-  // Instructions so far; 0 if the system does not count them.
-  std::uint64_t count() {
-    std::uint64_t result = 0;
-#if defined(__linux__)
-    if (file_ < 0 || read(file_, &result, sizeof(result)) != sizeof(result)) return 0;
-#endif
-    return result;
-  }
-
- private:
-  [[maybe_unused]] int file_ = -1;  // open until the program ends
-};
-
 using Rows = std::vector<std::pair<std::string, double>>;
 
 // A function that is not inlined, so that callgrind can count it alone (.ci/cost).
@@ -74,19 +39,13 @@ using Rows = std::vector<std::pair<std::string, double>>;
 // growing.
 Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>& scans,
              std::size_t pushes) {
-  InstructionCounter instructions;
   DynaInsRemover remover(config);
   std::vector<StageTimes> times;
-  std::vector<double> millions;
   for (std::size_t i = 0; i < pushes; ++i) {
     const std::size_t at = i % (2 * scans.size());
     const test::Scan& scan = scans[at < scans.size() ? at : 2 * scans.size() - 1 - at];
-    const std::uint64_t before = instructions.count();
     const StageTimes spent = counted_push(remover, scan, 0.1 * static_cast<double>(i));
-    const std::uint64_t after = instructions.count();
-    if (i < pushes / 2) continue;
-    times.push_back(spent);
-    millions.push_back(1e-6 * static_cast<double>(after - before));
+    if (i >= pushes / 2) times.push_back(spent);
   }
   Rows rows;
   const auto add = [&](const std::string& name, auto&& value) {
@@ -107,8 +66,6 @@ Rows measure(const DynaInsRemover::Config& config, const std::vector<test::Scan>
     });
   }
   add("all stages, ms", [](const StageTimes& spent) { return spent.total(); });
-  const double counted = median(std::move(millions));
-  if (counted > 0.0) rows.emplace_back("instructions, millions", counted);
   rows.emplace_back("points", static_cast<double>(scans.front().points.size()));
   rows.emplace_back("map, MB", 1e-6 * static_cast<double>(remover.map().memory_bytes()));
   return rows;
