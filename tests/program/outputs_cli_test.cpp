@@ -103,20 +103,3 @@ TEST_CASE("A file among scans would be a scan, and is refused as an output") {
   check_refused(experiment("/times.csv"), 1, "/times.csv: would be a part of " + flat);
   succeed(experiment("/times.tsv"));
 }
-
-TEST_CASE("A map of results is theirs by its content, not by its path") {
-  const Given given;
-  const std::string map = given.at("mine.ply");
-  const auto run = [&] {
-    return start({"run", given.seq, "--out", given.out, "--map", map, "-q", "--force"});
-  };
-  succeed(run());
-  const std::string written = read_text(map);
-  succeed(run());
-  CHECK(read_text(map) == written);
-  std::string own = written;
-  own.back() = static_cast<char>(own.back() ^ 1);
-  write_text(map, own);
-  check_refused(run(), 1, map + ": exists, and is no file of the results");
-  CHECK(read_text(map) == own);
-}

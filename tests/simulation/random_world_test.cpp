@@ -19,7 +19,7 @@ double elevation_of(const SimulatedScan& scan, std::size_t i) {
   return std::atan2(static_cast<double>(p[2]), std::hypot(p[0], p[1])) * 57.29578;
 }
 
-TEST_CASE("a seed is a world, and worlds differ in scene, sensor and carrier") {
+TEST_CASE("worlds differ in scene, sensor and carrier") {
   std::set<Scene> scenes;
   std::set<Sensor> sensors;
   std::set<Gait> gaits;
@@ -35,13 +35,6 @@ TEST_CASE("a seed is a world, and worlds differ in scene, sensor and carrier") {
   CHECK(scenes.size() == 15);  // all but the one in which nothing moves
   CHECK(sensors.size() == value_names(Sensor()).size());
   CHECK(gaits.size() == 3);
-
-  Config config = random_world(3);
-  config.scans = 2;
-  const SimulatedScan a = Simulator(config).scan(1), b = Simulator(config).scan(1);
-  CHECK(a.xyzi == b.xyzi);
-  CHECK(a.labels == b.labels);
-  CHECK(a.labels.size() > 1000);
 }
 
 TEST_CASE("static things have lasting instance ids if asked, and are otherwise the same") {
