@@ -40,7 +40,9 @@ class Odometry::Loop {
   Loop(const Config& config, const DynaInsRemover::Config& remover)
       : config_(config),
         remover_config_(remover),
-        scan_(config.nearest, config.farthest, remover.sensors) {}
+        scan_(config.nearest, config.farthest, remover.sensors) {
+    remover_config_.evidence.pose_tolerance = 0.0;  // the scan is registered here
+  }
 
   OdometryResult push(const detail::CloudView& cloud, Span<const double> offsets, double time,
                       std::optional<Pose> T_odometry_sensor) {
@@ -119,14 +121,33 @@ class Odometry::Loop {
     return fit >= kMin || fit >= kMin * scan_.expected_fit();
   }
 
-  /// Whether the scan fits worse beside its place, along the direction that surfaces determine
-  /// worst. Their scatter seems to determine a motion along smooth walls, where any fits as well.
+  /// Sum of the weights of the points on planes. Poles do not count: columns of beams on smooth
+  /// walls look like them, and move with the sensor.
+  double weight_on_planes(const Pose& T_map_scan) const {
+    constexpr double kScale = 0.1;  // m, of the weights
+    double sum = 0.0;
+    for (const Eigen::Vector3d& p : scan_.keypoints()) {
+      const Eigen::Vector3d place = T_map_scan * p;
+      const CellSurface* const surface = map_.find(kCellLevels - 1, place);
+      if (surface == nullptr || surface->direction_count != 1) continue;
+      sum += detail::robust_weight(surface->squared_distance(place), kScale);
+    }
+    return sum;
+  }
+
+  /// Whether the scan fits clearly worse on both sides of its place, along the direction that
+  /// surfaces determine worst. Their scatter seems to determine a motion along smooth walls, where
+  /// any fits nearly as well.
   bool is_held(const Registration& found) const {
-    constexpr double kAside = 0.1;    // m, scale of the weights: tilts of planes change less
-    constexpr double kAsGood = 0.98;  // ratio of fits
-    Pose T_beside = found.T_a_b;
-    T_beside.translation() += kAside * found.uncertain[0];
-    return fit_of(map_, scan_.keypoints(), T_beside) < kAsGood * found.score;
+    constexpr double kAside = 2.0;    // m, more than patterns of beams on surfaces are wide
+    constexpr double kAsGood = 0.75;  // ratio
+    const double least = kAsGood * weight_on_planes(found.T_a_b);
+    const auto is_worse_at = [&](double way) {
+      Pose T_beside = found.T_a_b;
+      T_beside.translation() += way * found.uncertain[0];
+      return weight_on_planes(T_beside) < least;
+    };
+    return is_worse_at(kAside) && is_worse_at(-kAside);
   }
 
   /// De-skewing needs the motion, which needs de-skewed points: both in turn.

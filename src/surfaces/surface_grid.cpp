@@ -40,33 +40,15 @@ void SurfaceGrid::forget_beyond(const Eigen::Vector3d& centre, double reach) {
 const CellSurface* SurfaceGrid::find(std::size_t level, const Eigen::Vector3d& point) const {
   const std::size_t coarsest = with_clutter_ ? 0 : level;
   for (std::size_t k = level + 1; k-- > coarsest;) {
-    const CellSurface* const surface = fitted(k, point);
-    if (surface == nullptr || surface->direction_count == 0) continue;
-    const bool is_pole = surface->direction_count == 2 && surface->is_upright;
-    if (with_clutter_ && is_pole && is_on_wall(k, surface->mean)) continue;
-    return surface;
+    const Level& at = levels_[k];
+    const std::uint32_t number = at.numbers.find(voxel_at(point, scale_ * kCellEdges[k]));
+    if (number == kNoIndex) continue;
+    const Cell& cell = at.cells[number];
+    if (!cell.is_fitted) cell.surface = surface_of(cell);
+    cell.is_fitted = true;
+    if (cell.surface.direction_count > 0) return &cell.surface;
   }
   return nullptr;
-}
-
-const CellSurface* SurfaceGrid::fitted(std::size_t level, const Eigen::Vector3d& point) const {
-  const Level& at = levels_[level];
-  const std::uint32_t number = at.numbers.find(voxel_at(point, scale_ * kCellEdges[level]));
-  if (number == kNoIndex) return nullptr;
-  const Cell& cell = at.cells[number];
-  if (!cell.is_fitted) cell.surface = surface_of(cell);
-  cell.is_fitted = true;
-  return &cell.surface;
-}
-
-bool SurfaceGrid::is_on_wall(std::size_t level, const Eigen::Vector3d& point) const {
-  constexpr double kNear = 0.1;  // m
-  for (std::size_t k = level; k-- > 0;) {
-    const CellSurface* const around = fitted(k, point);
-    if (around == nullptr || around->direction_count == 2 || !around->is_upright) continue;
-    if (std::abs(around->directions[0].dot(point - around->mean)) < scale_ * kNear) return true;
-  }
-  return false;
 }
 
 CellSurface SurfaceGrid::surface_of(const Cell& cell) const {

@@ -72,8 +72,8 @@ class Odometry {
  public:
   using Config = OdometryConfig;
 
-  /// `remover`: parameters of the removal, and the sensors, whose points register together. Throws
-  /// ConfigError.
+  /// `remover`: parameters of the removal, whose own registration is left out, and the sensors,
+  /// whose points register together. Throws ConfigError.
   explicit Odometry(const Config& config = {},
                     const DynaInsRemover::Config& remover = DynaInsRemover::Config::odometry());
   Odometry(Odometry&&) noexcept;

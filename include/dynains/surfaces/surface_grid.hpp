@@ -87,11 +87,6 @@ class SurfaceGrid {
   };
 
   CellSurface surface_of(const Cell& cell) const;
-  const CellSurface* fitted(std::size_t level, const Eigen::Vector3d& point) const;
-  /// Whether an upright line through `point` in a cell of this level is a part of a wall in a
-  /// larger cell: on a wall that beams graze, the columns of a sensor lie farther apart than a cell
-  /// is wide, and move with it.
-  bool is_on_wall(std::size_t level, const Eigen::Vector3d& point) const;
 
   bool with_clutter_;
   double scale_;
