@@ -28,7 +28,7 @@ bool is_straight(const Street& street, double s) {
 Builder::Builder(const Config& config, const TerrainConfig& ground, std::vector<Street> streets)
     : config_(config),
       random_(seed_of(config)),
-      world_{Terrain(ground, std::move(streets), random_.fork(1)), {}, Traffic(random_.fork(2))} {}
+      world_{Terrain(ground, std::move(streets), random_.fork(1)), Traffic(random_.fork(2))} {}
 
 int Builder::count(double usual) const {
   return lively() ? static_cast<int>(std::lround(usual * config_.traffic)) : 0;
@@ -43,10 +43,13 @@ bool Builder::place(const Model& model, const Footprint& footprint, double margi
 
 void Builder::place_anyway(const Model& model, const Waypoint& at) {
   const double z = world_.terrain.height(at.position);
-  world_.statics.add({rotation_z(at.heading),
-                      {static_cast<float>(at.position.x), static_cast<float>(at.position.y),
-                       static_cast<float>(z)}},
-                     model);
+  const Rigid T_world_model{rotation_z(at.heading),
+                            {static_cast<float>(at.position.x), static_cast<float>(at.position.y),
+                             static_cast<float>(z)}};
+  for (const Primitive& part : model) {
+    world_.statics.push_back({transformed(T_world_model, part), world_.models});
+  }
+  ++world_.models;
 }
 
 double Builder::clearance(const Footprint& f) const {

@@ -82,7 +82,8 @@ World build_world(const Config& config) {
   };
   traffic.walkers.erase(std::remove_if(traffic.walkers.begin(), traffic.walkers.end(), is_inside),
                         traffic.walkers.end());
-  return {std::move(layout.terrain), std::move(layout.statics), std::move(traffic)};
+  layout.traffic = std::move(traffic);
+  return layout;
 }
 
 }  // namespace dynains::simulation

@@ -372,16 +372,18 @@ class Simulator::Implementation {
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
     const Vec2 centre{moment.T_world_sensor(0, 3), moment.T_world_sensor(1, 3)};
-    world_.statics.visit_near(
-        centre, model_.max_range,
-        [&](const Primitive& primitive, std::uint64_t salt, std::uint32_t model) {
-          // Subtract first: large coordinates must not cost precision.
-          Primitive near = primitive;
-          near.centre = near.centre - origin;
-          const std::uint32_t id = kFirstStatic + model % (kFirstChange - kFirstStatic);
-          renderer_.add(transformed(turn, near), config_.static_instances ? id << 16 : 0,
-                        mix(salt, 1));
-        });
+    for (std::size_t i = 0; i < world_.statics.size(); ++i) {
+      Primitive part = world_.statics[i].primitive;
+      const Vec2 place{static_cast<double>(part.centre.x), static_cast<double>(part.centre.y)};
+      // No primitive reaches farther than 40 m from its middle.
+      if (norm(place - centre) > model_.max_range + 40) continue;
+      // Subtract first: large coordinates must not cost precision.
+      part.centre = part.centre - origin;
+      const std::uint32_t id =
+          kFirstStatic + world_.statics[i].model % (kFirstChange - kFirstStatic);
+      renderer_.add(transformed(turn, part), config_.static_instances ? id << 16 : 0,
+                    mix(std::uint64_t{i}, 1));
+    }
     for (const ObjectPose& pose : moment.objects) {
       const Object& object = world_.traffic.objects[pose.object];
       const bool person = object.kind == Kind::kPedestrian;

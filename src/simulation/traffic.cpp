@@ -4,11 +4,6 @@
 #include <cmath>
 
 namespace dynains::simulation {
-namespace {
-
-constexpr double kActiveRadius = 260.0;  // m around the ego vehicle; objects beyond stand still
-
-}  // namespace
 
 bool Signal::is_red(double time, int stream) const {
   const double turn = (time + phase) / period;

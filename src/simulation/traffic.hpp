@@ -127,13 +127,14 @@ class Traffic {
 
   /// Advances by `dt` seconds.
   void step(double dt);
-  double time() const { return time_; }
 
   EgoPose ego() const;
   /// Everybody within `radius` of `centre`.
   std::vector<ObjectPose> around(Vec2 centre, double radius) const;
 
  private:
+  static constexpr double kActiveRadius = 260;  ///< m, around the sensor; others stand still
+
   struct Body {
     Footprint footprint;
     Vec2 velocity;
