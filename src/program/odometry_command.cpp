@@ -10,8 +10,8 @@
 #include "progress.hpp"
 #include "recording_options.hpp"
 #include "run/output/output_folder.hpp"
+#include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"
-#include "run/remarks/start_check.hpp"
 
 namespace dynains::program {
 namespace {
@@ -33,8 +33,9 @@ void warn_as_run(const Recording& recording, const PoseEstimate& estimate) {
   const ScanRange range = whole_of(recording);
   const StartCheck start = check_start(recording, range, DynaInsRemover::Config(), true);
   for (const std::string& text : start.warnings) print_warning(text);
-  const RunDoubts doubts = find_doubts(recording, range, estimate.timing);
-  for (const std::string& text : sentences(doubts, recording)) print_warning(text);
+  for (const std::string& text : find_doubts(recording, range, estimate.timing).sentences) {
+    print_warning(text);
+  }
 }
 
 void write_poses(const OdometryFlags& flags) {

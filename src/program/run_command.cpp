@@ -72,9 +72,12 @@ void print_alignment(const SessionAlignment& alignment) {
 void print_summary(const RunOutcome& run) {
   print_results(run);
   if (run.alignment) print_alignment(*run.alignment);
-  if (!run.log.empty()) std::cout << "log: " << run.log.string() << std::endl;
-  if (!run.grid.is_null()) print_grid(run.outputs.grid, run.grid);
-  if (!run.page.empty()) std::cout << "page: " << run.page.string() << std::endl;
+  const RunOutputs& outputs = run.outputs;
+  if (!outputs.log.empty()) std::cout << "log: " << outputs.log.string() << std::endl;
+  if (!outputs.grid.empty()) print_grid(outputs.grid, run.report["grid"]);
+  if (outputs.write_page) {
+    std::cout << "page: " << (outputs.folder / kResultNames.page).string() << std::endl;
+  }
 }
 
 /// The recording, with its poses or those of the odometry.
@@ -122,7 +125,7 @@ void run_as_asked(RunFlags& flags) {
   const RunOutcome outcome = run::run(settings, open(flags, estimate), listener);
   progress.reset();
 
-  if (!outcome.complete) {
+  if (outcome.signal != 0) {
     std::cerr << "dynains: interrupted; the results of " << outcome.report["scans"]
               << " scans stay in " << outcome.outputs.folder.string() << " until the next run"
               << std::endl;

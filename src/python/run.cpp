@@ -157,11 +157,11 @@ RunResult run(const py::object& recording, const fs::path& out, const py::kwargs
     const py::gil_scoped_release release;
     outcome = run::run(prepared.arguments.settings, prepared.recording->get(), listener);
   }
-  if (!outcome.complete) raise_signal(outcome);
+  if (outcome.signal != 0) raise_signal(outcome);
   const run::RunOutputs& outputs = outcome.outputs;
   RunResult result{outputs.folder, {}, {}, {}};
   if (!outputs.map.empty()) result.static_map = outputs.folder / outputs.map_name();
-  if (!outcome.page.empty()) result.page = outcome.page;
+  if (outputs.write_page) result.page = outputs.folder / run::kResultNames.page;
   const py::object text = py::module_::import("pathlib")
                               .attr("Path")(outputs.folder / "report.json")
                               .attr("read_bytes")();

@@ -17,10 +17,11 @@
 #include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
-#include "passes.hpp"
 #include "run/output/output_folder.hpp"
+#include "run/remarks/cloud_remarks.hpp"
+#include "run/remarks/odd_scans.hpp"
+#include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"
-#include "run/remarks/start_check.hpp"
 #include "run_plan.hpp"
 #include "run_report.hpp"
 #include "run_sequence.hpp"
@@ -40,11 +41,10 @@ int remover_threads(const RunPlan& plan) {
 }
 
 /// Processes all scans, or those that come before a signal. Returns the times.
-RunTiming process(const RunPlan& plan, const RunListener& listener, const Passes& passes,
-                  RunResults& results) {
+RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& results) {
   const std::size_t total = plan.range.size();
   DynaInsRemover::Config config = plan.settings.config;
-  config.build_map = config.build_map && passes.is_one();
+  config.build_map = config.build_map && !results.has_second_pass();
   config.threads = remover_threads(plan);
   DynaInsRemover remover(config);
   listener.progress(0, total);
@@ -52,16 +52,6 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, const Passes
     listener.progress(done, total);
     return InterruptGuard::signal() == 0;
   });
-}
-
-/// The listener, whose warnings are also added to `warnings`. Both must outlive the result.
-RunListener with_memory(const RunListener& listener, std::vector<std::string>& warnings) {
-  RunListener result = listener;
-  result.warn = [&](const std::string& text) {
-    warnings.push_back(text);
-    listener.warn(text);
-  };
-  return result;
 }
 
 /// Throws IoError if nothing was judged, or nothing is static: the scans are then not what the run
@@ -83,12 +73,12 @@ void check_not_empty(const RunPlan& plan, const RunResults& results) {
 /// Warns if many points, or most of those above the ground, were not judged, if most of the removed
 /// ones are ground, and of odd scans.
 void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTiming& timing,
-                   const RunListener& listener) {
+                   const Warn& warn) {
   const Tally& labels = results.tally();
   const auto warn_above = [&](double share, std::uint64_t part, std::uint64_t whole,
                               const char* text) {
     if (static_cast<double>(part) > share * static_cast<double>(whole))
-      listener.warn(std::to_string(100 * part / whole) + " % of the points " + text);
+      warn(std::to_string(100 * part / whole) + " % of the points " + text);
   };
   // Beams without a return are not judged in any recording; those of a box are.
   const bool has_box = !plan.sequence.options().self_boxes.empty();
@@ -107,7 +97,7 @@ void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTimi
   }
   for (const std::string& text :
        remarks_on_odd_scans(plan.sequence, plan.range.first, counts, false)) {
-    listener.warn(text);
+    warn(text);
   }
 }
 
@@ -154,68 +144,70 @@ bool adds_session(const RunPlan& plan, const OutputFolder& out) {
   return !out.had("/request/session", plan.session.info.name) || !plan.session.is_fulfilled();
 }
 
-/// Writes the log with its clouds cleaned or marked, unless a signal comes.
-void write_log(const fs::path& file, const RunPlan& plan, const PointStore& labels,
-               const RunListener& listener, RunOutcome& outcome) {
+/// Writes the log with its clouds cleaned or marked. False after a signal.
+bool write_log(const fs::path& file, const RunPlan& plan, const PointStore& labels,
+               const Warn& warn) {
   const std::optional<std::size_t> unjudged = write_log(plan, labels, file);
-  outcome.complete = unjudged.has_value();
-  if (!unjudged) return;
-  outcome.log = plan.settings.outputs.log;
-  if (*unjudged == 0) return;
-  listener.warn(outcome.log.string() + ": " + std::to_string(*unjudged) +
-                " clouds have no verdict, for lack of a pose, by their stamps or by --start and "
-                "--end; they keep all points");
+  if (unjudged.value_or(0) > 0) {
+    warn(plan.settings.outputs.log.string() + ": " + std::to_string(*unjudged) +
+         " clouds have no verdict, for lack of a pose, by their stamps or by --start and --end; "
+         "they keep all points");
+  }
+  return unjudged.has_value();
 }
 
-/// Writes the grid, unless a signal comes.
-void write_grid(const OutsideFiles& outside, const RunPlan& plan, const PointStore& labels,
-                const RunListener& listener, RunOutcome& outcome) {
+/// Writes the grid. Returns PlacedGrid::summary(), null after a signal.
+nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& plan,
+                                  const PointStore& labels, const Warn& warn) {
   std::vector<std::size_t> scans(plan.range.size());
   std::iota(scans.begin(), scans.end(), plan.range.first);
-  if (scans.size() == 1) listener.warn(kGridOfOneScan);
+  if (scans.size() == 1) warn(kGridOfOneScan);
   const PlacedGrid made = grid_of_run(
       [&](std::size_t i, const RecordedScan&, std::vector<PointLabel>& of_scan) {
         labels.read(i - plan.range.first, of_scan);
       },
       plan.sequence, scans, plan.settings.outputs.grid_config, false,
       [](std::size_t) { return InterruptGuard::signal() == 0; });
-  outcome.complete = InterruptGuard::signal() == 0;
-  if (!outcome.complete) return;
+  if (InterruptGuard::signal() != 0) return nullptr;
   grid::write_grid(outside.image, outside.grid, made.grid, made.origin);
-  outcome.grid = made.summary();
+  return made.summary();
 }
 
 /// Throws ConfigError if the scans disagree with the poses.
-void check_before(const RunPlan& plan, const RunListener& listener) {
+void check_before(const RunPlan& plan, const Warn& warn) {
   const RunSettings& settings = plan.settings;
   check_ranges(plan.sequence, plan.range, settings.config,
                settings.recording_flags.contains("--point-units"));
   const StartCheck start =
       check_start(plan.sequence, plan.range, settings.config, settings.accept_poses);
-  for (const std::string& text : start.warnings) listener.warn(text);
+  for (const std::string& text : start.warnings) warn(text);
   if (!start.refusal.empty()) {
     throw ConfigError(start.refusal + " See: dynains check " + settings.recording_as_given +
                       "; or run with these poses and clouds by --accept-poses");
   }
 }
 
-/// Where the files are written that appear at the end.
-RunOutputs partial_outputs(const RunPlan& plan, const OutputFolder& out,
-                           const OutsideFiles& outside) {
-  RunOutputs outputs = plan.settings.outputs;
+/// With the places where the files are written that appear at the end.
+RunSettings partial_settings(const RunPlan& plan, const OutputFolder& out,
+                             const OutsideFiles& outside) {
+  RunSettings settings = plan.settings;
+  RunOutputs& outputs = settings.outputs;
   outputs.folder = out.path();
   if (!outputs.map.empty()) {
     outputs.map = outside.map.empty() ? out.path() / outputs.map.filename() : outside.map;
   }
-  return outputs;
+  return settings;
 }
 
 /// Writes the results, from the first scan on, or until a signal comes.
-RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputFolder& out,
+RunOutcome write_results(const RunPlan& plan, const RunListener& listener, OutputFolder& out,
                          OutsideFiles& outside) {
   std::vector<std::string> warnings = plan.sequence.warnings();
-  const RunListener listener = with_memory(caller, warnings);
-  check_before(plan, listener);
+  const Warn warn = [&](const std::string& text) {
+    warnings.push_back(text);
+    listener.warn(text);
+  };
+  check_before(plan, warn);
   RunOutcome outcome;
   outcome.outputs = plan.settings.outputs;
   std::optional<SessionWriter> session;
@@ -226,11 +218,11 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
   }
 
   const InterruptGuard interrupt(listener.second_signal);
-  const RunOutputs outputs = partial_outputs(plan, out, outside);
-  Passes passes(plan, outputs.folder);
+  const RunSettings settings = partial_settings(plan, out, outside);
+  const RunOutputs& outputs = settings.outputs;
   std::optional<Page> page;
   PointStore labels(outputs.folder);  // final ones, for what reads the recording again
-  RunResults results(plan.sequence, plan.range, outputs, &passes);
+  RunResults results(plan.sequence, plan.range, settings);
   if (session) {
     results.add(
         [&](const JudgedScan& judged) {
@@ -240,46 +232,45 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& caller, OutputF
         true);
   }
   if (outputs.write_page) {
-    page.emplace(plan.sequence, plan.range, plan.settings.config.map.map_voxel);
+    page.emplace(plan.sequence, plan.range, settings.config.map.map_voxel);
     results.add([&](const JudgedScan& judged) { page->add(judged); }, true);
   }
   if (!outside.log.empty() || !outside.grid.empty()) {
     results.add([&](const JudgedScan& judged) { labels.add(judged.arrays.labels); });
   }
-  const RunTiming timing = process(plan, listener, passes, results);
-  passes.finish(results,
-                [&](std::size_t done) { listener.revision_progress(done, results.finished()); });
-  outcome.complete = results.finished() == plan.range.size() && passes.is_complete();
+  const RunTiming timing = process(plan, listener, results);
+  results.revise([&](std::size_t done) { listener.revision_progress(done, results.finished()); });
 
   check_not_empty(plan, results);
-  warn_of_scans(plan, results, timing, listener);
-  RunDoubts doubts = find_doubts(plan.sequence, plan.range, timing);
-  doubts.returns = return_errors(plan.sequence, plan.range.first, passes.returns());
-  for (const std::string& text : sentences(doubts, plan.sequence)) listener.warn(text);
+  warn_of_scans(plan, results, timing, warn);
+  const RunDoubts doubts =
+      find_doubts(plan.sequence, plan.range, timing,
+                  return_errors(plan.sequence, plan.range.first, results.returns()));
+  for (const std::string& text : doubts.sentences) warn(text);
   results.commit();
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kResultNames.poses, plan.sequence);
-  if (!outside.log.empty() && outcome.complete) {
-    write_log(outside.log, plan, labels, listener, outcome);
+  bool is_complete = results.finished() == plan.range.size() && results.is_revised();
+  if (is_complete && !outside.log.empty()) {
+    is_complete = write_log(outside.log, plan, labels, warn);
   }
-  if (!outside.grid.empty() && outcome.complete) {
-    write_grid(outside, plan, labels, listener, outcome);
+  nlohmann::ordered_json grid;
+  if (is_complete && !outside.grid.empty()) {
+    grid = write_grid(outside, plan, labels, warn);
+    is_complete = !grid.is_null();
   }
-  nlohmann::ordered_json told = to_json(doubts, plan.sequence);
+  nlohmann::ordered_json told = doubts.json;
   told["warnings"] = warnings;
   outcome.report = make_report(plan, told, results, timing);
-  if (!outcome.grid.is_null()) outcome.report["grid"] = outcome.grid;
-  if (!passes.is_one()) outcome.report["second_pass"] = passes.report();
-  if (!outcome.complete) {
+  if (!grid.is_null()) outcome.report["grid"] = grid;
+  if (results.has_second_pass()) outcome.report["second_pass"] = results.second_pass_report();
+  if (!is_complete) {
     outcome.signal = InterruptGuard::signal();
     outcome.outputs.folder = out.path();
     out.keep_unfinished(outcome.report);
     return outcome;
   }
-  if (page) {
-    outcome.page = plan.settings.outputs.folder / kResultNames.page;
-    page->write(outputs.folder / kResultNames.page);
-  }
+  if (page) page->write(outputs.folder / kResultNames.page);
   const nlohmann::ordered_json written = outside.contents();
   if (!written.is_null()) outcome.report["written"] = written;
   out.finish(outcome.report, [&] {

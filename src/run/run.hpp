@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,9 +14,11 @@
 
 namespace dynains::run {
 
+using Warn = std::function<void(const std::string& text)>;
+
 /// How a run and its caller reach each other while it lasts.
 struct RunListener {
-  std::function<void(const std::string&)> warn = [](const std::string&) {};
+  Warn warn = [](const std::string&) {};
   /// Called before the first scan and after each.
   std::function<void(std::size_t done, std::size_t total)> progress = [](std::size_t, std::size_t) {
   };
@@ -27,14 +28,10 @@ struct RunListener {
 };
 
 struct RunOutcome {
-  RunOutputs outputs;    ///< their folder is that of unfinished results after a signal
-  bool complete = true;  ///< false after a signal
-  int signal = 0;        ///< that ended the run
+  RunOutputs outputs;  ///< their folder is that of unfinished results after a signal
+  int signal = 0;      ///< that ended the run; 0: the results are complete
   nlohmann::ordered_json report;
-  nlohmann::ordered_json grid;                ///< PlacedGrid::summary(); null: none was written
   std::optional<SessionAlignment> alignment;  ///< of the session in a map of many sessions
-  std::filesystem::path page;                 ///< empty: none was asked for
-  std::filesystem::path log;                  ///< empty: none was written
 };
 
 /// Runs over a recording. SIGINT and SIGTERM end the run after the scan at hand: the results so

@@ -8,7 +8,9 @@
 
 #include "clean_writer.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "interrupt.hpp"
 #include "io/folder.hpp"
+#include "read_ahead.hpp"
 #include "recorded_scans.hpp"
 
 namespace dynains::run {
@@ -46,37 +48,47 @@ std::vector<Eigen::Vector3d> path_of(const Recording& recording, const ScanRange
 }  // namespace
 
 RunResults::RunResults(const Recording& recording, const ScanRange& range,
-                       const RunOutputs& outputs, Passes* passes)
+                       const RunSettings& settings)
     : recording_(recording),
       range_(range),
-      outputs_(outputs),
-      passes_(passes),
-      final_labels_(outputs.folder, "labels", outputs.write_beliefs),
-      dynamic_points_(outputs.folder / "dynamic_points.ply", moving_columns(recording, range)),
+      outputs_(settings.outputs),
+      store_(outputs_.folder),
+      returns_(store_, settings.config.evidence),
+      verdicts_(outputs_.folder),
+      final_labels_(outputs_.folder, "labels", outputs_.write_beliefs),
+      dynamic_points_(outputs_.folder / "dynamic_points.ply", moving_columns(recording, range)),
       overview_(path_of(recording, range)),
-      writing_(outputs.thread()),
-      writing_online_(outputs.thread()) {
+      writing_(outputs_.thread()),
+      writing_online_(outputs_.thread()) {
+  if (settings.passes > 1 && range.size() > returns_.compared()) {
+    SecondPassConfig config;
+    config.sensors = settings.config.sensors;
+    config.static_policy = settings.static_policy;
+    config.evidence = settings.config.evidence;
+    second_.emplace(store_, config);
+  }
   final_labels_.create_folders();
   add([this](const JudgedScan& judged) {
     final_labels_.write(recording_.name(judged.index), judged.packed);
   });
-  if (outputs.write_online) online_labels_.emplace(outputs.folder, "online").create_folders();
-  if (outputs.write_clean) {
-    const std::filesystem::path folder = outputs.folder / "clean";
+  if (outputs_.write_online) online_labels_.emplace(outputs_.folder, "online").create_folders();
+  if (outputs_.write_clean) {
+    const std::filesystem::path folder = outputs_.folder / "clean";
     create_folder(folder);
     add([this, folder](const JudgedScan& judged) {
       write_clean(recording_, judged, folder, outputs_.drop_not_judged);
     });
   }
-  if (!outputs.map.empty()) {
-    map_ = open_map(outputs.map, recording, range, outputs.map_attributes, outputs.crs);
+  if (!outputs_.map.empty()) {
+    map_ = open_map(outputs_.map, recording, range, outputs_.map_attributes, outputs_.crs);
   }
-  if (map_ && passes != nullptr && !passes->is_one()) {
-    revised_map_.emplace(passes->map_config());
+  if (map_ && second_) {
+    revised_map_.emplace(settings.config.map);
     add([this](const JudgedScan& judged) { add_to_revised_map(judged); });
   }
-  if (outputs.map_attributes) {
-    map_attributes_.emplace(outputs.map_voxel, recording.T_world_sensor(range.first).translation());
+  if (outputs_.map_attributes) {
+    map_attributes_.emplace(outputs_.map_voxel,
+                            recording.T_world_sensor(range.first).translation());
     add([this](const JudgedScan& judged) { map_attributes_->add(judged); }, true);
   }
   add([this](const JudgedScan& judged) { overview_.add(judged); });
@@ -130,19 +142,46 @@ void RunResults::take_final(RecordedScan* scan, const ScanVerdict& verdict) {
   writing_.begin([this, reads = scan == nullptr] {
     if (reads) recording_.read_scan(judged_.index, judged_.scan);
     copy_points(judged_.scan, judged_.points);
-    if (passes_ != nullptr) passes_->add(judged_);
-    if (passes_ == nullptr || passes_->is_one()) hand_out();
+    if (second_) return keep_for_second_pass();
+    returns_.add(judged_.points, judged_.verdict.labels, judged_.verdict.compared);
+    hand_out();
   });
   ++finished_;
 }
 
-void RunResults::take_revised(JudgedScan& judged) {
+void RunResults::keep_for_second_pass() {
+  judged_.packed.pack(judged_.verdict, outputs_.write_beliefs);
+  verdicts_.add(judged_.packed.labels);
+  verdicts_.add(judged_.packed.causes);
+  verdicts_.add(judged_.packed.beliefs);
+  second_->add(judged_.points, judged_.verdict, judged_.scan.sensor);
+}
+
+void RunResults::revise(const std::function<void(std::size_t done)>& progress) {
+  if (!second_) return;
+  second_->test([] { return InterruptGuard::signal() == 0; });
+  if (finished_ == 0) return;
+  progress(0);
+  ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, writing_.policy());
+  JudgedScan next;
+  for (std::size_t k = 0; k < finished_; ++k) {
+    next.index = range_.first + k;
+    next.scan = reader.next(std::move(next.scan));
+    copy_points(next.scan, next.points);
+    verdicts_.read(3 * k, next.packed.labels);
+    verdicts_.read(3 * k + 1, next.packed.causes);
+    verdicts_.read(3 * k + 2, next.packed.beliefs);
+    next.packed.unpack(next.scan, next.arrays);
+    second_->revise(next.points, static_cast<std::uint32_t>(k), next.arrays);
+    finish();
+    std::swap(judged_, next);
+    judged_.verdict =
+        judged_.arrays.verdict({k, recording_.time(judged_.index),
+                                orthonormalized(recording_.T_world_sensor(judged_.index))});
+    writing_.begin([this] { hand_out(); });
+    progress(k + 1);
+  }
   finish();
-  std::swap(judged_, judged);
-  const std::size_t i = judged_.index;
-  judged_.verdict = judged_.arrays.verdict(
-      {i - range_.first, recording_.time(i), orthonormalized(recording_.T_world_sensor(i))});
-  writing_.begin([this] { hand_out(); });
 }
 
 void RunResults::hand_out() {
@@ -164,6 +203,12 @@ void RunResults::commit() {
   overview_.picture().write_png(outputs_.folder / kResultNames.picture);
   if (revised_map_) revised_map_->for_each([&](const auto& point) { add_map_point(point); });
   if (map_) map_->commit();
+}
+
+nlohmann::ordered_json RunResults::second_pass_report() const {
+  return {{"places", second_->place_count()},
+          {"removed_points", second_->revised().removed},
+          {"restored_points", second_->revised().restored}};
 }
 
 std::optional<std::size_t> RunResults::map_points() const {

@@ -3,17 +3,20 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/map/static_map_accumulator.hpp"
+#include "dynains/recording/second_pass.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 #include "map_file.hpp"
 #include "overview.hpp"
-#include "passes.hpp"
 #include "run_settings.hpp"
 #include "tally.hpp"
 #include "verdict_files.hpp"
@@ -27,14 +30,15 @@ struct TrackRow {
   MovingObject object;
 };
 
-/// Hands final verdicts to sinks, in another thread.
+/// Hands final verdicts to sinks, in another thread. Those of the stream are final unless there is
+/// a second pass: then they wait, packed, in files without a name in the folder of the outputs.
 class RunResults {
  public:
-  /// Opens all files in `outputs.folder`, and `outputs.map`, so that a folder that cannot be
-  /// written is noticed before the work. `passes`: null if verdicts of the stream are final. It and
-  /// the recording outlive this. Throws IoError.
-  RunResults(const Recording& recording, const ScanRange& range, const RunOutputs& outputs,
-             Passes* passes = nullptr);
+  /// Opens all files in the folder of `settings.outputs`, and their map, so that a folder that
+  /// cannot be written is noticed before the work. There is a second pass if the settings ask for
+  /// one and the recording, which outlives this, is longer than what the first one compares. Throws
+  /// IoError.
+  RunResults(const Recording& recording, const ScanRange& range, const RunSettings& settings);
 
   /// Final verdicts also go to `sink`. `needs_truth`: with the labels of the recording.
   void add(Sink sink, bool needs_truth = false);
@@ -44,9 +48,9 @@ class RunResults {
   /// and gives the content of an earlier scan back, whose memory the caller can use again. If
   /// `scan` is null, the scan is read from its file. Throws IoError, for the scan before as well.
   void take_final(RecordedScan* scan, const ScanVerdict& verdict);
-  /// A verdict that take_final() took, after its revision: `judged` has the index, the scan, its
-  /// points and arrays. Gives the content of an earlier one back.
-  void take_revised(JudgedScan& judged);
+  /// After the last scan: hands the verdicts of a second pass out, revised. A signal ends the
+  /// revision; they then stay as they are. Calls `progress` before the first scan and after each.
+  void revise(const std::function<void(std::size_t done)>& progress);
   /// Waits for the results of the last scan. Throws IoError.
   void finish() { writing_.wait(); }
   /// See RunOutputs::thread().
@@ -61,8 +65,17 @@ class RunResults {
   const Tally& tally() const { return tally_; }
   /// Empty without a map.
   std::optional<std::size_t> map_points() const;
+  bool has_second_pass() const { return second_.has_value(); }
+  /// Whether no signal has ended revise().
+  bool is_revised() const { return !second_ || second_->is_decided(); }
+  const std::vector<ReturnToPlace>& returns() const {
+    return second_ ? second_->returns() : returns_.found();
+  }
+  /// The field "second_pass" of the report.
+  nlohmann::ordered_json second_pass_report() const;
 
  private:
+  void keep_for_second_pass();
   void hand_out();
   void write_moving(const JudgedScan& judged);
   void add_to_revised_map(const JudgedScan& judged);
@@ -70,7 +83,10 @@ class RunResults {
   const Recording& recording_;
   ScanRange range_;
   RunOutputs outputs_;
-  Passes* passes_;
+  ByteStore store_;
+  Returns returns_;  // of one pass
+  std::optional<SecondPass> second_;
+  PointStore verdicts_;  // of the stream, for the second pass
   bool needs_truth_ = false;
   std::vector<Sink> sinks_;
   VerdictFiles final_labels_;

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "dynains/errors.hpp"
+#include "dynains/median.hpp"
 #include "dynains/poses/turns.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "io/points/finite_points.hpp"
@@ -155,17 +158,6 @@ std::optional<std::string> remark_on_turns(const Recording& recording, const Sca
          "(--deskew), or clouds should be single turns";
 }
 
-}  // namespace
-
-std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range) {
-  std::vector<std::string> remarks;
-  for (const auto& remark : {remark_on_stripes(recording), remark_on_copies(recording, range),
-                             remark_on_turns(recording, range)}) {
-    if (remark) remarks.push_back(*remark);
-  }
-  return remarks;
-}
-
 std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range) {
   // The remover finds the ground below the mean of several sensors, not below the origin.
   if (!recording.sensors().empty()) return std::nullopt;
@@ -180,6 +172,70 @@ std::optional<std::string> remark_on_tilt(const Recording& recording, const Scan
   return "the sensor seems to be tilted by " + degrees(std::acos(std::clamp(up->z(), -1.0, 1.0))) +
          " deg: pass --mounting-pitch " + degrees(std::asin(std::clamp(-up->x(), -1.0, 1.0))) +
          " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
+}
+
+}  // namespace
+
+std::vector<std::string> remarks_on_clouds(const Recording& recording, const ScanRange& range,
+                                           bool seeks_ground) {
+  std::vector<std::string> remarks;
+  for (const auto& remark : {remark_on_stripes(recording), remark_on_copies(recording, range),
+                             remark_on_turns(recording, range),
+                             seeks_ground ? remark_on_tilt(recording, range) : std::nullopt}) {
+    if (remark) remarks.push_back(*remark);
+  }
+  return remarks;
+}
+
+void check_ranges(const Recording& recording, const ScanRange& range, const RemoverConfig& config,
+                  bool unit_is_given) {
+  constexpr double kMaxReturn = 250.0;  // m, of most points of a LiDAR
+  std::vector<float> ranges;            // in the x-y plane
+  for (const std::size_t i : range.sample()) {
+    const PointBuffer points = sampled_points(recording.read_scan(i));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      ranges.push_back(std::hypot(points.x[k], points.y[k]));
+    }
+  }
+  if (ranges.empty()) return;
+  const auto count_within = [&](double most) {
+    return static_cast<double>(
+        std::count_if(ranges.begin(), ranges.end(), [&](float one) { return one <= most; }));
+  };
+  const auto count = static_cast<double>(ranges.size());
+  const double judged = (count_within(config.max_range) - count_within(config.min_range)) / count;
+  const bool is_far = !unit_is_given && count_within(kMaxReturn) < 0.1 * count;
+  if (judged >= 0.01 && !is_far) return;
+  const auto number = [](double value) { return text::fixed(value, 1); };
+  throw ConfigError(
+      recording.folder().string() + ": " + number(100.0 * judged) +
+      " % of the points can be judged, those from " + number(config.min_range) +
+      " m (--min-range) to " + number(config.max_range) +
+      " m (--max-range) from the sensor; half of the points are beyond " +
+      number(median(std::move(ranges))) +
+      " m. If coordinates are in millimetres or centimetres: --point-units mm, --point-units cm; "
+      "in the frame of the world: --frame world; else --point-units m runs unless nothing can be "
+      "judged");
+}
+
+std::optional<std::string> remark_on_lone_scans(const Recording& recording, const ScanRange& range,
+                                                const RemoverConfig& config) {
+  const auto [first, last] = range;
+  if (first == last) {
+    return "one scan alone is compared with no other, and nothing is removed from it";
+  }
+  std::size_t breaks = 0;
+  for (std::size_t i = first + 1; i <= last; ++i) {
+    const Eigen::Vector3d step =
+        recording.T_world_sensor(i).translation() - recording.T_world_sensor(i - 1).translation();
+    const double pause = recording.time(i) - recording.time(i - 1);
+    breaks += config.starts_epoch(pause, step.norm()) ? 1 : 0;
+  }
+  if (10 * breaks <= last - first) return std::nullopt;
+  return std::to_string(breaks) + " of " + std::to_string(last - first + 1) +
+         " scans come so long after the one before, or so far from it, that they are not compared, "
+         "and nothing is removed from scans that stand alone; are times in seconds and poses in "
+         "metres? If so, see --max-gap and --max-speed";
 }
 
 }  // namespace dynains::run

@@ -8,13 +8,12 @@
 #include <vector>
 
 #include "cloud_remarks.hpp"
-#include "dynains/config.hpp"
 #include "dynains/io/extrinsic.hpp"
+#include "dynains/poses/ray_origin.hpp"
 #include "dynains/poses/sensor_agreement.hpp"
 #include "io/text.hpp"
 #include "odd_scans.hpp"
 #include "pose_advice.hpp"
-#include "start_check.hpp"
 
 namespace dynains::run {
 namespace {
@@ -86,12 +85,10 @@ void add_findings_in_scans(const Recording& recording, const Diagnosis& d,
   for (const std::string& odd : remarks_on_odd_scans(recording, 0, counts, d.sound())) {
     text << "note: " << odd << '\n';
   }
-  for (const std::string& remark : remarks_on_clouds(recording, whole_of(recording))) {
+  for (const std::string& remark :
+       remarks_on_clouds(recording, whole_of(recording), !d.mounting.known)) {
     text << "note: " << remark << '\n';
   }
-  if (d.mounting.known) return;
-  const auto remark = remark_on_tilt(recording, whole_of(recording));
-  if (remark) text << "note: " << *remark << '\n';
 }
 
 std::string describe(const Recording& recording, const Diagnosis& d,
@@ -128,6 +125,18 @@ std::string describe(const Recording& recording, const Diagnosis& d,
   return text.str();
 }
 
+/// Judges the poses as `dynains check` does, unless a few places confirm them.
+void check_poses(const Recording& recording, StartCheck& result) {
+  const bool is_usual =
+      recording.frame() == PointFrame::kSensor && recording.sensor_origin().isZero(0.0);
+  if (is_usual && are_poses_exact(recording) && !other_ray_origin(recording)) return;
+  Diagnosis d = diagnose(recording, /*pairs=*/3);
+  if (d.verdict == PoseVerdict::kUnknown) d = diagnose(recording);  // the places may be empty
+  if (d.verdict == PoseVerdict::kAgree || d.verdict == PoseVerdict::kNoMotion) return;
+  const bool may_run = d.sound() || d.verdict == PoseVerdict::kUnknown;
+  (may_run ? result.warnings.emplace_back() : result.refusal) = advice(recording, d);
+}
+
 }  // namespace
 
 RecordingCheck check_recording(const Recording& recording) {
@@ -146,6 +155,22 @@ RecordingCheck check_recording(const Recording& recording) {
   check.flags = proposed_flags(recording, check.diagnosis.proposal);
   if (lone) check.remark = *lone + ".\n";
   return check;
+}
+
+StartCheck check_start(const Recording& recording, const ScanRange& range,
+                       const RemoverConfig& config, bool accepts_poses) {
+  constexpr std::size_t kMinScans = 8;
+  StartCheck result;
+  const bool are_judged = !accepts_poses && !recording.options().without_poses;
+  if (are_judged && range.size() >= kMinScans) check_poses(recording, result);
+  if (!result.refusal.empty()) return result;
+  const auto lone = remark_on_lone_scans(recording, range, config);
+  if (lone) result.warnings.push_back(*lone);
+  const bool seeks_ground =
+      config.level && config.mounting_pitch == 0.0 && config.mounting_roll == 0.0;
+  const auto remarks = remarks_on_clouds(recording, range, seeks_ground);
+  result.warnings.insert(result.warnings.end(), remarks.begin(), remarks.end());
+  return result;
 }
 
 }  // namespace dynains::run

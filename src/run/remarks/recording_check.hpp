@@ -1,10 +1,14 @@
-// The check of a recording for `dynains check` and the Python module.
+// The check of a recording: of the whole of it for `dynains check` and the Python module, and that
+// before the first scan of a run.
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "dynains/config.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/poses/diagnosis.hpp"
+#include "run/scan_range.hpp"
 
 namespace dynains::run {
 
@@ -19,5 +23,15 @@ struct RecordingCheck {
 
 /// Looks at the size of every scan file and at a sample of scans. Throws IoError.
 RecordingCheck check_recording(const Recording& recording);
+
+struct StartCheck {
+  std::vector<std::string> warnings;
+  std::string refusal;  ///< why the run must not begin; empty: it may
+};
+
+/// Judges the poses, and the clouds of `range`. Poses of an odometry of this program, those of
+/// fewer than eight scans, and all with `accepts_poses` are not judged. Throws IoError.
+StartCheck check_start(const Recording& recording, const ScanRange& range,
+                       const RemoverConfig& config, bool accepts_poses);
 
 }  // namespace dynains::run

@@ -12,6 +12,23 @@
 namespace dynains::run {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
+/// Scans in a row that no correct recording gives.
+struct SuspiciousScans {
+  Suspicion suspicion = Suspicion::kNone;
+  std::size_t first = 0;  // scan of the recording
+  std::size_t count = 0;
+  Plausibility worst;  // of the window with the largest shares
+};
+
+/// A scan that begins an epoch because its surfaces do not fit, and how far its motion lies from
+/// those beside it.
+struct PoseJump {
+  std::size_t scan;
+  double metres, degrees;
+};
+
 std::string percent(float share) { return std::to_string(std::lround(100.0F * share)) + " %"; }
 
 /// How far the given motion to scan `i` (from 1) lies from the nearer one of the motions before and
@@ -23,7 +40,7 @@ PoseJump jump_at(const Recording& recording, std::size_t i) {
     const Pose E =
         motion_between(recording, k - 1, k).inverse() * motion_between(recording, i - 1, i);
     const PoseJump jump{i, E.translation().norm(), 180.0 / M_PI * angle_of(E.linear())};
-    if (!least || jump.translation < least->translation) least = jump;
+    if (!least || jump.metres < least->metres) least = jump;
   }
   return least.value_or(PoseJump{i, 0.0, 0.0});
 }
@@ -35,8 +52,7 @@ std::string text_of(const std::vector<PoseJump>& jumps, const Recording& recordi
                      (jumps.size() == 1 ? " time" : " times") + ", at scan ";
   for (std::size_t i = 0; i < std::min(kShown, jumps.size()); ++i) {
     text += (i > 0 ? ", " : "") + recording.name(jumps[i].scan) + " by " +
-            text::fixed(jumps[i].translation, 2) + " m and " + text::fixed(jumps[i].rotation, 1) +
-            " deg";
+            text::fixed(jumps[i].metres, 2) + " m and " + text::fixed(jumps[i].degrees, 1) + " deg";
   }
   if (jumps.size() > kShown) text += " and " + std::to_string(jumps.size() - kShown) + " more";
   return text + "; scans are not compared across a large jump";
@@ -68,73 +84,69 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
          "many points be noise; see: dynains check";
 }
 
+Json json_of(const SuspiciousScans& part, const Recording& recording) {
+  return {{"suspicion", plain_value(part.suspicion)},
+          {"first_scan", recording.name(part.first)},
+          {"scans", part.count},
+          {"not_judged", part.worst.not_judged},
+          {"ground_free", part.worst.ground_free},
+          {"instance_free", part.worst.instance_free},
+          {"misfits", part.worst.misfits},
+          {"residual_metres", part.worst.residual}};
+}
+
+Json json_of(const ReturnError& error, const Recording& recording) {
+  return {{"earlier", {recording.name(error.first_earlier), recording.name(error.last_earlier)}},
+          {"later", {recording.name(error.first_later), recording.name(error.last_later)}},
+          {"metres", error.metres},
+          {"degrees", error.degrees}};
+}
+
+/// At most one part for each kind: the first one.
+void add(const Plausibility& window, std::size_t first, std::vector<SuspiciousScans>& parts) {
+  if (window.suspicion == Suspicion::kNone) return;
+  auto part = std::find_if(parts.begin(), parts.end(), [&](const SuspiciousScans& one) {
+    return one.suspicion == window.suspicion;
+  });
+  if (part == parts.end()) {
+    parts.push_back({window.suspicion, first + static_cast<std::size_t>(window.since), 0, {}});
+    part = parts.end() - 1;
+  }
+  ++part->count;
+  part->worst.raise_shares(window);
+}
+
 }  // namespace
 
-RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing) {
-  RunDoubts doubts;
+RunDoubts find_doubts(const Recording& recording, const ScanRange& range, const RunTiming& timing,
+                      const std::vector<ReturnError>& returns) {
+  std::vector<PoseJump> jumps;
+  std::vector<SuspiciousScans> parts;
   for (std::size_t k = 0; k < timing.rows.size(); ++k) {
     const TimingRow& row = timing.rows[k];
-    const std::size_t scan = range.first + k;
     const bool is_misfit =
         row.began_epoch == EpochReason::kJump || row.began_epoch == EpochReason::kMisfit;
-    if (is_misfit && scan > range.first) doubts.jumps.push_back(jump_at(recording, scan));
-    const Plausibility& window = row.plausibility;
-    if (window.suspicion == Suspicion::kNone) continue;
-    const auto same = [&](const SuspiciousScans& part) {
-      return part.suspicion == window.suspicion;
-    };
-    auto part = std::find_if(doubts.parts.begin(), doubts.parts.end(), same);
-    if (part == doubts.parts.end()) {
-      doubts.parts.push_back(
-          {window.suspicion, range.first + static_cast<std::size_t>(window.since), 0, {}});
-      part = doubts.parts.end() - 1;
-    }
-    ++part->count;
-    part->worst.raise_shares(window);
+    if (is_misfit && k > 0) jumps.push_back(jump_at(recording, range.first + k));
+    add(row.plausibility, range.first, parts);
+  }
+  RunDoubts doubts;
+  Json& json = doubts.json;
+  json = {{"jumps", Json::array()}, {"suspicious", Json::array()}, {"returns", Json::array()}};
+  if (!jumps.empty()) doubts.sentences.push_back(text_of(jumps, recording));
+  for (const PoseJump& jump : jumps) {
+    json["jumps"].push_back(
+        {{"scan", recording.name(jump.scan)}, {"metres", jump.metres}, {"degrees", jump.degrees}});
+  }
+  for (const SuspiciousScans& part : parts) {
+    doubts.sentences.push_back(text_of(part, recording));
+    json["suspicious"].push_back(json_of(part, recording));
+  }
+  for (const ReturnError& error : returns) {
+    doubts.sentences.push_back(sentence(error, recording) +
+                               ": what moved is not compared there; see: dynains check --closures");
+    json["returns"].push_back(json_of(error, recording));
   }
   return doubts;
-}
-
-std::vector<std::string> sentences(const RunDoubts& doubts, const Recording& recording) {
-  std::vector<std::string> result;
-  if (!doubts.jumps.empty()) {
-    result.push_back(text_of(doubts.jumps, recording));
-  }
-  for (const SuspiciousScans& part : doubts.parts) result.push_back(text_of(part, recording));
-  for (const ReturnError& error : doubts.returns) {
-    result.push_back(sentence(error, recording) +
-                     ": what moved is not compared there; see: dynains check --closures");
-  }
-  return result;
-}
-
-nlohmann::ordered_json to_json(const RunDoubts& doubts, const Recording& recording) {
-  nlohmann::ordered_json jumps = nlohmann::ordered_json::array();
-  for (const PoseJump& jump : doubts.jumps) {
-    jumps.push_back({{"scan", recording.name(jump.scan)},
-                     {"metres", jump.translation},
-                     {"degrees", jump.rotation}});
-  }
-  nlohmann::ordered_json parts = nlohmann::ordered_json::array();
-  for (const SuspiciousScans& part : doubts.parts) {
-    parts.push_back({{"suspicion", plain_value(part.suspicion)},
-                     {"first_scan", recording.name(part.first)},
-                     {"scans", part.count},
-                     {"not_judged", part.worst.not_judged},
-                     {"ground_free", part.worst.ground_free},
-                     {"instance_free", part.worst.instance_free},
-                     {"misfits", part.worst.misfits},
-                     {"residual_metres", part.worst.residual}});
-  }
-  nlohmann::ordered_json returns = nlohmann::ordered_json::array();
-  for (const ReturnError& error : doubts.returns) {
-    returns.push_back(
-        {{"earlier", {recording.name(error.first_earlier), recording.name(error.last_earlier)}},
-         {"later", {recording.name(error.first_later), recording.name(error.last_later)}},
-         {"metres", error.metres},
-         {"degrees", error.degrees}});
-  }
-  return {{"jumps", jumps}, {"suspicious", parts}, {"returns", returns}};
 }
 
 }  // namespace dynains::run
