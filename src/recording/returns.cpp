@@ -60,8 +60,7 @@ detail::VoxelPlanes Returns::find_planes(double edge) {
   const Pose T_origin_world = near_.front()->T_world_sensor.inverse();
   for (const KeyScan* const key : near_) {
     store_.read(key->offset, key->size, bytes_);
-    const Pose T = T_origin_world * key->T_world_sensor;
-    planes.begin_scan(T);
+    planes.begin_scan(T_origin_world * key->T_world_sensor);
     detail::VoxelPlanes::Block block;
     for (std::size_t i = 0; i + sizeof(Steps) <= bytes_.size(); i += sizeof(Steps)) {
       Steps at;
@@ -69,7 +68,7 @@ detail::VoxelPlanes Returns::find_planes(double edge) {
       const auto metres = [&](std::size_t axis) {
         return static_cast<double>(kBounds.stored_step * static_cast<float>(at[axis]));
       };
-      block.push_back(T, metres(0), metres(1), metres(2));
+      block.push_back(metres(0), metres(1), metres(2));
       if (block.is_full()) planes.add(block);
     }
     planes.add(block);

@@ -365,9 +365,9 @@ std::size_t points_on_planes(const std::vector<Eigen::Vector3d>& points) {
   for (const bool is_asked : {false, true}) {
     for (const Eigen::Vector3d& p : points) {
       VoxelPlanes::Block block;
-      block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
+      block.push_back(p.x(), p.y(), p.z());
       if (is_asked) {
-        planes.find(block, [&](std::size_t, const VoxelPlanes::Plane&) { ++found; });
+        planes.find(Pose::Identity(), block, [&](auto&&...) { ++found; });
       } else {
         planes.add(block);
       }
@@ -420,16 +420,16 @@ TEST_CASE("a block of points makes the planes of its single points") {
     planes.begin_scan(Pose::Identity());
     VoxelPlanes::Block block;
     for (const Eigen::Vector3d& p : points) {
-      block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
+      block.push_back(p.x(), p.y(), p.z());
       if (block.count == points_per_block) planes.add(block);
     }
     planes.add(block);
     std::vector<double> distances;
     for (const Eigen::Vector3d& p : points) {
       block.count = 0;
-      block.push_back(Pose::Identity(), p.x(), p.y(), p.z());
-      planes.find(block, [&](std::size_t, const VoxelPlanes::Plane& plane) {
-        distances.push_back(plane.distance(block.points[0]));
+      block.push_back(p.x(), p.y(), p.z());
+      planes.find(Pose::Identity(), block, [&](std::size_t i, const auto& plane, const auto& at) {
+        distances.push_back(plane.distance(at.point(i)));
       });
     }
     return distances;

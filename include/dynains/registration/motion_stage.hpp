@@ -28,7 +28,7 @@ class MotionStage {
   virtual Pose corrected(const Pose& T_world_frame) const = 0;
 
   /// Adds the static points of a scan to the surfaces. `T_world_level`: result of correct().
-  /// `moving`: by non-ground point, 1 for a point that may move, else 0; empty if no point does.
+  /// `moving`: by non-ground point, 0 for a point that does not move; empty if no point does.
   virtual void insert(const Pose& T_world_level, const GroundSplit& split,
                       Span<const std::uint8_t> moving) = 0;
 

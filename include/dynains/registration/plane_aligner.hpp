@@ -149,12 +149,13 @@ class PlaneAligner {
   // Matches every `step`-th point.
   void find_planes(PointsView points, std::size_t step, VoxelPlanes& planes, const Pose& T,
                    const Vector& found) {
-    using Block = VoxelPlanes::Block;
     matches_.clear();
     // AVX2 processors add four numbers at a time, here and below.
     with_packs([&](auto) {
-      for (std::size_t begin = 0; begin < points.size(); begin += Block::kMaxCount * step) {
-        match_block(points, begin, step, planes, T, found);
+      VoxelPlanes::Block block;
+      for (std::size_t begin = 0; begin < points.size(); begin += block.x.size() * step) {
+        block.count = 0;
+        match_block(points, begin, step, planes, T, found, block);
       }
     });
     for (const Match& match : matches_) match.plane->matches = 0;
@@ -163,23 +164,19 @@ class PlaneAligner {
 
   // Matches every `step`-th point from index `begin` on, as many as a block holds.
   void match_block(PointsView points, std::size_t begin, std::size_t step, VoxelPlanes& planes,
-                   const Pose& T, const Vector& found) {
-    VoxelPlanes::Block block;
+                   const Pose& T, const Vector& found, VoxelPlanes::Block& block) {
     for (std::size_t i = begin; i < points.size() && !block.is_full(); i += step) {
-      block.push_position(T, static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
-                          static_cast<double>(points.z[i]));
+      block.push_back(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
+                      static_cast<double>(points.z[i]));
     }
-    planes.find(block, [&](std::size_t i, VoxelPlanes::Plane& plane) {
-      const double(&p)[3] = block.points[i];
-      const std::size_t point = begin + i * step;
-      const SensorErrors errors =
-          sensor_errors(T, static_cast<double>(points.x[point]),
-                        static_cast<double>(points.y[point]), static_cast<double>(points.z[point]));
+    planes.find(T, block, [&](std::size_t i, VoxelPlanes::Plane& plane, const auto& placed) {
+      const std::array<double, 3> p = placed.point(i);
+      const SensorErrors errors = placed.errors(i);
       Match match = {&plane,
                      {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
                      {},
                      plane.distance(p),
-                     static_cast<std::uint32_t>(point)};
+                     static_cast<std::uint32_t>(begin + i * step)};
       for (std::size_t k = 0; k < kSensorErrors; ++k) {
         match.errors[k] = -plane.moved[k];
         for (std::size_t axis = 0; axis < 3; ++axis) {

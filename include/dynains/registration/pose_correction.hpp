@@ -135,7 +135,7 @@ class PoseCorrection final : public MotionStage {
       visit_some(split, kInserted, [&](std::size_t i, double x, double y, double z) {
         const bool is_object = i >= split.ground_count;
         if (is_object && !moving.empty() && moving[i - split.ground_count] != 0) return;
-        block.push_back(T, x, y, z);
+        block.push_back(x, y, z);
         if (block.is_full()) planes_.add(block);
       });
       planes_.add(block);

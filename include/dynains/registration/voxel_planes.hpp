@@ -21,22 +21,6 @@ namespace dynains::detail {
 inline constexpr std::size_t kSensorErrors = 3;
 using SensorErrors = std::array<std::array<float, 3>, kSensorErrors>;
 
-/// SensorErrors of the point (x, y, z) (m, sensor frame).
-inline SensorErrors sensor_errors(const Pose& T_map_sensor, double x, double y, double z) {
-  const double distance = std::sqrt(x * x + y * y);
-  const double along = distance > 0.0 ? -z / distance : 0.0;
-  SensorErrors errors;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double R[3] = {T_map_sensor(axis, 0), T_map_sensor(axis, 1), T_map_sensor(axis, 2)};
-    const double moved[kSensorErrors] = {R[0] * (along * x) + R[1] * (along * y) + R[2] * distance,
-                                         R[2] * y - R[1] * z, R[0] * z - R[2] * x};
-    for (std::size_t k = 0; k < kSensorErrors; ++k) {
-      errors[k][static_cast<std::size_t>(axis)] = static_cast<float>(moved[k]);
-    }
-  }
-  return errors;
-}
-
 /// Map of planes: each voxel has the plane of its points, if these lie on a plane. The number of
 /// voxels is limited; a full map forgets the voxels that have received no point for the longest
 /// time. All coordinates: m, in one frame.
@@ -52,29 +36,43 @@ class VoxelPlanes {
     /// Movement of the plane along its normal by each error of the sensor, m.
     std::array<double, kSensorErrors> moved = {};
 
-    double distance(const double (&p)[3]) const {
+    double distance(const std::array<double, 3>& p) const {
       return normal[0] * (p[0] - mean[0]) + normal[1] * (p[1] - mean[1]) +
              normal[2] * (p[2] - mean[2]);
     }
   };
 
-  /// Some points, m. A block is looked up at once, so that its memory accesses overlap.
+  /// Some points, m, sensor frame. A block is looked up at once, so that its memory accesses
+  /// overlap.
   struct Block {
     static constexpr std::size_t kMaxCount = 32;
-    double points[kMaxCount][3];
-    SensorErrors errors[kMaxCount];  // of points to insert
+    using Numbers = std::array<double, kMaxCount>;  // by point; any numbers behind the last one
+    Numbers x = {}, y = {}, z = {};
     std::size_t count = 0;
 
     bool is_full() const { return count == kMaxCount; }
-    /// Adds the point (x, y, z) (m), transformed by `T`, to look it up. The block must not be full.
-    void push_position(const Pose& T, double x, double y, double z) {
-      double(&point)[3] = points[count++];
-      for (int k = 0; k < 3; ++k) point[k] = T(k, 0) * x + T(k, 1) * y + T(k, 2) * z + T(k, 3);
+    /// Adds a point. The block must not be full.
+    void push_back(double px, double py, double pz) {
+      x[count] = px;
+      y[count] = py;
+      z[count++] = pz;
     }
-    /// Adds this point to insert it.
-    void push_back(const Pose& T, double x, double y, double z) {
-      errors[count] = sensor_errors(T, x, y, z);
-      push_position(T, x, y, z);
+  };
+  /// The points of a block in the map.
+  struct Placed {
+    std::array<Block::Numbers, 3> along;  ///< by axis, then by point: m
+    std::array<std::array<std::array<float, Block::kMaxCount>, 3>, kSensorErrors> moved;
+    VoxelKey keys[Block::kMaxCount];
+
+    std::array<double, 3> point(std::size_t i) const {
+      return {along[0][i], along[1][i], along[2][i]};
+    }
+    SensorErrors errors(std::size_t i) const {
+      SensorErrors errors;
+      for (std::size_t k = 0; k < kSensorErrors; ++k) {
+        for (std::size_t axis = 0; axis < 3; ++axis) errors[k][axis] = moved[k][axis][i];
+      }
+      return errors;
     }
   };
 
@@ -100,36 +98,37 @@ class VoxelPlanes {
 
   /// Begins the insertion of the points of the next scan. `T_map_sensor`: its pose.
   void begin_scan(const Pose& T_map_sensor) {
-    for (int axis = 0; axis < 3; ++axis) {
-      sensor_[static_cast<std::size_t>(axis)] = T_map_sensor(axis, 3);
-    }
+    T_map_sensor_ = T_map_sensor;
     ++scans_;
     if (size() > kMaxVoxels / 4 * 3) forget_oldest();
   }
 
   /// Adds points of the current scan, and empties the block.
   void add(Block& block) {
-    VoxelKey keys[Block::kMaxCount];
+    Placed placed;
+    place(T_map_sensor_, block, placed);
+    const VoxelKey* const keys = placed.keys;
     std::uint32_t numbers[Block::kMaxCount];
-    find_keys(block, keys);
     for (std::size_t i = 0; i < block.count; ++i) {
       numbers[i] = i > 0 && keys[i] == keys[i - 1] ? numbers[i - 1] : number_for(keys[i]);
     }
     for (std::size_t i = 0; i < block.count;) {
       std::size_t end = i + 1;
       while (end < block.count && numbers[end] == numbers[i]) ++end;
-      if (numbers[i] != kNoIndex) add(block, i, end, keys[i], numbers[i]);
+      if (numbers[i] != kNoIndex) add(placed, i, end, numbers[i]);
       i = end;
     }
     block.count = 0;
   }
 
-  /// Calls `visit(i, plane)` for each point of a block in a voxel with a plane.
+  /// Calls `visit(i, plane, placed)` for each point of a block, placed by a pose of the sensor, in
+  /// a voxel with a plane.
   template <class Visit>
-  void find(const Block& block, Visit&& visit) {
-    VoxelKey keys[Block::kMaxCount];
+  void find(const Pose& T_map_sensor, const Block& block, Visit&& visit) {
+    Placed placed;
+    place(T_map_sensor, block, placed);
+    const VoxelKey* const keys = placed.keys;
     std::uint32_t numbers[Block::kMaxCount];
-    find_keys(block, keys);
     for (std::size_t i = 0; i < block.count; ++i) {
       numbers[i] = table_.find(keys[i]);
       if (numbers[i] != kNoIndex) __builtin_prefetch(&planes_[numbers[i]]);
@@ -138,7 +137,7 @@ class VoxelPlanes {
       if (numbers[i] == kNoIndex) continue;
       Plane& plane = planes_[numbers[i]];
       if (!plane.is_fitted) plane = fit(keys[i], moments_[numbers[i]]);
-      if (plane.is_flat) visit(i, plane);
+      if (plane.is_flat) visit(i, plane, placed);
     }
   }
 
@@ -160,15 +159,36 @@ class VoxelPlanes {
     return (static_cast<double>(voxel_index(key, axis)) + 0.5) * edge_;
   }
 
-  // Computes the keys of the voxels of a block, and prefetches their entries in the table.
-  void find_keys(const Block& block, VoxelKey* keys) const {
-    for (std::size_t i = 0; i < block.count; ++i) {
-      std::int64_t index[3];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        index[axis] = floor_to<std::int64_t>(block.points[i][axis] * per_metre_);
+  // Places the points of a block, and prefetches the entries of their voxels in the table. Loops
+  // over all numbers are compiled to vector instructions.
+  void place(const Pose& T, const Block& block, Placed& placed) const {
+    constexpr std::size_t kCount = Block::kMaxCount;
+    const auto& [x, y, z, count] = block;
+    Block::Numbers distance, back_x, back_y;
+    for (std::size_t i = 0; i < kCount; ++i) distance[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      constexpr double kTiny = 1e-99;  // of a point above the sensor
+      const double along = -z[i] / (distance[i] > kTiny ? distance[i] : kTiny);
+      back_x[i] = along * x[i];
+      back_y[i] = along * y[i];
+    }
+    std::int32_t index[3][kCount];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto row = static_cast<int>(axis);
+      const double a = T(row, 0), b = T(row, 1), c = T(row, 2), t = T(row, 3);
+      const double per_metre = per_metre_;
+      for (std::size_t i = 0; i < kCount; ++i) {
+        placed.along[axis][i] = a * x[i] + b * y[i] + c * z[i] + t;
+        index[axis][i] = floor_to<std::int32_t>(placed.along[axis][i] * per_metre);
+        placed.moved[0][axis][i] =
+            static_cast<float>(a * back_x[i] + b * back_y[i] + c * distance[i]);
+        placed.moved[1][axis][i] = static_cast<float>(c * y[i] - b * z[i]);
+        placed.moved[2][axis][i] = static_cast<float>(a * z[i] - c * x[i]);
       }
-      keys[i] = voxel_key(index[0], index[1], index[2]);
-      table_.prefetch(keys[i]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      placed.keys[i] = voxel_key(index[0][i], index[1][i], index[2][i]);
+      table_.prefetch(placed.keys[i]);
     }
   }
 
@@ -185,17 +205,16 @@ class VoxelPlanes {
     return number;
   }
 
-  // Adds the points [begin, end) of a block to a voxel.
-  void add(const Block& block, std::size_t begin, std::size_t end, VoxelKey key,
-           std::uint32_t number) {
+  // Adds the points [begin, end) of a block to their voxel.
+  void add(const Placed& placed, std::size_t begin, std::size_t end, std::uint32_t number) {
+    const VoxelKey key = placed.keys[begin];
     const double x = centre(key, 0), y = centre(key, 1), z = centre(key, 2);
     Moments& moments = moments_[number];
     for (std::size_t i = begin; i < end; ++i) {
-      const double(&p)[3] = block.points[i];
-      moments.sums.add(p[0] - x, p[1] - y, p[2] - z, 1.0);
+      moments.sums.add(placed.along[0][i] - x, placed.along[1][i] - y, placed.along[2][i] - z, 1.0);
       for (std::size_t k = 0; k < kSensorErrors; ++k) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          moments.errors[k][axis] += block.errors[i][k][axis];
+          moments.errors[k][axis] += placed.moved[k][axis][i];
         }
       }
     }
@@ -225,7 +244,7 @@ class VoxelPlanes {
       }
     }
     double beam[3];
-    for (std::size_t k = 0; k < 3; ++k) beam[k] = plane.mean[k] - sensor_[k];
+    for (int k = 0; k < 3; ++k) beam[k] = plane.mean[k] - T_map_sensor_(k, 3);
     plane.is_flat = thickness_squared <= kMaxThickness * kMaxThickness * edge_ * edge_ &&
                     !is_trace_of_beam(beam, plane.normal, moments.sums);
     return plane;
@@ -263,7 +282,7 @@ class VoxelPlanes {
   std::vector<Moments> moments_;        // by voxel
   std::vector<Plane> planes_;           // by voxel
   std::uint32_t scans_ = 0;
-  std::array<double, 3> sensor_ = {};  // position at the newest scan, m
+  Pose T_map_sensor_ = Pose::Identity();  // of the newest scan
 };
 
 }  // namespace dynains::detail
