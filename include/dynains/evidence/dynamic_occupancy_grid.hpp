@@ -38,7 +38,7 @@ class DynamicOccupancyGrid {
   /// Removes all cells. Call it before the origin frame changes.
   void clear() {
     std::fill(lines_.begin(), lines_.end(), Line());
-    std::fill(may_be_dynamic_.begin(), may_be_dynamic_.end(), false);
+    std::fill(may_be_dynamic_.begin(), may_be_dynamic_.end(), std::uint8_t{0});
   }
 
   /// Counts the samples of scan number `scan` by their verdicts, and changes verdicts of static
@@ -49,14 +49,16 @@ class DynamicOccupancyGrid {
              std::vector<Count>& counted, std::vector<Verdict>& verdicts) {
     if (lines_.empty()) return;
     find_cells(samples, cell_, T_origin_sensor, keys_);
+    line_of_.resize(keys_.size());
+    std::transform(keys_.begin(), keys_.end(), line_of_.begin(), line_of);
     const std::uint32_t now = static_cast<std::uint32_t>(scan) + 1;
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
       const Count count = count_of(verdicts[s].cause);
       if (count == counted[s]) continue;
       for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
         if (i + kPrefetchDistance < keys_.size())
-          __builtin_prefetch(&lines_[line_of(keys_[i + kPrefetchDistance])]);
-        recount(keys_[i], now, counted[s], count);
+          __builtin_prefetch(&lines_[line_of_[i + kPrefetchDistance]]);
+        recount(i, now, counted[s], count);
       }
       counted[s] = count;
     }
@@ -86,19 +88,20 @@ class DynamicOccupancyGrid {
     return is_dynamic(cause) && cause != Cause::kPresumed ? Count::kDynamic : Count::kStatic;
   }
 
-  static std::size_t line_of(VoxelKey key) { return voxel_hash(key) >> 8 & (kLines - 1); }
+  static std::uint32_t line_of(VoxelKey key) { return voxel_hash(key) >> 8 & (kLines - 1); }
 
-  // The cell of a key; null if it has no samples of the last lookback scans.
-  const Cell* find(VoxelKey key, std::uint32_t now) const {
-    for (const Cell& cell : lines_[line_of(key)].cells) {
-      if (cell.key == key) return age(cell, now) <= lookback_scans_ ? &cell : nullptr;
+  // The cell of a sample; null if it has no samples of the last lookback scans.
+  const Cell* find(std::size_t sample, std::uint32_t now) const {
+    for (const Cell& cell : lines_[line_of_[sample]].cells) {
+      if (cell.key == keys_[sample]) return age(cell, now) <= lookback_scans_ ? &cell : nullptr;
     }
     return nullptr;
   }
 
-  // The cell of a key; a new cell replaces the oldest cell of its line.
-  Cell& cell_for(VoxelKey key, std::uint32_t now) {
-    Line& line = lines_[line_of(key)];
+  // The cell of a sample; a new cell replaces the oldest cell of its line.
+  Cell& cell_for(std::size_t sample, std::uint32_t now) {
+    const VoxelKey key = keys_[sample];
+    Line& line = lines_[line_of_[sample]];
     for (Cell& cell : line.cells) {
       if (cell.key != key) continue;
       if (age(cell, now) > lookback_scans_) cell = {key, now, 0, 0};
@@ -109,10 +112,9 @@ class DynamicOccupancyGrid {
         *std::min_element(line.cells.begin(), line.cells.end(),
                           [](const Cell& a, const Cell& b) { return a.last_scan < b.last_scan; });
     oldest = {key, now, 0, 0};
-    const bool may_be_dynamic =
+    may_be_dynamic_[line_of_[sample]] =
         std::any_of(line.cells.begin(), line.cells.end(),
                     [](const Cell& cell) { return cell.dynamic_count > 0; });
-    may_be_dynamic_[line_of(key)] = may_be_dynamic;
     return oldest;
   }
 
@@ -122,13 +124,13 @@ class DynamicOccupancyGrid {
   }
 
   // Counts one sample as `count` instead of `before`.
-  void recount(VoxelKey key, std::uint32_t now, Count before, Count count) {
-    Cell& cell = cell_for(key, now);
+  void recount(std::size_t sample, std::uint32_t now, Count before, Count count) {
+    Cell& cell = cell_for(sample, now);
     if (before == Count::kDynamic && cell.dynamic_count > 0) --cell.dynamic_count;
     if (before == Count::kStatic && cell.static_count > 0) --cell.static_count;
     if (count == Count::kDynamic) ++cell.dynamic_count;
     if (count == Count::kStatic) ++cell.static_count;
-    if (cell.dynamic_count > 0) may_be_dynamic_[line_of(key)] = true;
+    if (cell.dynamic_count > 0) may_be_dynamic_[line_of_[sample]] = 1;
     if (cell.dynamic_count + cell.static_count < kMaxCount) return;
     cell.dynamic_count /= 2;
     cell.static_count /= 2;
@@ -145,8 +147,8 @@ class DynamicOccupancyGrid {
     const std::uint32_t end = samples.sample_begin[s + 1];
     float highest = 0.0F;
     for (std::uint32_t i = begin; i < end; ++i) {
-      if (!may_be_dynamic_[line_of(keys_[i])]) continue;
-      const Cell* const cell = find(keys_[i], now);
+      if (may_be_dynamic_[line_of_[i]] == 0) continue;
+      const Cell* const cell = find(i, now);
       if (cell != nullptr) highest = std::max(highest, dynamic_ratio(*cell));
     }
     if (!(highest > ratio_)) return;
@@ -159,8 +161,9 @@ class DynamicOccupancyGrid {
   std::vector<Line> lines_;
   // By line: whether any of its cells may be dynamic. Few lines have such cells, so most samples
   // need no access to their cell.
-  std::vector<bool> may_be_dynamic_;
-  std::vector<VoxelKey> keys_;  // by sample
+  std::vector<std::uint8_t> may_be_dynamic_;
+  std::vector<VoxelKey> keys_;          // by sample
+  std::vector<std::uint32_t> line_of_;  // by sample
 };
 
 }  // namespace dynains::detail

@@ -105,6 +105,7 @@ class FreeSpaceEvidence {
     judged.scan = scan;
     judge_instances(is_final, judged);
     judge_by_dynamic_grid(judged);
+    if (!is_final && is_reference()) mark_movers(record_of(scan).evidence);
   }
 
   /// Verdict on the scan of the last judge() with the same `is_final`, before the next observe().
@@ -127,27 +128,17 @@ class FreeSpaceEvidence {
     return references_.takes(records_[newest_ % records_.size()].since_begin);
   }
 
-  /// By non-ground point of the newest scan, after its first judge(): 1 if it may move, else 0.
-  /// Valid until the next observe().
-  Span<const std::uint8_t> may_move() {
-    const detail::InstanceEvidence& evidence = record_of(newest_).evidence;
-    mark_points(
-        evidence.samples,
-        [&](std::uint32_t s) { return surely_moves(evidence, s) || may_move(evidence, s); },
-        may_move_);
-    return may_move_;
-  }
+  /// By non-ground point of the newest scan, after its first judge() if is_reference(): 0 if it
+  /// does not move, an odd number if it surely moves. Valid until the next judge().
+  Span<const std::uint8_t> may_move() const { return may_move_; }
 
   /// Makes the range image of the newest scan, if is_reference(). Points that are certain to move
   /// only occlude in it. Call it after the first judge() of the scan. `split`: points of the
   /// scan.
   void make_reference(const GroundSplit& split) {
     const Record& record = record_of(newest_);
-    const detail::InstanceEvidence& evidence = record.evidence;
-    mark_points(
-        evidence.samples, [&](std::uint32_t s) { return surely_moves(evidence, s); }, is_moving_);
     references_.add(newest_, record.epoch, record.since_begin, record.T_world_sensor, split,
-                    is_moving_);
+                    may_move_);
     if (phase_of(record) != 0 || delay_of(0) != 0) return;
     test_older_scans(0);
     sum_along_tracks(newest_);
@@ -328,18 +319,19 @@ class FreeSpaceEvidence {
            !evidence.beliefs.counts[instance].stands_still();
   }
 
-  // Writes by non-ground point of the newest scan whether `test(supervoxel)` holds.
-  template <class Test>
-  void mark_points(const detail::InstanceSamples& samples, Test&& test,
-                   std::vector<std::uint8_t>& marks) {
-    is_marked_group_.assign(samples.instance_of.size() + 1, 0);
+  // Marks the points of the newest scan, see may_move().
+  void mark_movers(const detail::InstanceEvidence& evidence) {
+    const detail::InstanceSamples& samples = evidence.samples;
+    mark_of_group_.assign(samples.instance_of.size() + 1, 0);
     for (std::uint32_t s = 0; s < samples.supervoxel_count(); ++s) {
-      is_marked_group_[s + 1] = test(s) ? 1 : 0;
+      mark_of_group_[s + 1] = surely_moves(evidence, s) ? 1 : may_move(evidence, s) ? 2 : 0;
     }
-    detail::resize_with_margin(marks, newest_group_of_point_.size());
-    for (std::size_t i = 0; i < marks.size(); ++i) {
-      marks[i] = is_marked_group_[newest_group_of_point_[i]];
-    }
+    detail::resize_with_margin(may_move_, newest_group_of_point_.size());
+    // Local copies: the compiler must assume that a store of a byte changes members.
+    const std::uint8_t* const mark_of_group = mark_of_group_.data();
+    const std::uint32_t* const group_of_point = newest_group_of_point_.data();
+    std::uint8_t* const marks = may_move_.data();
+    for (std::size_t i = 0; i < may_move_.size(); ++i) marks[i] = mark_of_group[group_of_point[i]];
   }
 
   Config config_;
@@ -363,8 +355,8 @@ class FreeSpaceEvidence {
   Judged provisional_, final_;
   std::vector<std::uint32_t> newest_group_of_point_, group_of_;
   std::vector<Verdict> groups_;
-  std::vector<std::uint8_t> is_marked_group_;
-  std::vector<std::uint8_t> is_moving_, may_move_;  // by non-ground point
+  std::vector<std::uint8_t> mark_of_group_;
+  std::vector<std::uint8_t> may_move_;  // by non-ground point
   std::vector<std::uint32_t> predecessors_;
 };
 

@@ -76,7 +76,7 @@ class RangeImage {
   }
 
   /// Replaces the image by the image of one scan. `ground`, `objects`: its points, m, sensor frame.
-  /// `moving`: by point of `objects`, 1 for a moving point, else 0; empty if no point moves.
+  /// `moving`: by point of `objects`, odd for a moving point; empty if no point moves.
   /// `reach` (m): a return of an object protects the cells within this lateral distance, and at
   /// least its 3x3 cells. Near the sensor, the 3x3 cells alone are narrower than the error of the
   /// poses.
@@ -131,7 +131,7 @@ class RangeImage {
         });
         if (!moving.empty()) {
           for (std::size_t i = 0; i < size; ++i) {
-            value[i] |= std::int32_t{moving[begin + i]} << 16;
+            value[i] |= (moving[begin + i] & kMoving) << 16;
           }
         }
         // Points outside the image have cell 0, a cell of the border that is not read.
@@ -318,7 +318,9 @@ class RangeImage {
     scratch.wider.assign(grid.cell_count(), kNothing);
     detail::with_packs([&](auto packs) {
       for (int cells = 1; cells <= kWidest; ++cells) {
-        const float farthest = reach * grid.columns_per_radian / (static_cast<float>(cells) - 0.5F);
+        // Farther returns protect no more than their 3x3 cells, the first step.
+        const float width = static_cast<float>(std::max(cells, 2)) - 0.5F;
+        const float farthest = reach * grid.columns_per_radian / width;
         const auto limit = static_cast<std::int16_t>(std::min(farthest, kMaxRange) * kCentimetres);
         for (std::size_t row = 0; row < static_cast<std::size_t>(grid.rows); ++row) {
           widen_row<typename decltype(packs)::Short>(grid, row, limit, cells > 1, scratch);
@@ -334,30 +336,30 @@ class RangeImage {
   void widen_row(const RangeImageGrid& grid, std::size_t row, std::int16_t limit, bool protects,
                  Scratch& scratch) {
     const Short nothing(kNothing), most(limit);
+    const std::size_t stride = grid.stride();
     Short least_of_row = nothing;
-    std::int16_t* const wider = &scratch.wider[row * grid.stride()];
+    std::int16_t* const wider = &scratch.wider[row * stride];
     const std::int16_t* const low = row_of(scratch.objects, row - 1, grid, scratch);
     const std::int16_t* const middle = row_of(scratch.objects, row, grid, scratch);
     const std::int16_t* const high = row_of(scratch.objects, row + 1, grid, scratch);
     std::int16_t* const leasts = scratch.least.data();
-    for (std::size_t column = 0; column < grid.stride(); column += detail::kShortPackWidth) {
+    for (std::size_t column = 0; column < stride; column += detail::kShortPackWidth) {
       const Short least = min(min(Short::load(low + column), Short::load(middle + column)),
                               Short::load(high + column));
       least_of_row = min(least_of_row, least);
       select(least < most, least, nothing).store(leasts + column);
     }
     if (!(least_of_row < most).any()) {
-      std::fill_n(wider, grid.stride(), kNothing);
+      std::fill_n(wider, stride, kNothing);
       return;
     }
     wrap(leasts, static_cast<std::size_t>(grid.columns));
-    for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < grid.stride();
+    Cell* const cells = &cells_[row * stride];
+    for (std::size_t column = detail::kPackWidth; column + detail::kPackWidth < stride;
          column += detail::kShortPackWidth) {
       const Short least = least_of_three<Short>(leasts + column);
       least.store(wider + column);
-      if (protects && (least < nothing).any()) {
-        protect(&cells_[row * grid.stride() + column], least);
-      }
+      if (protects && (least < nothing).any()) protect(cells + column, least);
     }
   }
 

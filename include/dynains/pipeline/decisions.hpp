@@ -168,7 +168,7 @@ class ScanDecision {
   /// older scan may come before that on the newest one. The spans are valid until the next call.
   virtual EvidenceVerdict verdict(const ScanSlot& scan, bool is_final) = 0;
 
-  /// Which non-ground points of the newest scan may move: 1, else 0. Empty unless it is a reference
+  /// By non-ground point of the newest scan: 0 if it does not move. Empty unless it is a reference
   /// for others. Call it, and then make_reference() unless it is empty, after the first judge().
   virtual std::optional<Span<const std::uint8_t>> may_move() { return std::nullopt; }
   virtual void make_reference(const ScanSlot&) {}
