@@ -62,19 +62,6 @@ Eigen::Isometry3d scaled(Eigen::Isometry3d pose, double factor) {
   return pose;
 }
 
-/// Right poses pass, and two usual mistakes are named, by motions that are registered.
-void check_way_is_told(const Street& road) {
-  const Diagnosis sound = road.diagnose([](const Eigen::Isometry3d& T) { return T; });
-  CHECK(sound.sound());
-  CHECK(road.flags(sound).empty());
-  CHECK(sound.registered_pairs >= 6);
-  CHECK(sound.translation_error < 0.1);
-  CHECK(road.flags(road.diagnose([](const Eigen::Isometry3d& T) { return T.inverse(); })) ==
-        "--invert-poses");
-  CHECK(road.flags(road.diagnose([](const Eigen::Isometry3d& T) { return scaled(T, 1000.0); })) ==
-        "--pose-units mm");
-}
-
 }  // namespace
 
 TEST_CASE("check names the mistake in the poses and the option against it") {
@@ -218,20 +205,6 @@ TEST_CASE("check gives the error of inexact poses in centimetres and degrees") {
   CHECK(noisy.registered_pairs >= 8);
   CHECK_THAT(street.advice(noisy), ContainsSubstring("inexact by about 1") &&
                                        ContainsSubstring(" deg from one scan to the next"));
-}
-
-TEST_CASE("On a motorway, plants and posts tell the way that walls and rails leave open") {
-  const simulation::Config config =
-      drive_of(simulation::Scene::kHighway, simulation::Sensor::kHdl32, 24, 31);
-  const Street road(config);
-  check_way_is_told(road);
-  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
-  T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  const Diagnosis yawed =
-      road.diagnose([&](const Eigen::Isometry3d& T) { return T * T_body_sensor.inverse(); });
-  CHECK(yawed.verdict == PoseVerdict::kOtherwise);
-  const Eigen::Matrix3d R = yawed.proposal.convention.T_body_sensor.linear();
-  CHECK(Eigen::AngleAxisd(R.transpose() * T_body_sensor.linear()).angle() < 0.03);
 }
 
 TEST_CASE("check reports what it cannot decide") {
