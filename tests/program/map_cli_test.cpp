@@ -136,21 +136,6 @@ TEST_CASE("map: a session twice, another voxel edge and bad names are refused, a
   CHECK(read_tree(days.at("city")) == before);
 }
 
-TEST_CASE("map: a broken session is named by check with path and position") {
-  const Days days;
-  succeed(days.update(0, "city", "out"));
-  const std::string file = days.at("city/day0.session");
-  std::string bytes = read_text(file);
-  bytes[70] = static_cast<char>(bytes[70] ^ 4);
-  write_text(file, bytes);
-  const Outcome check = start({"map", days.at("city"), "check"});
-  CHECK(check.code == 1);
-  CHECK_THAT(check.out, ContainsSubstring(file + ": byte 8: "));
-  check_refused(start({"map", days.at("city"), "export", days.at("x.ply")}), 1,
-                file + ": byte 8: ");
-  CHECK_FALSE(fs::exists(days.at("x.ply")));
-}
-
 TEST_CASE("map: a copy of a session and an empty one are told, and drop repairs") {
   const Days days;
   succeed(days.update(0, "city", "out"));
@@ -165,6 +150,7 @@ TEST_CASE("map: a copy of a session and an empty one are told, and drop repairs"
   const Outcome damaged = start({"map", city, "check"});
   CHECK(damaged.code == 1);
   CHECK_THAT(damaged.out, ContainsSubstring("e.session: ") && ContainsSubstring("2 defects"));
+  check_refused(start({"map", city, "export", days.at("x.ply")}), 1, "e.session: ");
   succeed(start({"map", city, "drop", "z"}));
   succeed(start({"map", city, "drop", "e"}));
   succeed(start({"map", city, "check"}));
