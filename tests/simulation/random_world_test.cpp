@@ -184,9 +184,10 @@ TEST_CASE("de-skewing takes the motion within a scan away as far as it is known"
 TEST_CASE("the drift of written poses grows with the way") {
   Config config = test::drive_of(Scene::kStatic, Sensor::kVlp16, 100, 5);
   config.ego_speed = 10;
+  config.max_range = 5;  // only poses count
   config.pose_drift = 0.5;
   double early = 0, late = 0;
-  for (config.seed = 1; config.seed <= 12; ++config.seed) {
+  for (config.seed = 1; config.seed <= 6; ++config.seed) {
     Simulator simulator(config);
     const auto error = [&simulator](std::size_t i) {
       const SimulatedScan scan = simulator.scan(i);
@@ -197,7 +198,7 @@ TEST_CASE("the drift of written poses grows with the way") {
     late += error(99);
   }
   CHECK(late > 1.5 * early);
-  CHECK(late / 12 == Approx(0.5 * 1.6).epsilon(0.5));  // mean length of three errors
+  CHECK(late / 6 == Approx(0.5 * 1.6).epsilon(0.5));  // mean length of three errors
 }
 
 }  // namespace
