@@ -20,6 +20,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "simulation/simulator.hpp"
+#include "support/simulated_runs.hpp"
 
 using namespace dynains;
 
@@ -41,20 +42,6 @@ struct Truth {
 struct Counts {
   int observed = 0, found = 0, near = 0, timed = 0, fast = 0, pairs = 0, switches = 0;
   int listed = 0, false_ones = 0, doubles = 0;
-
-  Counts& operator+=(const Counts& other) {
-    observed += other.observed;
-    found += other.found;
-    near += other.near;
-    timed += other.timed;
-    fast += other.fast;
-    pairs += other.pairs;
-    switches += other.switches;
-    listed += other.listed;
-    false_ones += other.false_ones;
-    doubles += other.doubles;
-    return *this;
-  }
 };
 
 constexpr double kRange = 40.0;  // m
@@ -185,9 +172,7 @@ int main(int argc, char** argv) {
     simulation::Config world = simulation::random_world(seed);
     world.scans = static_cast<int>(number(3, 60));
     if (world.rolling_shutter) world.deskewed = 0.0;  // with times of the points
-    simulation::Simulator simulator(world);
-    std::vector<simulation::SimulatedScan> scans;
-    for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+    std::vector<simulation::SimulatedScan> scans = test::simulate(world);
     deskew(scans);
     const std::vector<Truth> truth = truth_of(scans);
     std::size_t observations = 0;
@@ -199,9 +184,10 @@ int main(int argc, char** argv) {
     config.objects = true;
     DynaInsRemover remover(config);
     std::array<Counts, 2> counts;
-    std::array<Ids, 2> ids;
+    std::array<Ids, 2> ids, ids_for_sums;
     const auto take = [&](const ScanVerdict& verdict, std::size_t kind) {
       count(truth[verdict.scan], verdict.objects, ids[kind], counts[kind]);
+      count(truth[verdict.scan], verdict.objects, ids_for_sums[kind], sums[kind]);
     };
     for (const simulation::SimulatedScan& scan : scans) {
       const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
@@ -214,7 +200,6 @@ int main(int argc, char** argv) {
       print(std::to_string(seed) + ' ' + plain_value(world.scene) + ' ' +
                 plain_value(world.sensor) + ' ' + kNames[kind],
             counts[kind]);
-      sums[kind] += counts[kind];
     }
   }
   for (std::size_t kind = 0; kind < 2; ++kind) print(kNames[kind], sums[kind]);

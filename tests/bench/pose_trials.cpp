@@ -2,8 +2,6 @@
 // Markdown. An answer is right if the proposed options give the true motion, or if the poses as
 // given do and no option is proposed, or if they are called inexact and are so by 3 cm.
 //   pose_trials [EVERY]   (every n-th recording)
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -21,8 +19,7 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "simulation/simulator.hpp"
-#include "simulation/write_sequence.hpp"
+#include "support/written_drive.hpp"
 
 using namespace dynains;
 namespace fs = std::filesystem;
@@ -240,9 +237,6 @@ int main(int argc, char** argv) {
   constexpr std::size_t kFirstSeed = 100;
   const std::vector<Kind> all = kinds();
   std::map<std::string, std::pair<int, int>> right_of;
-  std::string pattern = (fs::temp_directory_path() / "pose_trials_XXXXXX").string();
-  const fs::path folder = ::mkdtemp(pattern.data());
-  fs::create_directory(folder / "velodyne");
   std::size_t number = 0;
   for (const std::string scene : value_names(simulation::Scene())) {
     for (const char* const sensor : {"hdl64", "vlp16", "os1-64", "hdl32", "livox"}) {
@@ -252,23 +246,17 @@ int main(int argc, char** argv) {
       config.sensor = value_of_name<simulation::Sensor>(sensor).value();
       config.scans = static_cast<int>(kScans);
       config.seed = kFirstSeed + number;
-      simulation::Simulator simulator(config);
-      Poses truth;
-      for (std::size_t i = 0; i < kScans; ++i) {
-        const simulation::SimulatedScan scan = simulator.scan(i);
-        write_scan(folder / "velodyne" / (simulation::scan_name(i) + ".bin"), scan.xyzi);
-        truth.push_back(scan.T_world_sensor);
-      }
+      const test::WrittenDrive drive(config);
+      const Poses truth = drive.poses();
       for (const Kind& kind : all) {
-        fs::remove(folder / "times.txt");
-        kind.write(folder, truth);
+        fs::remove(drive.path() / "times.txt");
+        kind.write(drive.path(), truth);
         auto& [good, count] = right_of[kind.name];
-        good += is_right(folder, kind, truth) ? 1 : 0;
+        good += is_right(drive.path(), kind, truth) ? 1 : 0;
         ++count;
       }
     }
   }
-  fs::remove_all(folder);
   int good = 0;
   int count = 0;
   std::cout << "| poses | right answers |\n|---|---|\n";
