@@ -228,6 +228,41 @@ TEST_CASE("ground is removed if it is free in two references and hit in few") {
   CHECK(ground_seen_free(ground, {far_free, near_free, far_free}) == far);
 }
 
+TEST_CASE("a pavement that references hit stays under a removed person") {
+  // Points of one voxel of 1.2 m, on a pavement between lower streets. A foot is in their run.
+  PointBuffer ground;
+  for (const float x : {4.9F, 5.1F, 5.3F, 5.5F}) ground.push_back(x, 0.3F, -1.65F);
+  ground.push_back(5.4F, 0.3F, -1.60F);
+  const std::set<std::uint32_t> all = {0, 1, 2, 3, 4}, foot = {4};
+  for (float x = 3.0F; x < 8.0F; x += 0.25F) {
+    for (const float y : {-1.5F, -1.3F, 1.5F, 1.7F}) ground.push_back(x, y, -1.7F);
+  }
+  RemovedBox person;
+  for (std::size_t i = 0; i < person.points.size(); ++i) {
+    person.points.x[i] = 5.2F;
+    person.points.y[i] = 0.3F;
+    person.points.z[i] = -1.4F;
+  }
+  const auto removed = [&](const std::vector<BeamResult>& references, double gap) {
+    GroundSamples samples = samples_of(FreeSpaceConfig(), ground);
+    for (const BeamResult result : references) {
+      samples.add(visibility_of(std::vector<BeamResult>(samples.size(), result)));
+    }
+    MovedGround moved{FreeSpaceConfig()};
+    SensorModel sensor = SensorModel::typical();
+    sensor.elevation_gap_wide = gap;
+    moved.adapt(sensor);
+    return removed_with_box(std::move(moved), ground, samples, Cause::kUnderInstance, person);
+  };
+  constexpr BeamResult kHit = BeamResult::kHit;
+  CHECK(removed({}, 0.6) == all);
+  CHECK(removed({kHit, kHit}, 0.6) == all);
+  CHECK(removed({kHit, kHit, kHit}, 0.6) == foot);
+  CHECK(removed({kHit, kHit, kHit, BeamResult::kFree}, 0.6) == all);
+  // At 5 m, beams 2 deg apart are 0.17 m apart: a hit may lie beside the sample.
+  CHECK(removed({kHit, kHit, kHit}, 2.0) == all);
+}
+
 TEST_CASE("where the ground around is not known, all of it is removed from under a removed box") {
   FreeSpaceConfig config;
   // Ground points exist below the box only.

@@ -143,10 +143,18 @@ class MovedGround {
   Span<const EvidenceVerdict::GroundPoint> find(PointsView ground, const GroundSamples& samples) {
     found_.clear();
     under_.assign(GroundFootprint::block_count(ground.size()), 0);
+    bool any = false;
     if (!footprint_.empty() && removes_footprint_) {
-      with_packs([&](auto) { find_under(ground, samples); });
+      with_packs([&](auto) {
+        for (std::size_t i = 0; i < under_.size(); ++i) {
+          under_[i] = footprint_.find_under(block_of(ground, i), clearance_);
+          any |= under_[i] != 0;
+        }
+      });
     }
-    if (find_free_voxels(samples)) remove_free_runs(ground, samples);
+    if (any && rise_ > 0.0F) find_surroundings(ground, samples);
+    any |= judge_samples(samples);
+    if (any) remove_points(ground, samples);
     footprint_.clear();
     return found_;
   }
@@ -155,23 +163,11 @@ class MovedGround {
   static constexpr double kMinCell = 0.1;       // m, smallest cell of the footprint
   static constexpr std::uint32_t kMinFree = 2;  // "free" references of a moved voxel
   static constexpr float kMinRatio = 0.3F;      // "free" to "hit" references of a moved voxel
+  static constexpr std::uint32_t kMinHit = 3;   // "hit" references of a voxel that is ground
+  static constexpr float kMaxGap = 0.1F;        // m between two beams whose hits show the ground
 
-  // Removes the ground points under removed points that rise above the surrounding ground (the foot
-  // of an object), or whose surrounding ground is unknown.
-  void find_under(PointsView ground, const GroundSamples& samples) {
-    bool any = false;
-    for (std::size_t i = 0; i < under_.size(); ++i) {
-      under_[i] = footprint_.find_under(block_of(ground, i), clearance_);
-      any |= under_[i] != 0;
-    }
-    if (!any) return;
-    if (rise_ > 0.0F) find_surroundings(ground, samples);
-    for (std::size_t i = 0; i < under_.size(); ++i) {
-      const std::uint64_t removed =
-          rise_ > 0.0F ? rising(block_of(ground, i), under_[i]) : under_[i];
-      remove(i, removed, Cause::kUnderInstance);
-    }
-  }
+  /// What references saw of a sample.
+  enum class Seen : std::uint8_t { kUnknown, kMoved, kGround };
 
   // The first points of the runs beside the removed points give the height of the surrounding
   // ground, which is unknown without samples.
@@ -192,12 +188,68 @@ class MovedGround {
     around_.assign(PointsView(around_points_).subview(0, count));
   }
 
+  // Sets `seen_` by GroundSamples::group_of; returns whether any voxel has moved.
+  bool judge_samples(const GroundSamples& samples) {
+    bool any = false;
+    seen_.assign(samples.size() + 2, Seen::kUnknown);
+    for (std::size_t sample = 0; sample < samples.size(); ++sample) {
+      const std::uint8_t free = samples.free[sample], hit = samples.hit[sample];
+      if (free >= kMinFree && static_cast<float>(free) >= kMinRatio * static_cast<float>(hit)) {
+        seen_[sample + 1] = Seen::kMoved;
+        any = true;
+      } else if (free == 0 && hit >= kMinHit) {
+        seen_[sample + 1] = Seen::kGround;
+      }
+    }
+    return any;
+  }
+
+  // Removes the runs in moved voxels, and the points under removed points that rise above the
+  // surrounding ground (the foot of an object), or whose surrounding ground is unknown.
+  void remove_points(PointsView ground, const GroundSamples& samples) {
+    const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
+    const std::uint32_t* group = samples.group_of.data();
+    for (std::size_t i = 0; i < under_.size(); ++i) {
+      const PointsView block = block_of(ground, i);
+      const std::uint64_t runs = samples.size() > 0 ? samples.run_begins[i] : 0;
+      std::uint64_t rising = rise_ > 0.0F ? find_rising(block, under_[i]) : under_[i];
+      std::uint64_t moved = 0;
+      for (std::uint64_t left = runs; left != 0; left &= left - 1, ++group) {
+        const Seen seen = seen_[*group];
+        if (seen == Seen::kUnknown) continue;
+        const std::uint64_t first = lowest(left);
+        const std::uint64_t next = lowest(left ^ first);  // 0 behind the last run
+        const std::uint64_t run = (next - 1) & ~(first - 1) & all_of(block);
+        if (seen == Seen::kMoved) {
+          moved |= run;
+        } else if ((rising & run) != 0) {
+          rising &= ~find_seen(block, rising & run, samples.points.z[*group - 1]);
+        }
+      }
+      remove(i, rising, Cause::kUnderInstance);
+      remove(i, moved & ~under_[i], Cause::kFreeSpace);
+    }
+  }
+
   // The bits of `which` whose points rise above the surrounding ground.
-  std::uint64_t rising(PointsView block, std::uint64_t which) {
+  std::uint64_t find_rising(PointsView block, std::uint64_t which) {
     std::uint64_t bits = 0;
     for_each_bit(which, [&](std::size_t k) {
       const bool rises = around_.height(block.x[k], block.y[k], block.z[k]) >= rise_;
       bits |= std::uint64_t{rises} << k;
+    });
+    return bits;
+  }
+
+  // The bits of `which` whose points do not rise above a sample at height `z` that references hit.
+  // The plane through a kerb lies below the pavement. Where beams are far apart, the hits may lie
+  // above or below the sample.
+  std::uint64_t find_seen(PointsView block, std::uint64_t which, float z) const {
+    std::uint64_t bits = 0;
+    for_each_bit(which, [&](std::size_t k) {
+      const float range = std::sqrt(block.x[k] * block.x[k] + block.y[k] * block.y[k]);
+      const bool is_seen = range * clearance_.slope < kMaxGap && block.z[k] < z + rise_;
+      bits |= std::uint64_t{is_seen} << k;
     });
     return bits;
   }
@@ -218,35 +270,6 @@ class MovedGround {
     });
   }
 
-  // Sets `moved_` by GroundSamples::group_of; returns whether any voxel has moved.
-  bool find_free_voxels(const GroundSamples& ground) {
-    bool any = false;
-    moved_.assign(ground.size() + 2, 0);
-    for (std::size_t sample = 0; sample < ground.size(); ++sample) {
-      const std::uint8_t free = ground.free[sample];
-      const bool moved = free >= kMinFree && static_cast<float>(free) >=
-                                                 kMinRatio * static_cast<float>(ground.hit[sample]);
-      moved_[sample + 1] = moved ? 1 : 0;
-      any |= moved;
-    }
-    return any;
-  }
-
-  // Removes the runs in moved voxels, except points under removed points.
-  void remove_free_runs(PointsView ground, const GroundSamples& samples) {
-    const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
-    const std::uint32_t* group = samples.group_of.data();
-    for (std::size_t i = 0; i < samples.run_begins.size(); ++i) {
-      const std::uint64_t all = all_of(block_of(ground, i));
-      for (std::uint64_t left = samples.run_begins[i]; left != 0; left &= left - 1) {
-        if (moved_[*group++] == 0) continue;
-        const std::uint64_t first = lowest(left);
-        const std::uint64_t next = lowest(left ^ first);  // 0 behind the last run
-        remove(i, (next - 1) & ~(first - 1) & all & ~under_[i], Cause::kFreeSpace);
-      }
-    }
-  }
-
   bool removes_footprint_;
   float rise_;
   float belief_;
@@ -256,7 +279,8 @@ class MovedGround {
   std::vector<std::uint64_t> under_;    // by block of the ground: points under removed points
   Clearance clearance_ = {0.4F, 0.0F};  // between the ground and objects on it
   std::vector<EvidenceVerdict::GroundPoint> found_;
-  std::vector<std::uint8_t> moved_;  // by group of points, then by group of runs
+  std::vector<std::uint8_t> moved_;  // by group of points
+  std::vector<Seen> seen_;           // by group of runs
 };
 
 }  // namespace dynains::detail
