@@ -91,21 +91,18 @@ struct InstanceBeliefs {
   /// Log-odds that a supervoxel was free, a FreeSpaceSum. Thin objects, which some beams pass, have
   /// too many hits for the sum to grow.
   struct Belief {
-    float level = 0.0F;  ///< log-odds by the references of one side of time, >= 0
-    float peak = 0.0F;   ///< maximum of `level` that hits cannot take back, over both sides of time
+    float level = 0.0F;          ///< log-odds by the references of one side of time, >= 0
+    float peak = 0.0F;           ///< maximum of `level`, over both sides of time
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
-    /// References with hits on enough samples, at most kFirmHits. Free samples without weight set
-    /// it back to 1.
-    std::uint8_t hits = 0;
+    std::uint8_t hits = 0;       ///< references with hits on enough samples, at most kFirmHits
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
     /// As which Counts holds it. kStood is decided: hits alone change nothing but `hits`.
     enum class State : std::uint8_t { kUnknown, kDecided, kStood, kMoved };
     State counted = State::kUnknown;
 
-    float highest() const { return std::max(peak, level); }
     /// Whether it stays when its instance moves, since many references hit its place and none saw
     /// it free. An object that moves leaves its place earlier.
-    bool stays() const { return hits >= kFirmHits && highest() <= 0.0F; }
+    bool stays() const { return hits >= kFirmHits && peak <= 0.0F; }
   };
   /// Numbers of samples of an instance, or of a part of it.
   struct Counts {
@@ -154,7 +151,6 @@ class InstanceBeliefUpdater {
   /// Restarts the sums for the references on the other side of time; keeps the peaks.
   void begin_later_references(InstanceBeliefs& beliefs) const {
     for (Belief& belief : beliefs.supervoxels) {
-      belief.peak = belief.highest();
       belief.level = 0.0F;
       belief.turns &= static_cast<std::uint8_t>(~1U);
     }
@@ -188,7 +184,7 @@ class InstanceBeliefUpdater {
   /// that beams pass by chance, such as foliage.
   bool is_free(const Belief& belief) const {
     return belief.turns < kTurnsByChance &&
-           belief.highest() >= (belief.contested != 0 ? contested_level_ : free_level_);
+           belief.peak >= (belief.contested != 0 ? contested_level_ : free_level_);
   }
 
  private:
@@ -220,7 +216,7 @@ class InstanceBeliefUpdater {
     if (is_free(belief)) return Belief::State::kMoved;
     if (belief.hits == 0) return Belief::State::kUnknown;
     const bool may_turn = belief.turns % 2 != 0 && belief.turns < kTurnsByChance;
-    return may_turn || belief.highest() > 0.0F ? Belief::State::kDecided : Belief::State::kStood;
+    return may_turn || belief.peak > 0.0F ? Belief::State::kDecided : Belief::State::kStood;
   }
 
   static void count_hits(Belief& belief, Visibility::Count visible, std::uint32_t samples) {
@@ -246,20 +242,17 @@ class InstanceBeliefUpdater {
   // Updates the belief on a supervoxel by one reference (Eq. 15), with `samples` samples and at
   // least one visible sample. No change if the ratio of free to visible samples lies between the
   // limits of FreeSpaceSum. `weight`: of free samples. Those of a reference that mostly hits an
-  // instance, or sees little of it, may lie at an edge of a standing object: they count half, and
-  // later hits take them back. A single hit sets `contested`, but does not count in `hits`.
+  // instance, or sees little of it, may lie at an edge of a standing object: they count half. A
+  // single hit sets `contested`, but does not count in `hits`.
   void update(Belief& belief, Visibility::Count visible, std::uint32_t samples,
               float weight) const {
     const auto free = static_cast<float>(visible.free);
     const float free_ratio = free / static_cast<float>(visible.free + visible.hit);
     if (free_ratio >= FreeSpaceSum::kFreeRatio) {
-      if (weight <= 0.0F) {
-        belief.hits = std::min<std::uint8_t>(belief.hits, 1);
-        return;
-      }
+      if (weight <= 0.0F) return;
       belief.turns |= 1U;
       sum_.raise(belief.level, free_ratio, weight);
-      if (weight >= 1.0F) belief.peak = std::max(belief.peak, belief.level);
+      belief.peak = std::max(belief.peak, belief.level);
       return;
     }
     if (free_ratio > FreeSpaceSum::kHitRatio) return;

@@ -115,15 +115,15 @@ class InstanceJudge {
     float level = 0.0F;
     for (std::uint32_t s = first; s < last; ++s) {
       const InstanceBeliefs::Belief& belief = beliefs.supervoxels[s];
-      level = std::max(level, belief.highest());
-      verdicts[s] = {cause_to_stay(belief), as_probability(belief.highest())};
+      level = std::max(level, belief.peak);
+      verdicts[s] = {cause_to_stay(belief), as_probability(belief.peak)};
       if (updater.is_free(belief)) free_.push_back(s);
     }
     return level;
   }
 
   static Cause cause_to_stay(const InstanceBeliefs::Belief& belief) {
-    if (belief.highest() > 0.0F) return Cause::kTooLittleFree;
+    if (belief.peak > 0.0F) return Cause::kTooLittleFree;
     return belief.contested != 0 ? Cause::kOccupied : Cause::kNoEvidence;
   }
 
