@@ -101,34 +101,27 @@ void BeamTable::add(double azimuth, double cos_elevation, double sin_elevation, 
   cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(azimuth)));
 }
 
-// Two mirrors with incommensurate speeds: petals that precess from scan to scan.
-void BeamTable::add_rosette(const SensorModel& model, std::size_t scan, Columns part) {
-  const double opening = 35 * kDegree;
+// Patterns that never repeat: their turns a scan are incommensurate.
+void BeamTable::add_free_beams(const SensorModel& model, std::size_t scan, Columns part) {
+  const auto fraction = [](double turns) { return turns - std::floor(turns); };
   const double first = static_cast<double>(scan) * model.columns;
   for (int i = part.first; i < part.last; ++i) {
     const double t = (first + i) / model.columns;
-    const double petal = 2 * kPi * (t * 61.6180339887 - std::floor(t * 61.6180339887));
-    const double spin = 2 * kPi * (t * 17.4142135624 - std::floor(t * 17.4142135624));
-    const double angle = opening * std::cos(petal);
+    if (model.dome) {
+      // A fast turn, and lasers that swing up and down between two elevations.
+      const double bottom = -7 * kDegree, top = 52 * kDegree;
+      const double laser = static_cast<double>(i % model.lasers) / model.lasers;
+      const double share = std::abs(2 * fraction(t * 79.6180339887 + 0.5 * laser) - 1);
+      const double elevation = bottom + (top - bottom) * share;
+      add(2 * kPi * fraction(t * 17.4142135624 + 0.02 * laser) - kPi, std::cos(elevation),
+          std::sin(elevation), row_of(elevation));
+      continue;
+    }
+    // Two mirrors: petals that precess from scan to scan.
+    const double angle = 35 * kDegree * std::cos(2 * kPi * fraction(t * 61.6180339887));
+    const double spin = 2 * kPi * fraction(t * 17.4142135624);
     const double y = std::sin(angle) * std::cos(spin), z = std::sin(angle) * std::sin(spin);
-    const double elevation = std::asin(z);
-    add(std::atan2(y, std::cos(angle)), std::sqrt(1 - z * z), z, row_of(elevation));
-  }
-}
-
-// A fast turn, and lasers that swing up and down between two elevations.
-void BeamTable::add_dome(const SensorModel& model, std::size_t scan, Columns part) {
-  const double bottom = -7 * kDegree, top = 52 * kDegree;
-  const double first = static_cast<double>(scan) * model.columns;
-  for (int i = part.first; i < part.last; ++i) {
-    const double t = (first + i) / model.columns;
-    const double laser = static_cast<double>(i % model.lasers) / model.lasers;
-    const double turn = t * 17.4142135624 + 0.02 * laser;
-    const double swing = t * 79.6180339887 + 0.5 * laser;
-    const double share = std::abs(2 * (swing - std::floor(swing)) - 1);
-    const double elevation = bottom + (top - bottom) * share;
-    add(2 * kPi * (turn - std::floor(turn)) - kPi, std::cos(elevation), std::sin(elevation),
-        row_of(elevation));
+    add(std::atan2(y, std::cos(angle)), std::sqrt(1 - z * z), z, row_of(std::asin(z)));
   }
 }
 
@@ -183,10 +176,8 @@ void BeamTable::sort_by_cell() {
 void BeamTable::fill(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part) {
   unordered_.clear();
   cells_.clear();
-  if (model.dome) {
-    add_dome(model, scan, part);
-  } else if (model.elevations.empty()) {
-    add_rosette(model, scan, part);
+  if (model.elevations.empty()) {
+    add_free_beams(model, scan, part);
   } else {
     add_rings(model, seed, scan, part);
   }

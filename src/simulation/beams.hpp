@@ -72,8 +72,7 @@ class BeamTable {
 
  private:
   void add(double azimuth, double cos_elevation, double sin_elevation, int row);
-  void add_rosette(const SensorModel& model, std::size_t scan, Columns part);
-  void add_dome(const SensorModel& model, std::size_t scan, Columns part);
+  void add_free_beams(const SensorModel& model, std::size_t scan, Columns part);
   void add_rings(const SensorModel& model, std::uint64_t seed, std::size_t scan, Columns part);
   void sort_by_cell();
 

@@ -38,14 +38,12 @@ std::uint64_t FootprintSet::key(Vec2 p) {
 }
 
 void FootprintSet::add(const Footprint& footprint) {
-  const auto index = static_cast<std::uint32_t>(all_.size());
-  all_.push_back(footprint);
   // Every cell within reach of the rectangle's surroundings lists it.
   const double reach = norm(Vec2{footprint.half_length, footprint.half_width}) + kCell / 2;
   const Vec2 c = footprint.centre;
   for (double x = std::floor((c.x - reach) / kCell); x * kCell <= c.x + reach; ++x) {
     for (double y = std::floor((c.y - reach) / kCell); y * kCell <= c.y + reach; ++y) {
-      cells_[key({(x + 0.5) * kCell, (y + 0.5) * kCell})].push_back(index);
+      cells_[key({(x + 0.5) * kCell, (y + 0.5) * kCell})].push_back(footprint);
     }
   }
 }

@@ -31,15 +31,14 @@ class FootprintSet {
   void visit_near(Vec2 p, Visitor&& visitor) const {
     const auto found = cells_.find(key(p));
     if (found == cells_.end()) return;
-    for (const std::uint32_t i : found->second) visitor(all_[i]);
+    for (const Footprint& footprint : found->second) visitor(footprint);
   }
 
  private:
   static constexpr double kCell = 24.0;
   static std::uint64_t key(Vec2 p);
 
-  std::vector<Footprint> all_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
+  std::unordered_map<std::uint64_t, std::vector<Footprint>> cells_;
 };
 
 }  // namespace dynains::simulation

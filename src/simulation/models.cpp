@@ -65,9 +65,9 @@ Model assembled(const Parts& parts, const Size& size, const Material& paint) {
 
 Model& Model::block(const Material& material, double x0, double x1, double y0, double y1, double z0,
                     double z1, double taper_x, double taper_y) {
-  push_back(make_tapered_box(material, vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
-                             vec((x1 - x0) / 2, (y1 - y0) / 2, (z1 - z0) / 2),
-                             static_cast<float>(taper_x), static_cast<float>(taper_y)));
+  push_back(make_primitive(Shape::kBox, material, vec((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),
+                           vec((x1 - x0) / 2, (y1 - y0) / 2, (z1 - z0) / 2), {},
+                           static_cast<float>(taper_x), static_cast<float>(taper_y)));
   return *this;
 }
 

@@ -37,7 +37,7 @@ void clip_quadratic(float a, float b, float c, Interval& interval) {
 }  // namespace
 
 Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec3 half,
-                         const Mat3& rotation) {
+                         const Mat3& rotation, float taper_x, float taper_y) {
   Primitive result;
   result.shape = shape;
   result.material = &material;
@@ -45,12 +45,6 @@ Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec
   const Mat3 inverse = transposed(rotation);
   result.to_unit = {(1 / half.x) * inverse.x, (1 / half.y) * inverse.y, (1 / half.z) * inverse.z};
   result.from_unit = transposed({half.x * inverse.x, half.y * inverse.y, half.z * inverse.z});
-  return result;
-}
-
-Primitive make_tapered_box(const Material& material, Vec3 centre, Vec3 half, float taper_x,
-                           float taper_y) {
-  Primitive result = make_primitive(Shape::kBox, material, centre, half);
   result.taper_x = taper_x / half.x;
   result.taper_y = taper_y / half.y;
   return result;

@@ -34,11 +34,10 @@ struct Primitive {
   float taper_x = 0.0F, taper_y = 0.0F;  ///< of a box: how far each side has moved at the top
 };
 
-/// `half` are the half extents along the axes of `rotation`.
+/// `half` are the half extents along the axes of `rotation`. `taper_x`, `taper_y`: m, how far the
+/// sides of a box have moved inwards at the top.
 Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec3 half,
-                         const Mat3& rotation = {});
-Primitive make_tapered_box(const Material& material, Vec3 centre, Vec3 half, float taper_x,
-                           float taper_y);
+                         const Mat3& rotation = {}, float taper_x = 0, float taper_y = 0);
 
 /// The primitive in another frame.
 Primitive transformed(const Rigid& T_target_source, const Primitive& source);

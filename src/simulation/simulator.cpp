@@ -24,9 +24,6 @@ struct Surface {
   std::uint32_t label = 0;
 };
 
-/// Surfaces in the order of measurement.
-using Surfaces = std::vector<std::optional<Surface>>;
-
 namespace {
 
 constexpr double kMovingSpeed = 0.5;  // m/s
@@ -582,7 +579,7 @@ class Simulator::Implementation {
   std::vector<std::array<double, 3>> drift_;  ///< m, of each moment
   BeamTable beams_;
   Renderer renderer_;
-  Surfaces surfaces_;
+  std::vector<std::optional<Surface>> surfaces_;  ///< in the order of measurement
 };
 
 Simulator::Simulator(const Config& config)

@@ -63,7 +63,10 @@ class Terrain {
     return v * static_cast<float>(1 / kCell) - static_cast<float>(first_tile * kCells);
   }
   /// The prepared tile at these samples, or null.
-  const Tile* near_tile(float u, float v) const;
+  const Tile* near_tile(float u, float v) const {
+    if (u <= -1 || v <= -1 || u >= kSide * kCells || v >= kSide * kCells) return nullptr;
+    return near_[grid_index(static_cast<int>(v) / kCells, static_cast<int>(u) / kCells, kSide)];
+  }
   float height_near(float x, float y) const;
 
   TerrainConfig config_;
@@ -80,10 +83,5 @@ class Terrain {
   int near_x_ = 0, near_y_ = 0;  ///< indices of the first prepared tile
   float low_ = 0, high_ = 0;
 };
-
-inline const Terrain::Tile* Terrain::near_tile(float u, float v) const {
-  if (u <= -1 || v <= -1 || u >= kSide * kCells || v >= kSide * kCells) return nullptr;
-  return near_[grid_index(static_cast<int>(v) / kCells, static_cast<int>(u) / kCells, kSide)];
-}
 
 }  // namespace dynains::simulation

@@ -73,10 +73,7 @@ bool write_sequence(Simulator& simulator, const std::filesystem::path& folder,
   sync_files(folder);
   write_calib(folder / "calib.txt", Tr);
   write_times(folder / "times.txt", times);
-  const Config& config = simulator.config();
-  if (config.has_pose_errors()) {
-    write_poses(folder / "poses_true.txt", true_poses);
-  }
+  if (simulator.config().has_pose_errors()) write_poses(folder / "poses_true.txt", true_poses);
   if (!mounts.empty()) write_poses(folder / "sensors.txt", mounts);
   write_poses(folder / "poses.txt", poses);
   return true;

@@ -40,7 +40,7 @@ TEST_CASE("a turned box is met at its edge") {
 
 TEST_CASE("a tapered box leans inwards") {
   // Half extent 2 at the bottom (z = 0) and 1 at the top (z = 2): 1.5 in the middle.
-  const Primitive box = make_tapered_box(kSolid, {0, 0, 1}, {2, 2, 1}, 1, 1);
+  const Primitive box = make_primitive(Shape::kBox, kSolid, {0, 0, 1}, {2, 2, 1}, {}, 1, 1);
   require_interval(intersect(box, {-10, 0, 1}, {1, 0, 0}), 8.5, 11.5);
   require_interval(intersect(box, {-10, 0, 0.0001F}, {1, 0, 0}), 8.00005, 11.99995);
   require_interval(intersect(box, {-10, 0, 1.9999F}, {1, 0, 0}), 8.99995, 11.00005);
