@@ -23,10 +23,12 @@ void OdometryConfig::validate() const {
 
 namespace {
 
-/// A pose, and the same turned by up to 30 deg.
-std::vector<Pose> turned(const Pose& T_map_near) {
-  std::vector<Pose> poses;
-  for (const double degrees : {0.0, -30.0, -20.0, -10.0, 10.0, 20.0, 30.0}) {
+/// A pose, and the same turned by up to `most` (deg).
+std::vector<Pose> turned(const Pose& T_map_near, int most) {
+  constexpr int kStep = 10;  // deg
+  std::vector<Pose> poses = {T_map_near};
+  for (int degrees = -most; degrees <= most; degrees += kStep) {
+    if (degrees == 0) continue;
     poses.push_back(T_map_near *
                     Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()));
   }
@@ -60,6 +62,7 @@ class Odometry::Loop {
     Pose T_last_newest = T_predicted;
     result.loss = register_scan(period, T_last_newest, result);
     const bool is_lost = result.loss != OdometryLoss::kNone;
+    if (!is_lost) fit_before_ = result.fit;
     const bool is_taken = !is_lost || T_odometry_sensor || result.loss == OdometryLoss::kGap;
     if (is_lost && is_taken) {
       T_last_newest = T_predicted;
@@ -121,31 +124,45 @@ class Odometry::Loop {
     return fit >= kMin || fit >= kMin * scan_.expected_fit();
   }
 
-  /// Sum of the weights of the points on planes. Poles do not count: columns of beams on smooth
-  /// walls look like them, and move with the sensor.
-  double weight_on_planes(const Pose& T_map_scan) const {
+  /// The predicted place, but not the predicted turn: a sensor that is carried by hand turns to and
+  /// fro.
+  Pose without_turn(Pose T_map_predicted) const {
+    T_map_predicted.linear() = T_world_last_.linear();
+    return T_map_predicted;
+  }
+
+  /// Sum of the weights of the points on planes whose normals and `direction` have a cosine of at
+  /// least `min_cosine`. Poles do not count: columns of beams on smooth walls look like them, and
+  /// move with the sensor.
+  double weight_on_planes(const Pose& T_map_scan, const Eigen::Vector3d& direction,
+                          double min_cosine) const {
     constexpr double kScale = 0.1;  // m, of the weights
     double sum = 0.0;
     for (const Eigen::Vector3d& p : scan_.keypoints()) {
       const Eigen::Vector3d place = T_map_scan * p;
       const CellSurface* const surface = map_.find(kCellLevels - 1, place);
       if (surface == nullptr || surface->direction_count != 1) continue;
+      if (std::abs(surface->directions[0].dot(direction)) < min_cosine) continue;
       sum += detail::robust_weight(surface->squared_distance(place), kScale);
     }
     return sum;
   }
 
-  /// Whether the scan fits clearly worse on both sides of its place, along the direction that
-  /// surfaces determine worst. Their scatter seems to determine a motion along smooth walls, where
-  /// any fits nearly as well.
+  /// Whether the scan is held along the direction that surfaces determine worst: by planes across
+  /// it, or because it fits clearly worse on both sides of its place. The scatter of smooth walls
+  /// seems to determine a motion along them, where any fits nearly as well.
   bool is_held(const Registration& found) const {
-    constexpr double kAside = 2.0;    // m, more than patterns of beams on surfaces are wide
-    constexpr double kAsGood = 0.75;  // ratio
-    const double least = kAsGood * weight_on_planes(found.T_a_b);
+    constexpr double kAcross = 0.8;      // cosine
+    constexpr double kMinAcross = 0.05;  // ratio of the weights
+    constexpr double kAside = 2.0;       // m, more than patterns of beams on surfaces are wide
+    constexpr double kAsGood = 0.75;     // ratio of the weights
+    const Eigen::Vector3d& direction = found.uncertain[0];
+    const double all = weight_on_planes(found.T_a_b, direction, 0.0);
+    if (weight_on_planes(found.T_a_b, direction, kAcross) > kMinAcross * all) return true;
     const auto is_worse_at = [&](double way) {
       Pose T_beside = found.T_a_b;
-      T_beside.translation() += way * found.uncertain[0];
-      return weight_on_planes(T_beside) < least;
+      T_beside.translation() += way * direction;
+      return weight_on_planes(T_beside, direction, 0.0) < kAsGood * all;
     };
     return is_worse_at(kAside) && is_worse_at(-kAside);
   }
@@ -154,6 +171,7 @@ class Odometry::Loop {
   OdometryLoss register_scan(double period, Pose& T_last_newest, OdometryResult& result) {
     constexpr int kMaxTurns = 4;
     constexpr double kConverged = 0.02;  // m
+    constexpr double kPoor = 0.8;        // ratio to the fit of the scan before
     for (int turn = 0; turn < kMaxTurns; ++turn) {
       scan_.prepare(T_last_newest, period);
       const std::vector<Eigen::Vector3d>& points = scan_.keypoints();
@@ -165,7 +183,11 @@ class Odometry::Loop {
       std::optional<Registration> best;
       if (turn > 0 || is_predictable(period)) best = register_near(map_, points, T_predicted);
       if (turn == 0 && (!best || !is_overlap(best->score))) {
-        best = register_scans(map_, points, turned(T_predicted));
+        best = register_scans(map_, points, turned(T_predicted, 30));
+      }
+      if (turn == 0 && !first_ && (!best || best->score < kPoor * fit_before_)) {
+        const auto other = register_scans(map_, points, turned(without_turn(T_predicted), 60));
+        if (other && (!best || best->score < kAlmost * other->score)) best = other;
       }
       if (first_ && turn == 0 && best) search_first_motion(*best, period);
       result.fit = best ? best->score : 0.0;
@@ -253,6 +275,7 @@ class Odometry::Loop {
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();  // m, of the map
   double mean_time_ = 0.0;                            // s, of the last scan
   double period_ = 0.0;                               // s, of T_last_newest_; 0: not known
+  double fit_before_ = 0.0;                           // of the last scan that is not lost
   std::size_t scan_count_ = 0;
 };
 

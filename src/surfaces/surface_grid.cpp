@@ -20,6 +20,7 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point) {
     Cell& cell = at.cells[number];
     const Eigen::Vector3d relative = point - cell.origin;
     cell.sums.add(relative.x(), relative.y(), relative.z(), 1.0);
+    cell.sensor = sensor_;
     cell.is_fitted = false;
   }
 }
@@ -75,7 +76,7 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
     surface.is_upright = std::abs(axes(2, 0)) < kUpright;
-    const Eigen::Vector3d beam = surface.mean - sensor_;
+    const Eigen::Vector3d beam = surface.mean - cell.sensor;
     // One scan needs distant ground, which a map has seen from nearer.
     const double edge_on = with_clutter_ ? 0.1 : 0.04;
     if (detail::is_trace_of_beam({beam[0], beam[1], beam[2]}, {axes(0, 0), axes(1, 0), axes(2, 0)},

@@ -73,6 +73,35 @@ TEST_CASE("Scans along smooth walls have a free direction, though many points fi
   CHECK(free_scans(simulation::Scene::kUrban) == 0);
 }
 
+TEST_CASE("Two scans a second by hand in a hall keep track, also if the sensor turns to and fro") {
+  simulation::Config config =
+      drive_of(simulation::Scene::kHall, simulation::Sensor::kOs1_64, 10, 501);
+  config.gait = simulation::Gait::kHandHeld;
+  config.rate = 2.0;
+  config.ego_speed = 1.2;
+  config.sensor_height = 1.4;
+  const double degrees = GENERATE(0.0, 40.0);
+  simulation::Simulator simulator(config);
+  const Pose T_first_world = simulator.scan(0).T_world_sensor.inverse();
+  Odometry odometry;
+  for (std::size_t i = 0; i < simulator.size(); ++i) {
+    simulation::SimulatedScan scan = simulator.scan(i);
+    const double angle = i < 3 || i % 2 == 0 ? 0.0 : degrees * M_PI / 180.0;
+    const Eigen::Matrix3d R_sensor_turned =
+        Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    for (std::size_t k = 0; k < scan.xyzi.size(); k += 4) {
+      Eigen::Map<Eigen::Vector3f> p(&scan.xyzi[k]);
+      p = R_sensor_turned.transpose().cast<float>() * p.eval();
+    }
+    const OdometryResult found = odometry.push(points_of(scan), {}, scan.time);
+    CAPTURE(degrees, i);
+    REQUIRE(found.loss == OdometryLoss::kNone);
+    CHECK(found.free_directions == 0);
+    const Pose T_exact = T_first_world * scan.T_world_sensor;
+    CHECK((found.T_world_sensor.translation() - T_exact.translation()).norm() < 0.03);
+  }
+}
+
 TEST_CASE("In a hall, a crowd and a forest, poses are found to centimetres, also without removal") {
   using simulation::Scene;
   for (const Scene scene : {Scene::kHall, Scene::kCrowd, Scene::kForest}) {

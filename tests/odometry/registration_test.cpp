@@ -115,5 +115,18 @@ TEST_CASE("An upright pole is a surface, a ring of the sensor is none") {
   CHECK(map.find(2, {0.1, 21.1, 0.0}) == nullptr);
 }
 
+TEST_CASE("The surface of a cell does not depend on when it is asked for") {
+  const bool is_asked_before = GENERATE(true, false);
+  const Eigen::Vector3d middle(0.5, 10.5, 0.5);
+  SurfaceGrid map(true);
+  map.begin_scan({0.5, 0.0, 0.5});  // in the plane of the points: they may be traces of beams
+  for (int i = -4; i <= 4; ++i) {
+    for (int k = -4; k <= 4; ++k) map.insert(middle + Eigen::Vector3d(0.0, 0.11 * i, 0.11 * k));
+  }
+  if (is_asked_before) CHECK(map.find(2, middle) == nullptr);
+  map.begin_scan({9.0, 10.0, 0.5});
+  CHECK(map.find(2, middle) == nullptr);
+}
+
 }  // namespace
 }  // namespace dynains::odometry

@@ -77,6 +77,7 @@ class SurfaceGrid {
   struct Cell {
     VoxelKey key;
     Eigen::Vector3d origin;  // m; sums are relative to it
+    Eigen::Vector3d sensor;  // m, at the newest point
     detail::PlaneMoments sums = {};
     mutable bool is_fitted = false;
     mutable CellSurface surface = {};
