@@ -1,9 +1,11 @@
 // Moving objects as boxes with ids and velocities (RemoverConfig::objects).
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "dynains/compiled_remover.hpp"
@@ -43,7 +45,6 @@ Listed list_objects(const std::vector<Scan>& scans, int threads) {
   DynaInsRemover::Config config;
   config.objects = true;
   config.threads = threads;
-  config.evidence.lookahead_scans = 10;
   DynaInsRemover remover(config);
   Listed listed;
   const auto keep = [](const ScanVerdict& verdict, std::vector<Found>& found) {
@@ -105,6 +106,7 @@ TEST_CASE("a moving van is one object with its place, size and velocity") {
 /// Observes a scan of moving clusters: points from the corner `low` on, 10 x 10 in a rectangle.
 struct Rectangle {
   Eigen::Vector2f low, size;  // m
+  Cause cause = Cause::kFreeSpace;
 };
 Span<const MovingObject> observe(std::uint64_t i, const std::vector<Rectangle>& clusters,
                                  detail::ObjectTracks& tracks) {
@@ -115,7 +117,7 @@ Span<const MovingObject> observe(std::uint64_t i, const std::vector<Rectangle>& 
   std::vector<std::uint32_t> cluster_of, group_of;
   for (std::uint32_t c = 0; c < clusters.size(); ++c) {
     scan.ids.push_back(c + 1);
-    groups.push_back({Cause::kFreeSpace, 1.0F});
+    groups.push_back({clusters[c].cause, 1.0F});
     cluster_of.push_back(c);
     for (int k = 0; k < 100; ++k) {
       const Eigen::Array2f share(static_cast<float>(k % 10) / 9.0F,
@@ -133,13 +135,54 @@ TEST_CASE("a van keeps the length that was seen before it drove away") {
   detail::ObjectTracks tracks(18.0, 4.5, 10, nullptr);
   for (std::uint64_t i = 0; i < 40; ++i) {
     const float rear = 2.0F + 0.8F * static_cast<float>(i);
-    const float seen = i < 15 ? 4.2F : 0.3F;  // m: then its rear hides the rest
+    const float seen = i < 15 ? 5.2F : 0.3F;  // m: then its rear hides the rest
     const auto objects = observe(i, {{{rear, -0.9F}, {seen, 1.8F}}}, tracks);
     if (i < 5) continue;
     REQUIRE(objects.size() == 1);
-    CHECK(objects[0].length == Approx(4.2).margin(0.2));
-    CHECK(objects[0].centre.x() == Approx(rear + 2.1).margin(0.3));
+    CHECK(objects[0].length == Approx(5.2).margin(0.2));
+    CHECK(objects[0].centre.x() == Approx(rear + 2.6).margin(0.3));
   }
+}
+
+TEST_CASE(
+    "a car that shows its rear alone has a usual length, and one seen from its side its own") {
+  detail::ObjectTracks tracks(18.0, 4.5, 10, nullptr);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    const float way = 0.8F * static_cast<float>(i);
+    const Rectangle ahead{{10.0F + way, -0.9F}, {0.3F, 1.8F}};
+    const Rectangle beside{{-8.0F + way, 25.0F}, {3.6F, 1.8F}};
+    const auto objects = observe(i, {ahead, beside}, tracks);
+    if (i < 10) continue;
+    REQUIRE(objects.size() == 2);
+    const auto& [car, small] = std::tie(objects[0], objects[1]);
+    CHECK(car.length == Approx(4.5).margin(0.1));
+    CHECK(car.centre.x() == Approx(10.0F + way + 2.25F).margin(0.2));
+    CHECK(small.length == Approx(3.6).margin(0.2));
+    CHECK(small.centre.x() == Approx(-8.0F + way + 1.8F).margin(0.2));
+  }
+}
+
+TEST_CASE("points that were removed for others neither begin nor widen objects") {
+  const auto width_with = [](Cause cause, detail::ObjectTracks* later) {
+    detail::ObjectTracks tracks(18.0, 4.5, 10, later);
+    double widest = 0.0;
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      const float rear = 5.0F + 0.8F * static_cast<float>(i);
+      const auto objects = observe(i,
+                                   {{{rear, 2.0F}, {4.2F, 1.8F}},
+                                    {{rear, 3.9F}, {4.2F, 0.5F}, cause},
+                                    {{rear, -6.0F}, {4.2F, 1.8F}, Cause::kPresumed}},
+                                   tracks);
+      CHECK(objects.size() <= 1);
+      for (const MovingObject& object : objects) widest = std::max(widest, object.width);
+    }
+    return widest;
+  };
+  detail::ObjectTracks newest(18.0, 4.5, 10, nullptr);
+  CHECK(width_with(Cause::kFreeSpace, nullptr) == Approx(2.4).margin(0.1));
+  CHECK(width_with(Cause::kDynamicOccupancy, nullptr) == Approx(1.8).margin(0.1));
+  CHECK(width_with(Cause::kWithInstance, nullptr) == Approx(2.4).margin(0.1));
+  CHECK(width_with(Cause::kWithInstance, &newest) == Approx(1.8).margin(0.1));
 }
 
 TEST_CASE("vehicles abreast that move alike are no single object") {

@@ -27,7 +27,7 @@ class ObjectTracks {
  public:
   /// `max_length`, `max_height`: m, of an object. `memory`: scans for which a lost track is kept.
   /// `later`: tracks that are scans ahead and outlive this, or null. Objects have their ids, and
-  /// begin with the motions, and have at least the sizes, that they know.
+  /// begin with the motions and sizes that they know.
   ObjectTracks(double max_length, double max_height, std::size_t memory, ObjectTracks* later)
       : max_length_(max_length), max_height_(max_height), memory_(memory), later_(later) {}
 
@@ -113,18 +113,27 @@ class ObjectTracks {
     std::uint64_t scan;  // the last one
   };
 
+  // Whether a point shows by itself where an object is. Others were removed with what is near them,
+  // or provisionally: they count inside the box of an object alone. The newest scans have too
+  // little evidence to do without those of their instances.
+  bool is_certain(Cause cause) const {
+    return cause != Cause::kPresumed && cause != Cause::kDynamicOccupancy &&
+           (cause != Cause::kWithInstance || later_ == nullptr);
+  }
+
   template <class Visit>
-  static void for_each_dynamic(const ScanSlot& scan, const EvidenceVerdict& evidence,
-                               Visit&& visit) {
+  void for_each_dynamic(const ScanSlot& scan, const EvidenceVerdict& evidence,
+                        Visit&& visit) const {
     const Eigen::Matrix3f R_world_level = scan.T_world_level.linear().cast<float>();
     const PointsView points = scan.split.non_ground();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const std::uint32_t group = evidence.group_of[i];
-      if (group == 0 || !is_dynamic(evidence.groups[group].cause)) continue;
+      const Cause cause = evidence.groups[group].cause;
+      if (group == 0 || !is_dynamic(cause)) continue;
       const std::uint32_t cluster = evidence.cluster_of[group - 1];
       if (cluster == kNoCluster) continue;
       const Eigen::Vector3f point(points.x[i], points.y[i], points.z[i]);
-      visit(cluster, Eigen::Vector3f(R_world_level * point));
+      visit(cluster, Eigen::Vector3f(R_world_level * point), is_certain(cause));
     }
   }
 
@@ -170,20 +179,21 @@ class ObjectTracks {
       track.half = 0.5F * size_of(track.object).cast<float>().array();
     }
     track_of_.clear();
-    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const Eigen::Vector3f& point) {
-      const std::uint32_t t = track_around(point, parts_[p].named);
+    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
+      const std::uint32_t t = track_around(point, certain, parts_[p].named);
       track_of_.push_back(t);
       if (t != kNoIndex) {
         ++tracks_[t].points;
         parts_[p].vote(t);
-      } else {
+      } else if (certain) {
         parts_[p].box.extend(point);
         ++parts_[p].points;
       }
     });
   }
 
-  std::uint32_t track_around(const Eigen::Vector3f& point, std::uint32_t named) const {
+  std::uint32_t track_around(const Eigen::Vector3f& point, bool certain,
+                             std::uint32_t named) const {
     std::uint32_t around = kNoIndex;
     float least = kGap + kGapOfRange * point.head<2>().norm();
     for (std::uint32_t t = 0; t < tracks_.size(); ++t) {
@@ -191,6 +201,7 @@ class ObjectTracks {
       if (!is_followed(track)) continue;
       const Eigen::Array2f offset = (along(track.along, point) - track.place).array();
       float gap = (offset.abs() - track.half).max(0.0F).matrix().norm();
+      if (gap > 0.0F && !certain) continue;
       if (t == named) gap -= kGapOfInstance + static_cast<float>(std::sqrt(track.pp));
       if (gap >= least) continue;
       around = t;
@@ -307,9 +318,9 @@ class ObjectTracks {
       }
     }
     std::size_t i = 0;
-    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const Eigen::Vector3f& point) {
-      const std::uint32_t followed = track_of_[i++];
-      const std::uint32_t t = followed != kNoIndex ? followed : parts_[p].begun;
+    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
+      std::uint32_t t = track_of_[i++];
+      if (t == kNoIndex && certain) t = parts_[p].begun;
       if (t == kNoIndex) return;
       tracks_[t].height.extend(Eigen::Matrix<float, 1, 1>(point.z()));
       for (std::size_t k = 0; k < kAxes; ++k) {
@@ -340,7 +351,7 @@ class ObjectTracks {
       track.seen = kNever;
       return;
     }
-    const Eigen::Vector2d centre = measure_centre(extent, known, track);
+    const Eigen::Vector2d centre = measure_centre(extent, track);
     if (object.first_scan == scan.scan) {
       object.centre.head<2>() = centre;
     } else {
@@ -353,13 +364,12 @@ class ObjectTracks {
     track.seen = scan.time;
     turn(track);
     if (!track.is_directed) return;
-    objects_.push_back(object);
+    objects_.push_back(with_hidden_length(object));
     if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
   }
 
   // The measured centre, by the side towards the sensor and the size: a far side may be hidden.
-  Eigen::Vector2d measure_centre(const Eigen::AlignedBox2f& extent, const Track* known,
-                                 Track& track) const {
+  Eigen::Vector2d measure_centre(const Eigen::AlignedBox2f& extent, Track& track) const {
     MovingObject& object = track.object;
     const Eigen::Matrix2d axes = axes_of(object.yaw);
     const Eigen::Vector2d expected = axes.transpose() * from_sensor(object);
@@ -371,20 +381,32 @@ class ObjectTracks {
       const double high = static_cast<double>(extent.max()[k]);
       const double before = size, middle = 0.5 * (low + high);
       size = remembered_size(track, size, high - low, view[1 - k]);
-      if (known != nullptr && known->is_directed) {
-        size = std::max(size, size_of(known->object)[k]);
-      }
       const double hidden = 0.5 * (size - (high - low));
-      if (low <= 0.0 && high >= 0.0) {  // both ends are equally far away
+      if (std::abs(expected[k]) <= 0.5 * size) {  // both ends are equally far away
         const double slack = std::abs(hidden);
         centre += std::clamp(expected[k], middle - slack, middle + slack) * axes.col(k);
         continue;
       }
-      const double away = low > 0.0 ? 1.0 : -1.0;
+      const double away = expected[k] > 0.0 ? 1.0 : -1.0;
       centre += (middle + away * hidden) * axes.col(k);
       object.centre.head<2>() += 0.5 * away * (size - before) * axes.col(k);
     }
     return centre;
+  }
+
+  // What drives and is as wide as a car has at least its length, as far as the side towards the
+  // sensor hides it: by the squared cosine of the angle between the length and the view.
+  MovingObject with_hidden_length(MovingObject object) const {
+    constexpr double kCarWidth = 1.3, kCarLength = 4.5;  // m: the narrowest, and a usual one
+    const Eigen::Vector2d axis = axes_of(object.yaw).col(0), view = from_sensor(object);
+    const double away = axis.dot(view), cosine = axis.dot(view.normalized());
+    if (object.width < kCarWidth || object.length >= kCarLength || away == 0.0) return object;
+    const double hidden = (kCarLength - object.length) * cosine * cosine;
+    // Beside the sensor both ends are seen.
+    const double side = away / std::max(0.5 * object.length, std::abs(away));
+    object.centre.head<2>() += 0.5 * side * hidden * axis;
+    object.length += hidden;
+    return object;
   }
 
   // The size of an object after it was seen as `seen`: nearly the largest one, since parts may be
