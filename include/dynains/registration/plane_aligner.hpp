@@ -171,7 +171,6 @@ class PlaneAligner {
     }
     planes.find(T, block, [&](std::size_t i, VoxelPlanes::Plane& plane, const auto& placed) {
       const std::array<double, 3> p = placed.point(i);
-      const SensorErrors errors = placed.errors(i);
       Match match = {&plane,
                      {p[0] - T(0, 3), p[1] - T(1, 3), p[2] - T(2, 3)},
                      {},
@@ -180,7 +179,7 @@ class PlaneAligner {
       for (std::size_t k = 0; k < kSensorErrors; ++k) {
         match.errors[k] = -plane.moved[k];
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          match.errors[k] += plane.normal[axis] * static_cast<double>(errors[k][axis]);
+          match.errors[k] += plane.normal[axis] * static_cast<double>(placed.moved[k][axis][i]);
         }
         match.distance += match.errors[k] * ((k == 0 ? elevation_ : 0.0) + found[6 + k]);
       }

@@ -19,7 +19,8 @@ namespace dynains::detail {
 /// Movement of a point, along the axes of the map, by one unit (rad) of each error: of all
 /// elevations, and of the mounting about the axes x and y of the sensor.
 inline constexpr std::size_t kSensorErrors = 3;
-using SensorErrors = std::array<std::array<float, 3>, kSensorErrors>;
+template <class Number>
+using SensorErrors = std::array<std::array<Number, 3>, kSensorErrors>;
 
 /// Map of planes: each voxel has the plane of its points, if these lie on a plane. The number of
 /// voxels is limited; a full map forgets the voxels that have received no point for the longest
@@ -61,18 +62,11 @@ class VoxelPlanes {
   /// The points of a block in the map.
   struct Placed {
     std::array<Block::Numbers, 3> along;  ///< by axis, then by point: m
-    std::array<std::array<std::array<float, Block::kMaxCount>, 3>, kSensorErrors> moved;
+    SensorErrors<std::array<float, Block::kMaxCount>> moved;
     VoxelKey keys[Block::kMaxCount];
 
     std::array<double, 3> point(std::size_t i) const {
       return {along[0][i], along[1][i], along[2][i]};
-    }
-    SensorErrors errors(std::size_t i) const {
-      SensorErrors errors;
-      for (std::size_t k = 0; k < kSensorErrors; ++k) {
-        for (std::size_t axis = 0; axis < 3; ++axis) errors[k][axis] = moved[k][axis][i];
-      }
-      return errors;
     }
   };
 
@@ -151,7 +145,7 @@ class VoxelPlanes {
   // The points of a voxel, relative to its centre.
   struct Moments {
     PlaneMoments sums;
-    SensorErrors errors = {};  // sums
+    SensorErrors<float> errors = {};  // sums
     std::uint32_t last_scan = 0;
   };
 
