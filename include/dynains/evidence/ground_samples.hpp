@@ -50,16 +50,14 @@ class GroundFootprint {
   /// Adds the points of a block whose bits are set in `which`.
   void add(PointsView block, std::uint64_t which) {
     const Located located = locate(block);
+    std::int32_t cell = 0;  // of the last points, neighbours on an object
+    float lowest = kNothing;
     for_each_bit(which & located.inside, [&](std::size_t i) {
-      for (std::int32_t row = -1; row <= 1; ++row) {
-        for (std::int32_t column = -1; column <= 1; ++column) {
-          const std::int32_t number = located.cell[i] + row * width_ + column;
-          const auto cell = static_cast<std::size_t>(number);
-          if (lowest_[cell] == kNothing) touched_.push_back(cell);
-          lowest_[cell] = std::min(lowest_[cell], block.z[i]);
-        }
-      }
+      if (located.cell[i] != cell && lowest != kNothing) add_around(cell, lowest);
+      lowest = located.cell[i] != cell ? block.z[i] : std::min(lowest, block.z[i]);
+      cell = located.cell[i];
     });
+    if (lowest != kNothing) add_around(cell, lowest);
   }
 
   /// The bits of the points of a block that lie less than `clearance` below the lowest removed
@@ -93,6 +91,17 @@ class GroundFootprint {
 
  private:
   static constexpr float kNothing = std::numeric_limits<float>::infinity();
+
+  // Adds the lowest point (m) of a cell.
+  void add_around(std::int32_t centre, float lowest) {
+    for (std::int32_t row = -1; row <= 1; ++row) {
+      for (std::int32_t column = -1; column <= 1; ++column) {
+        const auto cell = static_cast<std::size_t>(centre + row * width_ + column);
+        if (lowest_[cell] == kNothing) touched_.push_back(cell);
+        lowest_[cell] = std::min(lowest_[cell], lowest);
+      }
+    }
+  }
 
   // By point of a block: its cell; bits of the points inside the grid, whose border has none.
   struct Located {
