@@ -27,10 +27,7 @@ struct AlignmentBounds {
 };
 constexpr AlignmentBounds kBounds;
 
-std::string rounded(double value, int digits) {
-  const double scale = std::pow(10.0, digits);
-  return text::to_text(std::round(scale * value) / scale);
-}
+using text::rounded;
 
 [[noreturn]] void refuse(const City& city, const std::string& reason) {
   throw ConfigError(city.folder().string() + ": the session cannot be aligned: " + reason);

@@ -35,6 +35,11 @@ std::string fixed(double value, int decimals, std::string_view unit) {
   return text.str();
 }
 
+std::string rounded(double value, int decimals) {
+  const double scale = std::pow(10.0, decimals);
+  return to_text(std::round(scale * value) / scale);
+}
+
 std::string in_seconds(double time) { return to_text(time) + " s"; }
 
 std::optional<std::vector<double>> numbers_in(std::string text, std::string_view separators) {

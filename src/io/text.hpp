@@ -30,6 +30,8 @@ std::string lower_case(std::string text);
 std::string to_text(double value);
 /// With a number of decimals, and a unit behind it; "-" if it is not finite.
 std::string fixed(double value, int decimals, std::string_view unit = {});
+/// Rounded to a number of decimals, without zeros behind them.
+std::string rounded(double value, int decimals);
 /// "12.5 s".
 std::string in_seconds(double time);
 

@@ -1,15 +1,13 @@
 // How the times of points count: their unit and their origin.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
-#include "dynains/median.hpp"
 
 namespace dynains {
 
@@ -48,65 +46,14 @@ struct PointClockFinding {
   std::string text;
 };
 
-/// Finds the clock by what most points with a return of some scans say. A scan takes at most 1.5
-/// times the interval between scans, and at least 5 % of it (or 5 ms, if scans are farther apart
-/// than 0.1 s), so that one of s, ms, us and ns fits. If none does, times from 0 to 1 are shares of
-/// that interval, unless scans may be missing in between.
-class PointClockSearch {
- public:
-  /// `period`: median time from scan to scan, s; 0: not known. `unit`: s per unit of the column; 0:
-  /// to be found.
-  PointClockSearch(double period, double unit) : period_(period), unit_(unit) {}
-
-  /// `scan`: with raw times. `stamp`: time of the scan, s.
-  void add(double stamp, const RecordedScan& scan);
-  PointClockFinding result() const;
-
- private:
-  /// One scan of the sample.
-  struct Sample {
-    double stamp;
-    std::vector<double> times;   ///< of points with a return, ascending
-    bool is_random = false;      ///< times follow neither the order nor the direction of points
-    bool is_all_around = false;  ///< points lie in all directions
-
-    double quantile(double share) const;
-    double median() const { return quantile(0.5); }
-  };
-
-  double longest_scan() const;
-  double shortest_scan() const;
-  std::size_t count_outside(double unit) const;
-  double duration(double unit) const;
-  bool is_share() const;
-  std::optional<double> find_unit() const;
-  std::string found() const;
-  std::string outside_text(double unit) const;
-  std::string random_text() const;
-  std::string duration_text(double unit) const;
-  bool do_most(bool Sample::*property) const;
-
-  double period_;
-  double unit_;
-  std::size_t points_ = 0;  ///< of all samples
-  std::vector<Sample> samples_;
-};
-
-/// Searches the clock in a sample of scans. `times`: of the scans, s; `is_known`: whether they are
-/// measured. `unit`: as in PointClockSearch. `read(i)` gives scan i with raw times.
-template <class Read>
+/// Finds the clock in a sample of scans, by what most of their points with a return say. A scan
+/// takes at most 1.5 times the interval between scans, and at least 5 % of it (or 5 ms, if scans
+/// are farther apart than 0.1 s), so that one of s, ms, us and ns fits. If none does, times from 0
+/// to 1 are shares of that interval, unless scans may be missing in between.
+///
+/// `times`: of the scans, s; `is_known`: whether they are measured. `unit`: s per unit of the
+/// column; 0: to be found. `read(i)` gives scan i with raw times.
 PointClockFinding find_clock(const std::vector<double>& times, bool is_known, double unit,
-                             Read&& read) {
-  constexpr std::size_t kSamples = 5;
-  std::vector<double> periods;
-  for (std::size_t i = 1; i < times.size(); ++i) periods.push_back(times[i] - times[i - 1]);
-  PointClockSearch search(is_known ? median(std::move(periods)) : 0.0, unit);
-  const std::size_t count = std::min(kSamples, times.size());
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = count == 1 ? 0 : k * (times.size() - 1) / (count - 1);
-    search.add(times[i], read(i));
-  }
-  return search.result();
-}
+                             const std::function<const RecordedScan&(std::size_t)>& read);
 
 }  // namespace dynains
