@@ -156,7 +156,7 @@ std::unique_ptr<ScanReader> open_log(RecordingContents& r) {
     if (r.options.deskew || r.clock) r.motion = log->motion();
   }
   pose_by_stamps(r, r.folder);
-  return make_log_reader(std::move(log));
+  return log;
 }
 
 /// Takes the sweeps of one scene. Poses of a file belong to the sweeps by time.

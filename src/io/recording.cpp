@@ -86,7 +86,7 @@ std::vector<fs::path> Recording::files() const {
   return files;
 }
 
-const LogScans* Recording::log() const { return reader_->log(); }
+const LogScans* Recording::log() const { return reader_->log_scans(); }
 
 std::uint64_t Recording::point_count(std::size_t i) const {
   return reader_->point_count(contents_.scans.at(i));

@@ -1,24 +1,15 @@
 #include "scan_reader.hpp"
 
-#include <mutex>
 #include <utility>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "failure.hpp"
-#include "logs/log_scans.hpp"
 #include "points/bin_layout.hpp"
 #include "points/finite_points.hpp"
 
 namespace dynains {
 namespace {
-
-void transform(const FileTransform* T_target_file, RecordedScan& points) {
-  if (T_target_file == nullptr) return;
-  for_each_position(points, [&](auto p) {
-    p = (*T_target_file * p.template cast<double>()).template cast<float>();
-  });
-}
 
 /// .bin: float32 x y z intensity, or other columns; .pcd.bin of nuScenes has a ring behind them.
 class BinReader final : public ScanReader {
@@ -42,7 +33,7 @@ class BinReader final : public ScanReader {
     is_usual(layout_)
         ? read_scan(scan.file, points.xyzi)
         : read_bin_points(scan.file, layout_, points.xyzi, has_ring_ ? &points.ring : nullptr);
-    transform(T_target_file, points);
+    transform_scan(T_target_file, points);
   }
   std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {
     fail(scan.file, "has no labels");
@@ -86,44 +77,20 @@ class PointFileReader final : public ScanReader {
   }
 };
 
-/// Clouds of a log. All of them were checked when it was opened.
-class LogReader final : public ScanReader {
- public:
-  explicit LogReader(std::unique_ptr<LogScans> scans) : scans_(std::move(scans)) {}
-
-  PointColumns columns(const ScanEntry&) const override { return scans_->columns(); }
-  std::uint64_t point_count(const ScanEntry& scan) const override {
-    return scans_->point_count(scan.index);
-  }
-  void read(const ScanEntry& scan, const FileTransform* T_target_file,
-            RecordedScan& points) const override {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      scans_->read(scan.index, points);
-    }
-    transform(T_target_file, points);
-  }
-  std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return scans_->read_labels(scan.index);
-  }
-  const LogScans* log() const override { return scans_.get(); }
-
- private:
-  std::unique_ptr<LogScans> scans_;
-  mutable std::mutex mutex_;  ///< a log has one place in its file
-};
-
 }  // namespace
+
+void transform_scan(const FileTransform* T_target_file, RecordedScan& points) {
+  if (T_target_file == nullptr) return;
+  for_each_position(points, [&](auto p) {
+    p = (*T_target_file * p.template cast<double>()).template cast<float>();
+  });
+}
 
 std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout) {
   constexpr BinLayout kNuScenes{5, false};
   if (format == ScanFormat::kBin) return std::make_unique<BinReader>(layout, false);
   if (format == ScanFormat::kNuScenes) return std::make_unique<BinReader>(kNuScenes, true);
   return std::make_unique<PointFileReader>();
-}
-std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans) {
-  return std::make_unique<LogReader>(std::move(scans));
 }
 
 }  // namespace dynains

@@ -34,12 +34,14 @@ class ScanReader {
   /// The column `label`.
   virtual std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const = 0;
   /// Null if the scans are files.
-  virtual const LogScans* log() const { return nullptr; }
+  virtual const LogScans* log_scans() const { return nullptr; }
 };
 
-/// For scans in files, one each.
+/// For scans in files, one each; of logs, LogScans is one.
 std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout& layout);
-std::unique_ptr<ScanReader> make_log_reader(std::unique_ptr<LogScans> scans);
+
+/// Moves all points, if there is a transform.
+void transform_scan(const FileTransform* T_target_file, RecordedScan& points);
 
 struct OpenedRecording {
   RecordingContents contents;

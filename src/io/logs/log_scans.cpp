@@ -343,11 +343,11 @@ void LogScans::find_clocks() {
     if (!source.columns.time) continue;
     std::vector<double> times;
     for (const LogCloud& cloud : source.clouds) times.push_back(cloud.time);
-    const PointClockFinding finding =
-        find_clock(times, true, options_.point_time_unit, [&](std::size_t i) -> RecordedScan& {
-          read(source.clouds[i], part_);
-          return part_;
-        });
+    const PointClockFinding finding = find_clock(times, true, options_.point_time_unit,
+                                                 [&](std::size_t i) -> const RecordedScan& {
+                                                   read(source.clouds[i], part_);
+                                                   return part_;
+                                                 });
     const std::string& topic = log_->topics()[source.topic].name;
     if (!finding.clock && !finding.text.empty()) {
       fail(log_->path(), topic + " cannot be de-skewed: " + finding.text);
@@ -499,33 +499,41 @@ std::optional<Pose> LogScans::pose_at(double time) const {
 }
 
 /// The message, in memory until the next one.
-SerialisedMessage LogScans::load(const LogMessage& message) {
+SerialisedMessage LogScans::load(const LogMessage& message) const {
   log_->read(message, bytes_);
   return unpacked(*log_, log_->topics()[message.topic], message.time, bytes_, compressed_);
 }
 
-std::size_t LogScans::point_count(std::size_t i) const {
-  std::size_t count = 0;
-  for (const LogCloud& cloud : scans_.at(i)) count += cloud.points;
+std::uint64_t LogScans::point_count(const ScanEntry& scan) const {
+  std::uint64_t count = 0;
+  for (const LogCloud& cloud : clouds(scan.index)) count += cloud.points;
   return count;
 }
 
-void LogScans::read(const LogCloud& cloud, RecordedScan& scan) {
+void LogScans::read(const LogCloud& cloud, RecordedScan& scan) const {
   read_cloud(log_->topics()[cloud.message.topic].type, load(cloud.message), scan);
 }
 
-void LogScans::read(std::size_t i, RecordedScan& scan) {
-  const std::vector<LogCloud>& clouds = scans_.at(i);
+void LogScans::read(const ScanEntry& scan, const FileTransform* T_target_file,
+                    RecordedScan& points) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double time = times_[scan.index];
   if (is_merged()) {
-    scan.xyzi.clear();
-    scan.ring.clear();
-    scan.time.clear();
-    scan.sensor.clear();
-    for (const LogCloud& cloud : clouds) merge(cloud, times_[i], scan);
-    return;
+    points.xyzi.clear();
+    points.ring.clear();
+    points.time.clear();
+    points.sensor.clear();
+    for (const LogCloud& cloud : clouds(scan.index)) merge(cloud, time, points);
+  } else {
+    read(clouds(scan.index).front(), points);
+    read_sensors(time, points);
   }
-  read(clouds.front(), scan);
-  const auto parts = concatenations_.find(times_[i]);
+  transform_scan(T_target_file, points);
+}
+
+/// Sensors of a concatenated cloud.
+void LogScans::read_sensors(double time, RecordedScan& scan) const {
+  const auto parts = concatenations_.find(time);
   if (concatenated_.empty() || parts == concatenations_.end()) return;
   scan.sensor.assign(scan.size(), 0);
   for (const Concatenation::Part& part : parts->second) {
@@ -538,7 +546,7 @@ void LogScans::read(std::size_t i, RecordedScan& scan) {
 }
 
 /// Adds the points of one of several clouds. `time`: s, of the scan.
-void LogScans::merge(const LogCloud& cloud, double time, RecordedScan& scan) {
+void LogScans::merge(const LogCloud& cloud, double time, RecordedScan& scan) const {
   read(cloud, part_);
   const auto is_its = [&](const Source& one) { return one.topic == cloud.message.topic; };
   const auto source = std::find_if(sources_.begin(), sources_.end(), is_its);
@@ -554,9 +562,10 @@ void LogScans::merge(const LogCloud& cloud, double time, RecordedScan& scan) {
   scan.sensor.resize(scan.size(), static_cast<std::uint8_t>(source - sources_.begin()));
 }
 
-std::vector<std::uint32_t> LogScans::read_labels(std::size_t i) {
+std::vector<std::uint32_t> LogScans::read_labels(const ScanEntry& scan) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::uint32_t> labels;
-  for (const LogCloud& cloud : scans_.at(i)) {
+  for (const LogCloud& cloud : clouds(scan.index)) {
     const std::string& type = log_->topics()[cloud.message.topic].type;
     const std::vector<std::uint32_t> more = read_cloud_labels(type, load(cloud.message));
     labels.insert(labels.end(), more.begin(), more.end());

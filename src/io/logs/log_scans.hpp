@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "../points/point_clock.hpp"
+#include "../scan_reader.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
@@ -37,7 +39,7 @@ struct LogCloud {
 /// A scan is one cloud, or, of several topics, all clouds within half a period of the stamp of one
 /// on the first topic, in the frame of that topic. Clouds without one there are a scan of their
 /// own.
-class LogScans {
+class LogScans final : public ScanReader {
  public:
   /// Without `with_poses`, poses of the log are not looked for.
   LogScans(const std::filesystem::path& path, const RecordingOptions& options, bool with_poses);
@@ -66,15 +68,17 @@ class LogScans {
   /// Pose of `frame` in the frame of the clouds at the time of the first one. Throws IoError if the
   /// log does not connect them.
   Pose T_cloud_frame(const std::string& frame) const;
-  /// Columns of the first clouds.
-  const PointColumns& columns() const { return columns_; }
-  std::size_t point_count(std::size_t i) const;
   const std::vector<std::string>& notes() const { return notes_; }
   /// Defects that results depend on.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
-  void read(std::size_t i, RecordedScan& scan);
-  std::vector<std::uint32_t> read_labels(std::size_t i);
+  /// Columns of the first clouds.
+  PointColumns columns(const ScanEntry&) const override { return columns_; }
+  std::uint64_t point_count(const ScanEntry& scan) const override;
+  void read(const ScanEntry& scan, const FileTransform* T_target_file,
+            RecordedScan& points) const override;
+  std::vector<std::uint32_t> read_labels(const ScanEntry& scan) const override;
+  const LogScans* log_scans() const override { return this; }
 
  private:
   /// A topic of clouds.
@@ -99,8 +103,9 @@ class LogScans {
   void find_sensors();
   void find_concatenated();
   void find_clocks();
-  void read(const LogCloud& cloud, RecordedScan& scan);
-  void merge(const LogCloud& cloud, double time, RecordedScan& scan);
+  void read(const LogCloud& cloud, RecordedScan& scan) const;
+  void read_sensors(double time, RecordedScan& scan) const;
+  void merge(const LogCloud& cloud, double time, RecordedScan& scan) const;
   void place_scans();
   void choose_frames();
   std::string body_frame() const;
@@ -108,7 +113,7 @@ class LogScans {
   void refuse_conflict(const std::string& target, const std::string& source) const;
   void describe_extrinsic();
   std::optional<Pose> pose_at(double time) const;
-  SerialisedMessage load(const LogMessage& message);
+  SerialisedMessage load(const LogMessage& message) const;
 
   std::unique_ptr<LogFile> log_;
   RecordingOptions options_;
@@ -131,9 +136,9 @@ class LogScans {
   bool is_in_world_ = false;
   Trajectory trajectory_;
   std::vector<std::string> notes_, warnings_;
-  std::vector<std::uint8_t> bytes_;
-  std::vector<std::uint8_t> compressed_;
-  RecordedScan part_;
+  mutable std::mutex mutex_;  ///< the log has one place in its file
+  mutable std::vector<std::uint8_t> bytes_, compressed_;
+  mutable RecordedScan part_;
 };
 
 }  // namespace dynains
