@@ -14,6 +14,7 @@
 #include "dynains/io/atomic_file.hpp"
 #include "io/failure.hpp"
 #include "io/folder.hpp"
+#include "io/input_file.hpp"
 #include "io/text.hpp"
 #include "session_file.hpp"
 
@@ -89,16 +90,12 @@ City City::open_or_make(const fs::path& folder, const SessionGrid& grid) {
 // Returns the names of all sessions in the folder, sorted.
 std::vector<std::string> City::names() const {
   std::vector<std::string> names;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const fs::path& path = entry->path();
+  for (const fs::path& path : paths_in(folder_)) {
     const bool is_session = path.extension() == ".session" && is_session_name(path.stem().string());
-    if (is_session && fs::is_regular_file(entry->symlink_status())) {
+    if (is_session && fs::is_regular_file(fs::symlink_status(path))) {
       names.push_back(path.stem().string());
     }
   }
-  if (error) fail_by_system(folder_, "cannot be read", error.value());
   std::sort(names.begin(), names.end());
   return names;
 }

@@ -24,12 +24,13 @@ namespace fs = std::filesystem;
 using run::RunOutcome;
 using run::RunSettings;
 
-// The arguments of run() without the recording and its options.
+// The arguments of run().
 struct RunArguments {
   RunSettings settings;
   std::optional<std::string> preset;
   std::optional<DynaInsRemover::Config> config;
   py::object progress = py::none();
+  std::shared_ptr<SharedRecording> recording;
 };
 
 [[noreturn]] void refuse_value(const std::string& name, const py::handle& value,
@@ -128,34 +129,29 @@ struct RunResult {
   py::dict report;
 };
 
-// A run that is about to begin.
-struct PreparedRun {
-  RunArguments arguments;
-  std::shared_ptr<SharedRecording> recording;
-};
-
-PreparedRun prepare(const py::object& recording, const fs::path& out, const py::kwargs& values) {
+RunArguments prepare(const py::object& recording, const fs::path& out, const py::kwargs& values) {
   py::dict options(values);
   RunArguments arguments = take_arguments(options);
   take_config(arguments);
   RunSettings& settings = arguments.settings;
   settings.outputs.folder = out;
   run::check_settings(settings);
-  const std::shared_ptr<SharedRecording> shared = to_recording(recording, options);
-  if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared->get());
-  settings.recording = shared->get().folder().string();
-  settings.recording_flags = shared->settings().flags;
-  settings.recording_as_given = shared->settings().as_given(settings.recording);
-  return {std::move(arguments), shared};
+  arguments.recording = to_recording(recording, options);
+  const SharedRecording& shared = *arguments.recording;
+  if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared.get());
+  settings.recording = shared.get().folder().string();
+  settings.recording_flags = shared.settings().flags;
+  settings.recording_as_given = shared.settings().as_given(settings.recording);
+  return arguments;
 }
 
 RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
-  const PreparedRun prepared = prepare(recording, out, values);
-  const run::RunListener listener = listen(prepared.arguments);
+  const RunArguments arguments = prepare(recording, out, values);
+  const run::RunListener listener = listen(arguments);
   RunOutcome outcome;
   {
     const py::gil_scoped_release release;
-    outcome = run::run(prepared.arguments.settings, prepared.recording->get(), listener);
+    outcome = run::run(arguments.settings, arguments.recording->get(), listener);
   }
   if (outcome.signal != 0) raise_signal(outcome);
   const run::RunOutputs& outputs = outcome.outputs;

@@ -12,7 +12,6 @@
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
 #include "io/text.hpp"
-#include "read_ahead.hpp"
 #include "recorded_scans.hpp"
 #include "run_plan.hpp"
 

@@ -1,5 +1,6 @@
 #include "run.hpp"
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <numeric>
@@ -17,6 +18,7 @@
 #include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
+#include "recorded_scans.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/cloud_remarks.hpp"
 #include "run/remarks/odd_scans.hpp"
@@ -24,7 +26,6 @@
 #include "run/remarks/run_doubts.hpp"
 #include "run_plan.hpp"
 #include "run_report.hpp"
-#include "run_sequence.hpp"
 #include "verdict_files.hpp"
 #include "write_grid.hpp"
 #include "write_view.hpp"
@@ -33,6 +34,7 @@ namespace dynains::run {
 namespace {
 
 namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
 
 /// Threads of the remover: two, if the machine has two cores or the configuration says so.
 int remover_threads(const RunPlan& plan) {
@@ -40,18 +42,73 @@ int remover_threads(const RunPlan& plan) {
   return std::thread::hardware_concurrency() > 1 ? 2 : plan.settings.config.threads;
 }
 
-/// Processes all scans, or those that come before a signal. Returns the times.
+/// Pushes a scan, and adds its times.
+FrameResult push_timed(DynaInsRemover& remover, const Recording& recording, std::size_t i,
+                       const RecordedScan& scan, RunTiming& timing) {
+  const Clock::time_point begin = Clock::now();
+  const FrameResult frame = push_scan(remover, recording, i, scan);
+  timing.rows.push_back({recording.name(i), scan.size(), frame.times, ms_since(begin),
+                         frame.began_epoch, frame.plausibility, recording.time(i)});
+  if (const auto& residual = frame.pose_residual)
+    timing.rows.back().pose_residual.emplace(residual->translation, residual->rotation);
+  for (const std::uint8_t sensor : scan.sensor) ++timing.sensor_points[sensor];
+  return frame;
+}
+
+/// Hands the verdicts out that are open after the last scan.
+template <class TakeFinal>
+void flush_timed(DynaInsRemover& remover, TakeFinal&& take_final, RunTiming& timing) {
+  double writing = 0.0;
+  const Clock::time_point begin = Clock::now();
+  remover.flush([&](const ScanVerdict& verdict) {
+    const Clock::time_point begin_writing = Clock::now();
+    take_final(verdict);
+    writing += ms_since(begin_writing);
+  });
+  timing.flush = ms_since(begin) - writing;
+  timing.pipeline = timing.flush;
+  for (const TimingRow& row : timing.rows) timing.pipeline += row.total;
+}
+
+/// Pushes all scans, or those that come before a signal, and passes every verdict, and at the end
+/// the map, to `results`. Scans wait in memory for their final verdict, unless they are many and a
+/// second reading is a plain copy of their file (.bin).
 RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& results) {
-  const std::size_t total = plan.range.size();
+  const Recording& recording = plan.sequence;
+  const ScanRange& range = plan.range;
   DynaInsRemover::Config config = plan.settings.config;
   config.build_map = config.build_map && !results.has_second_pass();
   config.threads = remover_threads(plan);
   DynaInsRemover remover(config);
-  listener.progress(0, total);
-  return run_sequence(remover, plan.sequence, plan.range, results, [&](std::size_t done) {
-    listener.progress(done, total);
-    return InterruptGuard::signal() == 0;
-  });
+  RunTiming timing;
+  ReadAhead reader(recording, range.first, range.last, results.thread());
+  const bool are_kept = remover.latency() <= 8 || recording.format() != ScanFormat::kBin;
+  std::deque<RecordedScan> kept;  // oldest first; the last one is the pushed scan
+  RecordedScan spare;
+  const auto take_oldest = [&] {
+    spare = std::move(kept.front());
+    kept.pop_front();
+  };
+  const auto take_final = [&](const ScanVerdict& verdict) {
+    if (are_kept) take_oldest();
+    results.take_final(are_kept ? &spare : nullptr, verdict);
+  };
+  listener.progress(0, range.size());
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    if (!are_kept && !kept.empty()) take_oldest();
+    const RecordedScan& scan = kept.emplace_back(reader.next(std::exchange(spare, {})));
+    const FrameResult frame = push_timed(remover, recording, i, scan, timing);
+    results.take_newest(frame);
+    if (frame.finished) take_final(*frame.finished);
+    listener.progress(timing.rows.size(), range.size());
+    if (InterruptGuard::signal() != 0) break;
+  }
+  flush_timed(remover, take_final, timing);
+  results.finish();
+  if (results.map_points()) {
+    remover.map().for_each([&](const Eigen::Vector3d& point) { results.add_map_point(point); });
+  }
+  return timing;
 }
 
 /// Throws IoError if nothing was judged, or nothing is static: the scans are then not what the run
@@ -284,7 +341,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
 
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
   const RunPlan plan = make_plan(settings, std::move(recording));
-  OutputFolder out(plan.settings.outputs.folder, run_output_kind(), plan.listing, settings.force,
+  OutputFolder out(plan.settings.outputs.folder, kRunOutput, plan.listing, settings.force,
                    plan.inputs);
   OutsideFiles outside(plan, out);
   return write_results(plan, listener, out, outside);

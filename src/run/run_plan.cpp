@@ -75,9 +75,7 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
 /// So that a broken file or pose is noticed before anything is written.
 void check_scans(const Recording& sequence, const ScanRange& range) {
   count_points(sequence, range);
-  for (std::size_t i = range.first; i <= range.last; ++i) {
-    naming_scan(sequence, i, [&] { validate_pose("T_world_sensor", sequence.T_world_sensor(i)); });
-  }
+  for (std::size_t i = range.first; i <= range.last; ++i) check_pose(sequence, i);
 }
 
 /// Whether `path` lies in a folder of results. Both are by whole_path().
@@ -107,28 +105,25 @@ void complete_map(const DynaInsRemover::Config& config, RunOutputs& outputs) {
   }
 }
 
-/// Throws ConfigError.
-void complete_log(RunOutputs& outputs) {
-  if (outputs.log.empty()) {
-    if (outputs.mark_log) throw ConfigError("--mark needs --write-log");
-    return;
+/// Throws ConfigError unless `whole`, by whole_path(), lies outside of the folder of the results.
+void take_outside(const std::string& flag, const fs::path& whole, const RunOutputs& outputs,
+                  fs::path& file) {
+  if (is_in_results(whole, whole_path(outputs.folder))) {
+    throw ConfigError(flag + ' ' + file.string() + ": choose a place outside of --out");
   }
-  const fs::path log = whole_path(outputs.log);
-  if (is_in_results(log, whole_path(outputs.folder))) {
-    throw ConfigError("--write-log " + outputs.log.string() + ": choose a place outside of --out");
-  }
-  outputs.log = log;
+  file = whole;
 }
 
 /// Throws ConfigError.
-void complete_grid(RunOutputs& outputs) {
+void complete_log_and_grid(RunOutputs& outputs) {
+  if (!outputs.log.empty()) {
+    take_outside("--write-log", whole_path(outputs.log), outputs, outputs.log);
+  } else if (outputs.mark_log) {
+    throw ConfigError("--mark needs --write-log");
+  }
   if (outputs.grid.empty()) return;
   outputs.grid_config.validate();
-  const fs::path grid = grid_file(outputs.grid);
-  if (is_in_results(grid, whole_path(outputs.folder))) {
-    throw ConfigError("--grid " + outputs.grid.string() + ": choose a place outside of --out");
-  }
-  outputs.grid = grid;
+  take_outside("--grid", grid_file(outputs.grid), outputs, outputs.grid);
 }
 
 /// Throws ConfigError.
@@ -143,8 +138,7 @@ void check_passes(const RunSettings& settings) {
 RunOutputs outputs_of(const RunSettings& settings) {
   RunOutputs outputs = settings.outputs;
   complete_map(settings.config, outputs);
-  complete_log(outputs);
-  complete_grid(outputs);
+  complete_log_and_grid(outputs);
   check_passes(settings);
   outputs.write_tracks = settings.config.objects;
   // The second pass reads the beliefs of the first one.

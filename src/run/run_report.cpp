@@ -12,7 +12,6 @@
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/extrinsic.hpp"
-#include "run_sequence.hpp"
 
 namespace dynains::run {
 namespace {
@@ -72,7 +71,7 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_
   const Recording& sequence = plan.sequence;
   const RunSettings& settings = plan.settings;
   const Tally& labels = results.tally();
-  nlohmann::ordered_json report = begin_marker(run_output_kind());
+  nlohmann::ordered_json report = begin_marker(kRunOutput);
   report["static_map"] = nullptr;
   if (results.map_points()) {
     report["static_map"] = {{"file", settings.outputs.map_name()},
@@ -109,11 +108,6 @@ nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_
   report["configuration"] = plan.configuration;
   report["request"] = plan.request;
   return report;
-}
-
-const OutputKind& run_output_kind() {
-  static const OutputKind kind = {"run", "report.json"};
-  return kind;
 }
 
 void write_timing(const std::filesystem::path& path, const RunTiming& timing) {

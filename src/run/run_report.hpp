@@ -27,9 +27,6 @@ Statistics statistics(std::vector<double> values);
 nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_json& doubts,
                                    const RunResults& results, const RunTiming& timing);
 
-/// The folder of a run.
-const OutputKind& run_output_kind();
-
 /// Throws IoError.
 void write_timing(const std::filesystem::path& path, const RunTiming& timing);
 

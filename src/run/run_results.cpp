@@ -10,7 +10,6 @@
 #include "dynains/io/atomic_file.hpp"
 #include "interrupt.hpp"
 #include "io/folder.hpp"
-#include "read_ahead.hpp"
 #include "recorded_scans.hpp"
 
 namespace dynains::run {

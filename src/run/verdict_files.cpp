@@ -7,6 +7,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "io/points/finite_points.hpp"
 #include "run/output/output_folder.hpp"
 
 namespace dynains::run {
@@ -21,10 +22,7 @@ using Id = std::uint16_t;  // of an instance in a file; ids beyond start again a
 PointLabel point_label(std::uint32_t mos, Cause cause, const float* point) {
   if (mos == kRunMoving) return PointLabel::kDynamic;
   if (mos == kRunStatic) return cause == Cause::kGround ? PointLabel::kGround : PointLabel::kStatic;
-  const auto is_finite = [](float value) { return std::isfinite(value); };
-  const bool is_measured = std::all_of(point, point + 3, is_finite) &&
-                           std::any_of(point, point + 3, [](float v) { return v < 0 || v > 0; });
-  return is_measured ? PointLabel::kOutOfRange : PointLabel::kInvalid;
+  return is_measured(point) ? PointLabel::kOutOfRange : PointLabel::kInvalid;
 }
 
 constexpr const char* kLabels = "labels";

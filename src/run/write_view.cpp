@@ -13,7 +13,6 @@
 #include "run_report.hpp"
 #include "run_settings.hpp"
 #include "verdict_files.hpp"
-#include "viewer/page.hpp"
 
 namespace dynains::run {
 namespace {
@@ -110,7 +109,7 @@ void check_run_is_finished(const fs::path& folder) {
 }
 
 ResultFolder open_finished_run(const fs::path& folder) {
-  ResultFolder out(Folder(folder), run_output_kind());
+  ResultFolder out(Folder(folder), kRunOutput);
   if (!out.has_results()) {
     throw IoError(out.marker_path().string() + ": not found; expected a folder of `dynains run`");
   }

@@ -1,9 +1,6 @@
 #include "dynains/io/extrinsic.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <optional>
 #include <sstream>
 
@@ -17,21 +14,11 @@ namespace {
 
 constexpr const char* kExpectedExtrinsic = "expected \"x y z qx qy qz qw\" or a file with one pose";
 
-/// The numbers that `text` consists of; empty if it has other words, or not `kCount` of them.
-template <std::size_t kCount>
-std::optional<std::array<double, kCount>> numbers_of(const std::string& text) {
-  const auto all = text::numbers_in(text, ",");
-  if (!all || all->size() != kCount) return std::nullopt;
-  std::array<double, kCount> numbers{};
-  std::copy(all->begin(), all->end(), numbers.begin());
-  return numbers;
-}
-
 }  // namespace
 
 Pose read_extrinsic(const std::string& text) {
-  const auto numbers = numbers_of<7>(text);
-  if (!numbers) {
+  const auto numbers = text::numbers_in(text, ",");
+  if (!numbers || numbers->size() != 7) {
     const bool is_number = text::parse_number(text.substr(0, text.find_first_of(" ,"))).has_value();
     if (is_number) throw ConfigError("extrinsic \"" + text + "\": " + kExpectedExtrinsic);
     const Trajectory file = read_trajectory(text);
@@ -39,7 +26,7 @@ Pose read_extrinsic(const std::string& text) {
     throw IoError(text + ": has " + std::to_string(file.poses.size()) + " poses; " +
                   kExpectedExtrinsic);
   }
-  const auto& n = *numbers;
+  const std::vector<double>& n = *numbers;
   const auto pose = rigid_pose({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});
   if (!pose) {
     throw ConfigError("extrinsic \"" + text +
@@ -49,9 +36,9 @@ Pose read_extrinsic(const std::string& text) {
 }
 
 Eigen::Vector3d read_sensor_origin(const std::string& text) {
-  const auto position = numbers_of<3>(text);
-  if (!position) return read_extrinsic(text).translation();
-  return {(*position)[0], (*position)[1], (*position)[2]};
+  const auto position = text::numbers_in(text, ",");
+  if (!position || position->size() != 3) return read_extrinsic(text).translation();
+  return Eigen::Vector3d(position->data());
 }
 
 std::vector<Pose> read_sensor_poses(const std::string& file) { return read_trajectory(file).poses; }

@@ -28,11 +28,7 @@ constexpr const char* kPartialEnd = ".partial";
 const Json::json_pointer kComplete("/complete");
 const Json::json_pointer kContents("/contents");
 
-/// The folder of an OutputFile.
-const OutputKind& file_kind() {
-  static const OutputKind kind = {"file", "partial.json"};
-  return kind;
-}
+constexpr OutputKind kFileOutput = {"file", "partial.json"};  // the folder of an OutputFile
 
 OutputListing listing_of_file(const std::string& name) { return {{listed_name(name)}, {}, {}}; }
 
@@ -95,10 +91,8 @@ nlohmann::ordered_json OutputListing::to_json() const {
 
 OutputListing read_listing(const std::filesystem::path& file, const nlohmann::ordered_json& marker,
                            const std::string& command) {
-  const auto has = [&](const char* field, const std::string& value) {
-    return marker.is_object() && marker.contains(field) && marker[field] == value;
-  };
-  if (!has("program", "dynains") || !has("command", command)) {
+  if (!has(marker, Json::json_pointer("/program"), "dynains") ||
+      !has(marker, Json::json_pointer("/command"), command)) {
     throw IoError(file.string() + ": was not written by dynains " + command +
                   "; choose another folder");
   }
@@ -403,7 +397,7 @@ OutputFile::OutputFile(const fs::path& target, Existing existing, const InputFil
   // First: a folder that this command reads is in use, too.
   how_ = check_output(*locked_, name, existing, inputs);
   locked_->lock(Folder::Lock::kShared);
-  partial_.emplace(target_, file_kind(), listing_of_file(name), inputs);
+  partial_.emplace(target_, kFileOutput, listing_of_file(name), inputs);
   folder_ = &partial_->parent();
 }
 
@@ -412,7 +406,7 @@ OutputFile::OutputFile(const ResultFolder& results, const std::string& name)
   const bool is_ours = results.listing().contains("", name);
   how_ = check_output(*folder_, name, is_ours ? Existing::kOurs : Existing::kForeign, {});
   // Beside the folder, in which a file that is not listed is one of the user.
-  partial_.emplace(whole_path(results.path()).concat('.' + name), file_kind(),
+  partial_.emplace(whole_path(results.path()).concat('.' + name), kFileOutput,
                    listing_of_file(name), InputFiles());
 }
 

@@ -67,9 +67,10 @@ nlohmann::ordered_json content_of(const std::filesystem::path& file);
 /// Folders of results of one command, and the name of their marker: a file of JSON that names the
 /// program and the command, says whether the results are complete, and lists all other files.
 struct OutputKind {
-  std::string command;  ///< "run"
-  std::string marker;   ///< "report.json"
+  const char* command;
+  const char* marker;
 };
+inline constexpr OutputKind kRunOutput = {"run", "report.json"};
 
 /// The first fields of a marker: program, version, command and `"complete"`, which is false.
 nlohmann::ordered_json begin_marker(const OutputKind& kind);
