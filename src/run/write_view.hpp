@@ -11,8 +11,8 @@
 #include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
 #include "verdict_files.hpp"
+#include "viewer/page.hpp"
 #include "viewer/thinning.hpp"
-#include "viewer/view_data.hpp"
 
 namespace dynains::run {
 

@@ -6,7 +6,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "view_data.hpp"
+#include "page.hpp"
 
 namespace dynains::viewer {
 

@@ -7,7 +7,7 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
-#include "io/points/point_readers.hpp"
+#include "io/points/point_sink.hpp"
 #include "point_format_writer.hpp"
 #include "support/catch.hpp"
 

@@ -12,7 +12,6 @@
 #include "../failure.hpp"
 #include "../logs/bytes.hpp"
 #include "../scalar.hpp"
-#include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

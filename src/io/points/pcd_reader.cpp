@@ -10,7 +10,6 @@
 #include "../text.hpp"
 #include "lzf.hpp"
 #include "point_file_copy.hpp"
-#include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

@@ -11,7 +11,6 @@
 #include "../scalar.hpp"
 #include "../text.hpp"
 #include "point_file_copy.hpp"
-#include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

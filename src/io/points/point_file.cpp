@@ -10,7 +10,6 @@
 #include "../failure.hpp"
 #include "../scalar.hpp"
 #include "../text.hpp"
-#include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

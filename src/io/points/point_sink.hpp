@@ -1,9 +1,10 @@
-// Stores the values of a file in the columns of a PointFile.
+// The readers of point files, one for each format, and what they store values in.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,5 +50,16 @@ class PointSink {
   std::array<bool, static_cast<std::size_t>(Role::kNone)> claimed_{};
   PointFile file_;
 };
+
+/// Lines, fields or columns that a header may have.
+inline constexpr std::size_t kMaxHeaderItems = 1000;
+
+/// Read the columns, and the points as well if `with_points`. Return the number of points. Throw
+/// IoError unless the file can hold those of its header.
+std::uint64_t read_ply(const std::filesystem::path& path, PointSink& sink, bool with_points);
+std::uint64_t read_pcd(const std::filesystem::path& path, PointSink& sink, bool with_points);
+std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool with_points);
+std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool with_points);
+std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool with_points);
 
 }  // namespace dynains

@@ -4,7 +4,6 @@
 
 #include "../byte_reader.hpp"
 #include "../text.hpp"
-#include "point_readers.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {
