@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "command.hpp"
-#include "recording_options.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/pose_returns.hpp"
 #include "run/remarks/recording_check.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -23,13 +23,13 @@
 #include "io/text.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/map_file.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {
@@ -39,10 +39,8 @@ namespace fs = std::filesystem;
 /// Counts the static and the moving points of scans in the voxels that hold points of a map.
 class MapVotes {
  public:
-  enum class Verdict : std::uint8_t {
-    kStatic,  ///< as many static as moving points of scans in the voxel, or more
-    kMoving,
-    kUnseen,  ///< no point of a scan in the voxel, or coordinates that are not finite
+  struct Counts {
+    std::uint32_t rest = 0, moving = 0;  ///< static and moving points
   };
 
   /// `map`: positions in the world frame, m. `voxel`: edge of the voxels, m, above 0.
@@ -66,19 +64,12 @@ class MapVotes {
     if (voxel != kNoIndex) ++(is_moving ? counts_[voxel].moving : counts_[voxel].rest);
   }
 
-  /// Verdict on point `i` of the map.
-  Verdict verdict(std::size_t i) const {
-    if (voxels_[i] == kNoIndex) return Verdict::kUnseen;
-    const Counts& counts = counts_[voxels_[i]];
-    if (counts.moving > counts.rest) return Verdict::kMoving;
-    return counts.rest > 0 ? Verdict::kStatic : Verdict::kUnseen;
+  /// Of the voxel of point `i` of the map; none for coordinates that are not finite.
+  Counts counts(std::size_t i) const {
+    return voxels_[i] == kNoIndex ? Counts() : counts_[voxels_[i]];
   }
 
  private:
-  struct Counts {
-    std::uint32_t rest = 0, moving = 0;  // static and moving points
-  };
-
   // Empty for points far from the map, and those that are not finite.
   std::optional<VoxelKey> key_of(const Eigen::Vector3d& point) const {
     if (!origin_) return std::nullopt;
@@ -250,10 +241,11 @@ struct Verdicts {
 Verdicts judge(const MapVotes& votes, std::size_t count, const fs::path& map) {
   Verdicts verdicts;
   for (std::size_t i = 0; i < count; ++i) {
-    const MapVotes::Verdict verdict = votes.verdict(i);
-    verdicts.keep.push_back(verdict == MapVotes::Verdict::kMoving ? 0 : 1);
-    if (verdict == MapVotes::Verdict::kMoving) ++verdicts.moving;
-    if (verdict == MapVotes::Verdict::kUnseen) ++verdicts.unseen;
+    const MapVotes::Counts counts = votes.counts(i);
+    const bool is_moving = counts.moving > counts.rest;
+    verdicts.keep.push_back(is_moving ? 0 : 1);
+    verdicts.moving += is_moving ? 1 : 0;
+    verdicts.unseen += counts.rest + counts.moving == 0 ? 1 : 0;
   }
   if (count > 0 && verdicts.unseen == count) {
     throw IoError(map.string() +

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-namespace dynains::run {}
+#include "run/estimate_poses.hpp"
 
 namespace dynains::program {
 
@@ -20,11 +20,20 @@ void add_clean_command(CLI::App& app);
 void add_map_command(CLI::App& app);
 void add_fleet_command(CLI::App& app);
 void add_check_command(CLI::App& app);
+void add_odometry_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_eval_command(CLI::App& app);
 void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 void add_grid_command(CLI::App& app);
+
+/// Adds --no-deskew.
+void add_compensated_flag(CLI::App& command, bool& is_compensated);
+
+/// As estimate_poses(), with progress on standard error. Warns of directions that nothing
+/// determines.
+PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& window, bool one_thread,
+                                    bool quiet);
 
 /// Prints where a grid was written, and PlacedGrid::summary().
 void print_grid(const std::filesystem::path& file, const nlohmann::ordered_json& summary);

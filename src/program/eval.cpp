@@ -9,14 +9,13 @@
 #include "dynains/evaluation/evaluate.hpp"
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/point_file.hpp"
-#include "evaluation_options.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
 #include "run/labelled_sequence.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/write_view.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -17,15 +17,14 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/evaluation/text_table.hpp"
 #include "dynains/io/recording.hpp"
-#include "evaluation_options.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
-#include "remover_options.hpp"
 #include "run/labelled_sequence.hpp"
 #include "run/output/json_file.hpp"
+#include "run/recorded_scans.hpp"
 #include "run/run_report.hpp"
-#include "run/run_sequence.hpp"
+#include "run/run_timing.hpp"
+#include "shared_options.hpp"
 #include "variants.hpp"
 
 namespace dynains::program {

@@ -11,13 +11,13 @@
 #include "grid/grid_file.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_grid.hpp"
 #include "run/write_view.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {
@@ -47,7 +47,7 @@ PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
                            const Recording& recording) {
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
   if (scans.size() == 1) print_warning(kGridOfOneScan);
-  std::optional<Progress> progress;
+  Progress progress(2 * scans.size(), "scans", options.quiet);
   const VerdictFiles files(out.path());
   VerdictArrays verdict;
   const auto read = [&](std::size_t i, const RecordedScan& scan, std::vector<PointLabel>& labels) {
@@ -56,9 +56,7 @@ PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
   };
   PlacedGrid made = grid_of_run(read, recording, scans, options.config, options.keep_moving,
                                 [&](std::size_t done) {
-                                  if (done == 0)
-                                    progress.emplace(2 * scans.size(), "scans", options.quiet);
-                                  if (done > 0) progress->update(done);
+                                  progress.update(done);
                                   return InterruptGuard::signal() == 0;
                                 });
   if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};

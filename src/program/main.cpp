@@ -1,6 +1,5 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "odometry_command.hpp"
 #include "program.hpp"
 
 using namespace dynains::program;

@@ -1,17 +1,16 @@
-#include "odometry_command.hpp"
-
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "command.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -17,7 +17,6 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
-#include "odometry_command.hpp"
 #include "run/interrupt.hpp"
 
 namespace dynains::program {

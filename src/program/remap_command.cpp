@@ -13,7 +13,6 @@
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/recorded_scans.hpp"
@@ -21,6 +20,7 @@
 #include "run/session_request.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {
@@ -44,13 +44,6 @@ struct RemapOptions {
   bool force = false;
   bool quiet = false;
 };
-
-/// The recording with the poses for the new map.
-Recording open_corrected(const RecordingFlags& flags, bool has_points_in_world) {
-  RecordingOptions corrected = flags.settings.checked();
-  corrected.frame = has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
-  return Recording(flags.folder, corrected);
-}
 
 /// The recording as the run read it, whose points are in the frame of the world: the poses of the
 /// run lead back to the frame of the sensor.
@@ -190,13 +183,6 @@ class NewMap {
   std::unique_ptr<MapFile> writer_;
 };
 
-void check_poses(const Recording& recording, const std::vector<std::size_t>& scans) {
-  for (const std::size_t i : scans) {
-    naming_scan(recording, i,
-                [&] { validate_pose("T_world_sensor", recording.T_world_sensor(i)); });
-  }
-}
-
 /// The flags that state how the points of the run are stored.
 Json point_flags(const ResultFolder& out) {
   Json flags = Json::object();
@@ -213,9 +199,11 @@ void remap(RemapOptions& options) {
   const bool has_points_in_world = out.field<bool>("/request/points_in_world");
   const double map_voxel = out.field<double>("/configuration/map_voxel");
   options.sequence.settings.complete(point_flags(out));
-  const Recording corrected = open_corrected(options.sequence, has_points_in_world);
+  RecordingOptions with_new_poses = options.sequence.settings.checked();
+  with_new_poses.frame = has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
+  const Recording corrected(options.sequence.folder, with_new_poses);
   const std::vector<std::size_t> scans = scans_of_run(out, corrected);
-  check_poses(corrected, scans);
+  for (const std::size_t i : scans) check_pose(corrected, i);
   std::optional<Recording> original;
   if (has_points_in_world) original.emplace(open_original(options.sequence, out));
   const ScanRange range{scans.front(), scans.back()};

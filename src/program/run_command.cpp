@@ -7,14 +7,12 @@
 #include <string>
 
 #include "command.hpp"
-#include "odometry_command.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
-#include "recording_options.hpp"
-#include "remover_options.hpp"
 #include "run/interrupt.hpp"
 #include "run/run.hpp"
 #include "run/run_plan.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -3,8 +3,8 @@
 #include <string>
 
 #include "command.hpp"
-#include "recording_options.hpp"
 #include "run/write_view.hpp"
+#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {
