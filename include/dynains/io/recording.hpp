@@ -146,63 +146,27 @@ struct RecordingContents {
   std::vector<std::string> warnings;
 };
 
-/// Recorded scans with poses. Supported recordings:
+/// Recorded scans with poses: folders of KITTI, SemanticKITTI (see kitti.hpp), nuScenes or point
+/// files (see read_points()), and logs of ROS. docs/own_data.md lists all formats, columns and
+/// conventions.
 ///
-/// - KITTI and SemanticKITTI: see kitti.hpp. With `options.poses`, poses.txt may be missing.
-/// - Folder of point files (see read_points()), directly in the folder or in a subfolder (clouds,
-///   lidar, pcd, ply, points, scans, Scans, velodyne, velodyne_points/data). Beside .pcd, .ply or
-///   .bin files, files of the other formats are no scans. Scans are ordered by name, with numbers
-///   in names by value.
-/// - Folder of .bin files in the format of KITTI, or with RecordingOptions::bin_layout.
-/// - nuScenes: a folder with samples/, sweeps/ and v1.0-*/, or the folder of its tables. Scans are
-///   the .pcd.bin files of one scene; poses and times come from sample_data.json, ego_pose.json and
-///   calibrated_sensor.json.
-/// - ROS log: .mcap, .db3 or .bag, or a folder of such files: with metadata.yaml, or one file, or
-///   parts NAME_0, NAME_1, ... The constructor reads the log once; points stay in the file. Scans
-///   are the clouds of one topic, named by their number, with the times of their stamps.
+/// Scans are ordered by name, with numbers in names by value. Two scan files whose names differ
+/// only in the extension are an error. Scans of a log are the clouds of one topic, or of several
+/// within half a period of the first one, in its frame, named by their number, with the times of
+/// their stamps. The constructor reads a log once; points stay in the file.
 ///
-/// Two scan files whose names differ only in the extension are an error.
+/// Poses come from `options.poses`; else from what the recording states (topics or transforms of a
+/// log, tables of nuScenes, VIEWPOINT of any scan); else from poses.txt, trajectory.txt and the
+/// like in the folder or beside that of the scans. Times come from `options.times`; else from
+/// times.txt or timestamps.txt; else from names that are times; else from the rows of the poses if
+/// there is one for each scan; else scans are 0.1 s apart.
 ///
-/// Poses: the first available of
-/// 1. `options.poses`;
-/// 2. VIEWPOINT, if any scan has one;
-/// 3. poses.txt, poses.csv, poses.tum, trajectory.txt, trajectory.csv, trajectory.tum or
-///    optimized_poses.txt, in the folder or beside the folder of the scans (see read_trajectory).
-///
-/// Times: the first available of
-/// 1. `options.times`;
-/// 2. times.txt or timestamps.txt, in the folder or beside a file of poses of case 3;
-/// 3. names that are times (seconds with a decimal point; at least 10 digits: s, ms, us or ns since
-///    1970; SECONDS_NANOSECONDS);
-/// 4. the times of the pose rows, if the numbers of rows and scans are equal;
-/// 5. intervals of 0.1 s.
-///
-/// Rows of a matrix whose times are whole numbers belong to the scans of these numbers, as in
-/// KITTI-360, if scans have no times.
-///
-/// calib.txt is in the folder or beside the file of poses. An unreadable calib.txt is an error only
-/// if the poses are poses of a camera. Rows without times are assigned to scans by order, or by the
-/// number of the scan. Rows with times are interpolated at the times of the scans plus
-/// `options.time_offset`. Scans without a pose are excluded and listed in `notes()`; more than half
-/// of them without a pose are an error.
-///
-/// Poses of a log: the first available of `options.poses`; the topic `options.pose_topic`, or the
-/// only topic of poses; the transforms between `options.pose_frame` and the frame of the clouds. If
-/// a topic states its moving frame, the transforms of the log convert its poses to the frame of the
-/// clouds; without such transforms, the poses are used as poses of the sensor. If the clouds are in
-/// the fixed frame of the poses, PointFrame is kWorld.
-///
-/// Clouds of several topics within half a period of the first one are one scan, in the frame of the
-/// first topic. Transforms give the poses of their sensors. Their points move to the stamp of the
-/// scan by the poses, with RecordingOptions::deskew each from its own time.
-///
-/// Sensors of points (see Recording::sensors()) are in sensor/NAME.id (uint8 per point) in the
-/// folder of sensors.txt, in a column, see PointFile, or in ConcatenatedPointCloudInfo of Autoware.
+/// Rows without times belong to scans by order, or by the number of the scan. Rows with times are
+/// interpolated at the times of the scans plus `options.time_offset`. Scans without a pose are
+/// excluded and listed in `notes()`; more than half of them without a pose are an error. An
+/// unreadable calib.txt is an error only if the poses are those of a camera.
 ///
 /// With a sensor origin, points and poses are in a frame at the sensor with the axes of the clouds.
-///
-/// Labels (SemanticKITTI classes) are in labels/NAME.label or in a column `label`. In PCD scans
-/// with VIEWPOINT whose intensities are 0 and 1 alone, as in DynamicMap_Benchmark, 1 means moving.
 ///
 /// All members throw IoError with path, position and expected content.
 class Recording {
