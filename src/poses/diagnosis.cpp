@@ -150,13 +150,12 @@ RegisteredMotion motion_of_pair(const Pair& pair) {
   return {0, pair.first, pair.second, Pose::Identity(), {}, 0.0};
 }
 
-Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs,
-                          bool with_surfaces = false) {
+Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs) {
   Agreement mean{0.0, 0.0, 0};  // weighted by points
   for (const Pair& pair : pairs) {
     const auto T_a_b = motion(motion_of_pair(pair));
     if (!T_a_b) continue;
-    const Agreement one = pair.a.compare(pair.b, *T_a_b, with_surfaces);
+    const Agreement one = pair.a.compare(pair.b, *T_a_b);
     const auto points = static_cast<double>(one.points);
     mean.share += points * one.share;
     mean.gap += points * one.gap;
@@ -465,13 +464,12 @@ bool are_refuted(const Evidence& evidence) {
   return 2 * refuted > evidence.pairs.size();
 }
 
-/// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd. `d`: with the
-/// agreements that are shown.
-PoseVerdict verdict_of_agreement(const Evidence& evidence, const Diagnosis& d) {
+/// By landmarks alone. Low shares may be due to a sparse pattern, or to a crowd.
+PoseVerdict verdict_of_agreement(const Evidence& evidence) {
   const Agreement &given = evidence.as_given, &standing = evidence.standing;
   const bool is_doubtful = given.share < kMinAgreement || is_clearly_better(standing, given);
   if (is_doubtful && are_refuted(evidence)) return PoseVerdict::kDisagree;
-  return is_clearly_better(d.as_given, d.standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
+  return is_clearly_better(given, standing) ? PoseVerdict::kAgree : PoseVerdict::kNoMotion;
 }
 
 void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
@@ -497,12 +495,13 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
       return;
     }
   }
-  d.verdict = verdict_of_agreement(evidence, d);
+  d.verdict = verdict_of_agreement(evidence);
   if (all.at_points > kRough || miss_motion(motions, given)) {
     d.verdict = PoseVerdict::kDisagree;
   } else if (are_inexact || (d.verdict == PoseVerdict::kDisagree && !is_exact(all))) {
     d.verdict = PoseVerdict::kInexact;
-  } else if (d.verdict == PoseVerdict::kDisagree) {
+  } else if (d.verdict == PoseVerdict::kDisagree ||
+             is_much_smaller(all.at_points, error_at_points(motions, no_motion))) {
     d.verdict = PoseVerdict::kAgree;
   }
   const bool is_uncertain = d.translation_error > kInexact ||
@@ -549,19 +548,17 @@ Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   const bool overlaps = !motions.empty() && !are_exact(motions) && add_overlap(recording, motions);
   const Evidence evidence{recording,  sampled.pairs, std::move(motions),
                           d.as_given, d.standing,    overlaps};
-  d.as_given = agreement_under(given, sampled.pairs, true);
-  d.standing = agreement_under(no_motion, sampled.pairs, true);
   if (is_world) {
     constexpr double kTellingWay = 5.0;  // m
     d.verdict = follow_sensor(recording, kTellingWay).value_or(true)
-                    ? verdict_of_agreement(evidence, d)
+                    ? verdict_of_agreement(evidence)
                     : PoseVerdict::kDisagree;
     return d;
   }
   if (are_enough(evidence.motions, kMinPairs)) {
     judge_by_motions(evidence, d);
   } else {
-    d.verdict = verdict_of_agreement(evidence, d);
+    d.verdict = verdict_of_agreement(evidence);
   }
   const bool is_apart = std::max(evidence.as_given.share, evidence.standing.share) < kMinAgreement;
   if (d.verdict == PoseVerdict::kDisagree || (d.verdict == PoseVerdict::kNoMotion && is_apart)) {

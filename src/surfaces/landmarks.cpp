@@ -94,8 +94,7 @@ double Landmarks::distance_to(const Eigen::Vector3d& p) const {
   return std::sqrt(nearest.squared);
 }
 
-Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
-                             bool with_surfaces) const {
+Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) const {
   constexpr std::size_t kCompared = 1200;
   if (size() == 0 || other.size() == 0) return {};
   const std::size_t step = std::max<std::size_t>(1, other.size() / kCompared);
@@ -103,11 +102,7 @@ Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other,
   std::size_t count = 0;
   double sum = 0.0;
   for (std::size_t i = 0; i < other.size(); i += step) {
-    const Eigen::Vector3d p = T_this_other * other.points()[i];
-    double gap = distance_to(p);
-    const CellSurface* const surface =
-        with_surfaces ? surfaces().find(kCellLevels - 1, p) : nullptr;
-    if (surface != nullptr) gap = std::min(gap, std::sqrt(surface->squared_distance(p)));
+    const double gap = distance_to(T_this_other * other.points()[i]);
     sum += gap;
     if (gap < kAgreeing) ++close;
     ++count;

@@ -20,8 +20,8 @@ inline constexpr double kAgreeing = 0.3;
 
 /// Agreement of two scans above the ground.
 struct Agreement {
-  double share = 0.0;  ///< ratio of points with a surface of the other scan within 0.3 m, [0, 1]
-  double gap = 1.0;    ///< mean distance to the surfaces of the other scan, m, at most 1
+  double share = 0.0;      ///< ratio of points with one of the other scan within 0.3 m, [0, 1]
+  double gap = 1.0;        ///< mean distance to those of the other scan, m, at most 1
   std::size_t points = 0;  ///< number of compared points
 };
 
@@ -39,10 +39,8 @@ class Landmarks {
   std::size_t size() const { return points().size(); }
   const std::vector<Eigen::Vector3d>& points() const;
   /// Agreement of `other` with this scan under the pose `T_this_other`, at about 1200 points. It is
-  /// symmetric except for occlusion. `with_surfaces`: a point on a surface between points agrees
-  /// as well, so that on smooth walls the pattern of the beams does not count.
-  Agreement compare(const Landmarks& other, const Pose& T_this_other,
-                    bool with_surfaces = false) const;
+  /// symmetric except for occlusion.
+  Agreement compare(const Landmarks& other, const Pose& T_this_other) const;
   /// Surfaces through the points; the first call builds them.
   const SurfaceGrid& surfaces() const;
   /// Distance from `p` (m, sensor frame) to the nearest point, m, at most 1.
