@@ -109,10 +109,11 @@ void check_run_is_finished(const fs::path& folder) {
 }
 
 ResultFolder open_finished_run(const fs::path& folder) {
-  ResultFolder out(Folder(folder), kRunOutput);
-  if (!out.has_results()) {
-    throw IoError(out.marker_path().string() + ": not found; expected a folder of `dynains run`");
+  const fs::path marker = folder / kRunOutput.marker;
+  if (!fs::exists(marker)) {
+    throw IoError(marker.string() + ": not found; expected a folder of `dynains run`");
   }
+  ResultFolder out(Folder(folder), kRunOutput);
   check_run_is_finished(folder);
   return out;
 }

@@ -143,8 +143,7 @@ TEST_CASE("clean refuses a map or a recording that does not belong to the run") 
   }
   SECTION("a folder without results, another format, and the map itself") {
     CHECK_THAT(start({"clean", f.map, f.seq}).err,
-               ContainsSubstring(
-                   "a seq: is not empty and holds no results of dynains run (no report.json)"));
+               ContainsSubstring("report.json: not found; expected a folder of `dynains run`"));
     CHECK_THAT(f.clean({"--map", f.folder / "map.pcd"}).err,
                ContainsSubstring("expected a name that ends in .ply"));
     CHECK_THAT(f.clean({"--map", f.map, "--force"}).err, ContainsSubstring("merged.ply"));

@@ -48,6 +48,7 @@ TEST_CASE("a grid of what has none is refused by one line") {
   check_refused(
       start({"grid", folder / "none.xyz", "-o", map, "--min-height", "0.9", "--max-height", "0.5"}),
       2, "min_height");
+  check_refused(start({"grid", seq, "-o", map}), 1, "report.json: not found; expected a folder of");
   CHECK(!fs::exists(map));
   const Outcome one = succeed(start({"run", seq, "--out", out, "--grid", map, "--end", "0"}));
   CHECK_THAT(one.err, ContainsSubstring("warning: the grid is of one scan"));
