@@ -110,7 +110,7 @@ void check_run_is_finished(const fs::path& folder) {
 
 ResultFolder open_finished_run(const fs::path& folder) {
   const fs::path marker = folder / kRunOutput.marker;
-  if (!fs::exists(marker)) {
+  if (fs::is_directory(folder) && !fs::exists(marker)) {
     throw IoError(marker.string() + ": not found; expected a folder of `dynains run`");
   }
   ResultFolder out(Folder(folder), kRunOutput);
