@@ -23,11 +23,10 @@ void OdometryConfig::validate() const {
 
 namespace {
 
-/// A pose, and the same turned by up to `most` (deg).
+/// A pose, and the same turned in steps of 10 deg by up to `most` (deg).
 std::vector<Pose> turned(const Pose& T_map_near, int most) {
-  constexpr int kStep = 10;  // deg
   std::vector<Pose> poses = {T_map_near};
-  for (int degrees = -most; degrees <= most; degrees += kStep) {
+  for (int degrees = -most; degrees <= most; degrees += 10) {
     if (degrees == 0) continue;
     poses.push_back(T_map_near *
                     Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()));
@@ -136,14 +135,13 @@ class Odometry::Loop {
   /// move with the sensor.
   double weight_on_planes(const Pose& T_map_scan, const Eigen::Vector3d& direction,
                           double min_cosine) const {
-    constexpr double kScale = 0.1;  // m, of the weights
     double sum = 0.0;
     for (const Eigen::Vector3d& p : scan_.keypoints()) {
       const Eigen::Vector3d place = T_map_scan * p;
       const CellSurface* const surface = map_.find(kCellLevels - 1, place);
       if (surface == nullptr || surface->direction_count != 1) continue;
       if (std::abs(surface->directions[0].dot(direction)) < min_cosine) continue;
-      sum += detail::robust_weight(surface->squared_distance(place), kScale);
+      sum += detail::robust_weight(surface->squared_distance(place), 0.1);  // m
     }
     return sum;
   }

@@ -161,8 +161,7 @@ class VoxelPlanes {
     Block::Numbers distance, back_x, back_y;
     for (std::size_t i = 0; i < kCount; ++i) distance[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
     for (std::size_t i = 0; i < kCount; ++i) {
-      constexpr double kTiny = 1e-99;  // of a point above the sensor
-      const double along = -z[i] / (distance[i] > kTiny ? distance[i] : kTiny);
+      const double along = -z[i] / std::max(distance[i], 1e-99);  // 0 above the sensor
       back_x[i] = along * x[i];
       back_y[i] = along * y[i];
     }
