@@ -215,7 +215,7 @@ def test_a_view_needs_the_recording(drive, tmp_path):
     assert dynains.view(tmp_path / "out", tmp_path / "elsewhere").path.is_file()
     with pytest.raises(dynains.IoError, match="nowhere: cannot be opened"):
         dynains.view(tmp_path / "nowhere")
-    with pytest.raises(dynains.IoError, match="no report.json"):
+    with pytest.raises(dynains.IoError, match="report.json: not found"):
         dynains.view(drive)
 
 
