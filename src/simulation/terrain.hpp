@@ -65,7 +65,9 @@ class Terrain {
   /// The prepared tile at these samples, or null.
   const Tile* near_tile(float u, float v) const {
     if (u <= -1 || v <= -1 || u >= kSide * kCells || v >= kSide * kCells) return nullptr;
-    return near_[grid_index(static_cast<int>(v) / kCells, static_cast<int>(u) / kCells, kSide)];
+    const int row = static_cast<int>(v) / kCells, column = static_cast<int>(u) / kCells;
+    const Tile* const tile = near_[grid_index(row, column, kSide)];
+    return tile;
   }
   float height_near(float x, float y) const;
 

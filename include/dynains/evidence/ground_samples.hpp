@@ -94,9 +94,9 @@ class GroundFootprint {
 
   // Adds the lowest point (m) of a cell.
   void add_around(std::int32_t centre, float lowest) {
-    for (std::int32_t row = -1; row <= 1; ++row) {
-      for (std::int32_t column = -1; column <= 1; ++column) {
-        const auto cell = static_cast<std::size_t>(centre + row * width_ + column);
+    for (std::int32_t first = centre - width_; first <= centre + width_; first += width_) {
+      for (std::int32_t at = first - 1; at <= first + 1; ++at) {
+        const auto cell = static_cast<std::size_t>(at);
         if (lowest_[cell] == kNothing) touched_.push_back(cell);
         lowest_[cell] = std::min(lowest_[cell], lowest);
       }
