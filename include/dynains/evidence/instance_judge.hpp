@@ -78,12 +78,8 @@ class InstanceJudge {
       const Cause whole = cause_of_whole(evidence, may_presume, instance);
       if (is_dynamic(whole)) {
         const Verdict verdict = {whole, as_probability(std::max(level, updater.free_level()))};
-        // Where most of it is free, hits on the other parts are hits on itself.
-        const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
-        const bool all_moves =
-            static_cast<float>(counts.moved) >= kSurelyMoved * static_cast<float>(counts.decided);
         for (std::uint32_t s = first; s < last; ++s) {
-          if (all_moves || !evidence.beliefs.supervoxels[s].stays()) verdicts[s] = verdict;
+          if (!evidence.beliefs.supervoxels[s].stays()) verdicts[s] = verdict;
         }
       } else {
         // Only a part of the instance is dynamic; small groups of free samples may be noise.
@@ -105,7 +101,7 @@ class InstanceJudge {
 
  private:
   static constexpr std::size_t kMinGroup = 4;  // samples
-  static constexpr float kSurelyMoved = 0.7F;  // ratio of moved to decided samples
+  static constexpr float kSurelyMoved = 0.7F;  // ratio of moved to decided samples of a track
 
   static float moved_ratio(const InstanceEvidence& evidence, std::size_t instance) {
     return evidence.tracked.instances[instance].moved_ratio(evidence.beliefs.counts[instance]);
