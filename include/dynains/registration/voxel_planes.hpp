@@ -156,21 +156,21 @@ class VoxelPlanes {
   // Places the points of a block, and prefetches the entries of their voxels in the table. Loops
   // over all numbers are compiled to vector instructions.
   void place(const Pose& T, const Block& block, Placed& placed) const {
-    constexpr std::size_t kCount = Block::kMaxCount;
     const auto& [x, y, z, count] = block;
     Block::Numbers distance, back_x, back_y;
-    for (std::size_t i = 0; i < kCount; ++i) distance[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
-    for (std::size_t i = 0; i < kCount; ++i) {
+    for (std::size_t i = 0; i < Block::kMaxCount; ++i)
+      distance[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
+    for (std::size_t i = 0; i < Block::kMaxCount; ++i) {
       const double along = -z[i] / std::max(distance[i], 1e-99);  // 0 above the sensor
       back_x[i] = along * x[i];
       back_y[i] = along * y[i];
     }
-    std::int32_t index[3][kCount];
+    std::int32_t index[3][Block::kMaxCount];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto row = static_cast<int>(axis);
       const double a = T(row, 0), b = T(row, 1), c = T(row, 2), t = T(row, 3);
       const double per_metre = per_metre_;
-      for (std::size_t i = 0; i < kCount; ++i) {
+      for (std::size_t i = 0; i < Block::kMaxCount; ++i) {
         placed.along[axis][i] = a * x[i] + b * y[i] + c * z[i] + t;
         index[axis][i] = floor_to<std::int32_t>(placed.along[axis][i] * per_metre);
         placed.moved[0][axis][i] =
