@@ -158,8 +158,9 @@ class VoxelPlanes {
   void place(const Pose& T, const Block& block, Placed& placed) const {
     const auto& [x, y, z, count] = block;
     Block::Numbers distance, back_x, back_y;
-    for (std::size_t i = 0; i < Block::kMaxCount; ++i)
+    for (std::size_t i = 0; i < Block::kMaxCount; ++i) {
       distance[i] = std::sqrt(x[i] * x[i] + y[i] * y[i]);
+    }
     for (std::size_t i = 0; i < Block::kMaxCount; ++i) {
       const double along = -z[i] / std::max(distance[i], 1e-99);  // 0 above the sensor
       back_x[i] = along * x[i];
