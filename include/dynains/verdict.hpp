@@ -98,7 +98,7 @@ struct MovingObject {
   /// m, world frame, at the time of its points.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   /// m, along the yaw, across it, and of the points along z. Sides that the sensor has not seen yet
-  /// are missing, but what is as wide as a car and shows its front or rear has a car's length.
+  /// are missing; an object that is as wide as a car and shows its front or rear is 4.5 m long.
   double length = 0.0, width = 0.0, height = 0.0;
   /// rad, about z of the world frame: direction of the motion, or of the longest side while that is
   /// unknown.

@@ -130,37 +130,41 @@ class Odometry::Loop {
     return T_map_predicted;
   }
 
-  /// Sum of the weights of the points on planes whose normals and `direction` have a cosine of at
-  /// least `min_cosine`. Poles do not count: columns of beams on smooth walls look like them, and
-  /// move with the sensor.
-  double weight_on_planes(const Pose& T_map_scan, const Eigen::Vector3d& direction,
-                          double min_cosine) const {
-    double sum = 0.0;
+  /// Sums of the weights of points on planes.
+  struct PlaneWeights {
+    double all = 0.0;
+    double across = 0.0;  ///< on planes whose normals lie along a direction
+  };
+
+  /// Poles do not count: columns of beams on smooth walls look like them, and move with the sensor.
+  PlaneWeights weights_on_planes(const Pose& T_map_scan, const Eigen::Vector3d& direction) const {
+    constexpr double kAlong = 0.8;  // cosine
+    PlaneWeights sums;
     for (const Eigen::Vector3d& p : scan_.keypoints()) {
       const Eigen::Vector3d place = T_map_scan * p;
       const CellSurface* const surface = map_.find(kCellLevels - 1, place);
       if (surface == nullptr || surface->direction_count != 1) continue;
-      if (std::abs(surface->directions[0].dot(direction)) < min_cosine) continue;
-      sum += detail::robust_weight(surface->squared_distance(place), 0.1);  // m
+      const double weight = detail::robust_weight(surface->squared_distance(place), 0.1);  // m
+      sums.all += weight;
+      if (std::abs(surface->directions[0].dot(direction)) >= kAlong) sums.across += weight;
     }
-    return sum;
+    return sums;
   }
 
   /// Whether the scan is held along the direction that surfaces determine worst: by planes across
   /// it, or because it fits clearly worse on both sides of its place. The scatter of smooth walls
   /// seems to determine a motion along them, where any fits nearly as well.
   bool is_held(const Registration& found) const {
-    constexpr double kAcross = 0.8;      // cosine
     constexpr double kMinAcross = 0.05;  // ratio of the weights
     constexpr double kAside = 2.0;       // m, more than patterns of beams on surfaces are wide
     constexpr double kAsGood = 0.75;     // ratio of the weights
     const Eigen::Vector3d& direction = found.uncertain[0];
-    const double all = weight_on_planes(found.T_a_b, direction, 0.0);
-    if (weight_on_planes(found.T_a_b, direction, kAcross) > kMinAcross * all) return true;
+    const PlaneWeights here = weights_on_planes(found.T_a_b, direction);
+    if (here.across > kMinAcross * here.all) return true;
     const auto is_worse_at = [&](double way) {
       Pose T_beside = found.T_a_b;
       T_beside.translation() += way * direction;
-      return weight_on_planes(T_beside, direction, 0.0) < kAsGood * all;
+      return weights_on_planes(T_beside, direction).all < kAsGood * here.all;
     };
     return is_worse_at(kAside) && is_worse_at(-kAside);
   }

@@ -64,7 +64,7 @@ class MapVotes {
     if (voxel != kNoIndex) ++(is_moving ? counts_[voxel].moving : counts_[voxel].rest);
   }
 
-  /// Of the voxel of point `i` of the map; none for coordinates that are not finite.
+  /// Counts in the voxel of point `i` of the map; zero if its coordinates are not finite.
   Counts counts(std::size_t i) const {
     return voxels_[i] == kNoIndex ? Counts() : counts_[voxels_[i]];
   }

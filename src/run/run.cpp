@@ -316,9 +316,9 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
     grid = write_grid(outside, plan, labels, warn);
     is_complete = !grid.is_null();
   }
-  nlohmann::ordered_json told = doubts.json;
-  told["warnings"] = warnings;
-  outcome.report = make_report(plan, told, results, timing);
+  nlohmann::ordered_json remarks = doubts.json;
+  remarks["warnings"] = warnings;
+  outcome.report = make_report(plan, remarks, results, timing);
   if (!grid.is_null()) outcome.report["grid"] = grid;
   if (results.has_second_pass()) outcome.report["second_pass"] = results.second_pass_report();
   if (!is_complete) {

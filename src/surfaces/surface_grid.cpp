@@ -75,7 +75,6 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
     surface.direction_count = 2;
     surface.is_upright = true;
   } else if (extent[0] <= kThin * extent[1] + 0.03) {
-    surface.is_upright = std::abs(axes(2, 0)) < kUpright;
     const Eigen::Vector3d beam = surface.mean - cell.sensor;
     // One scan needs distant ground, which a map has seen from nearer.
     const double edge_on = with_clutter_ ? 0.1 : 0.04;
@@ -83,6 +82,7 @@ CellSurface SurfaceGrid::surface_of(const Cell& cell) const {
                                  sums, edge_on))
       return surface;
     surface.direction_count = 1;
+    surface.is_upright = std::abs(axes(2, 0)) < kUpright;
   } else if (with_clutter_) {
     surface.direction_count = 2;
     surface.variance = extent[1] * extent[1];

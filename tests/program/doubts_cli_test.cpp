@@ -108,9 +108,9 @@ TEST_CASE("run and check name scans with far fewer points than those before them
     }
   };
   const auto is_told = [&](const std::string& scans) {
-    const std::string told = scans + ": far fewer points than the scans before";
-    CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("note: " + told));
-    CHECK_THAT(drive.run({"--accept-poses"}).err, ContainsSubstring("warning: " + told));
+    const std::string remark = scans + ": far fewer points than the scans before";
+    CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("note: " + remark));
+    CHECK_THAT(drive.run({"--accept-poses"}).err, ContainsSubstring("warning: " + remark));
   };
   cut(12, 12, 1000000);
   is_told("scan 000012");
@@ -152,10 +152,10 @@ TEST_CASE("run and check name scans at the places of others, and none in a right
     write_scan(drive.file_of(k), drive.scan(i).xyzi);
   };
   swap(8, 20);
-  const std::string told = "2 scans from 000008 to 000020" + misplaced;
+  const std::string remark = "2 scans from 000008 to 000020" + misplaced;
   const std::string outputs = words();
-  CHECK_THAT(outputs, ContainsSubstring("note: " + told));     // by check
-  CHECK_THAT(outputs, ContainsSubstring("warning: " + told));  // by run
+  CHECK_THAT(outputs, ContainsSubstring("note: " + remark));     // by check
+  CHECK_THAT(outputs, ContainsSubstring("warning: " + remark));  // by run
   for (const std::size_t i : {8U, 20U}) write_scan(drive.file_of(i), drive.scan(i).xyzi);
 
   std::vector<float> noise = drive.scan(12).xyzi;

@@ -129,7 +129,7 @@ class FreeSpaceEvidence {
   }
 
   /// By non-ground point of the newest scan, after its first judge() if is_reference(): 0 if it
-  /// does not move, an odd number if it surely moves. Valid until the next judge().
+  /// does not move, 1 if it surely moves, 2 if it may move. Valid until the next judge().
   Span<const std::uint8_t> may_move() const { return may_move_; }
 
   /// Makes the range image of the newest scan, if is_reference(). Points that are certain to move

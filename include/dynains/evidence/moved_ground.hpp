@@ -166,7 +166,7 @@ class MovedGround {
   static constexpr std::uint32_t kMinHit = 3;   // "hit" references of a voxel that is ground
   static constexpr float kMaxGap = 0.1F;        // m between two beams whose hits show the ground
 
-  /// What references saw of a sample.
+  /// Result of the references for a sample of the ground.
   enum class Seen : std::uint8_t { kUnknown, kMoved, kGround };
 
   // The first points of the runs beside the removed points give the height of the surrounding

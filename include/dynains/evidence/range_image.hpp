@@ -76,7 +76,7 @@ class RangeImage {
   }
 
   /// Replaces the image by the image of one scan. `ground`, `objects`: its points, m, sensor frame.
-  /// `moving`: by point of `objects`, odd for a moving point; empty if no point moves.
+  /// `moving`: by point of `objects`, 1 for a moving point; empty if no point moves.
   /// `reach` (m): a return of an object protects the cells within this lateral distance, and at
   /// least its 3x3 cells. Near the sensor, the 3x3 cells alone are narrower than the error of the
   /// poses.

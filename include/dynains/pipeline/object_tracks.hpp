@@ -394,8 +394,8 @@ class ObjectTracks {
     return centre;
   }
 
-  // What drives and is as wide as a car has at least its length, as far as the side towards the
-  // sensor hides it: by the squared cosine of the angle between the length and the view.
+  // Extends an object that is at least as wide as a car to the length of a car, away from the
+  // sensor. Only the hidden part is added: the squared cosine of the angle between length and view.
   MovingObject with_hidden_length(MovingObject object) const {
     constexpr double kCarWidth = 1.3, kCarLength = 4.5;  // m: the narrowest, and a usual one
     const Eigen::Vector2d axis = axes_of(object.yaw).col(0), view = from_sensor(object);

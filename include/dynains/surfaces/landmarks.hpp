@@ -20,8 +20,8 @@ inline constexpr double kAgreeing = 0.3;
 
 /// Agreement of two scans above the ground.
 struct Agreement {
-  double share = 0.0;      ///< ratio of points with one of the other scan within 0.3 m, [0, 1]
-  double gap = 1.0;        ///< mean distance to those of the other scan, m, at most 1
+  double share = 0.0;      ///< ratio of points with a point of the other scan within 0.3 m, [0, 1]
+  double gap = 1.0;        ///< mean distance to the nearest point of the other scan, m, at most 1
   std::size_t points = 0;  ///< number of compared points
 };
 

@@ -35,7 +35,7 @@ struct CellSurface {
   std::array<Eigen::Vector3d, 2> directions;       ///< orthonormal; it determines places along them
   std::size_t direction_count = 0;                 ///< 0: nothing, 1: plane, 2: pole or clutter
   double variance = 0.0;                           ///< m^2, of clutter across its longest extent
-  bool is_upright = false;  ///< a pole or wall; also of a wall that does not count
+  bool is_upright = false;                         ///< a pole or wall
 
   /// m^2, of a point (m) along the directions.
   double squared_distance(const Eigen::Vector3d& point) const {

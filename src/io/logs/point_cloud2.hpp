@@ -50,7 +50,7 @@ class PointCloud2 {
     std::size_t data = 0, data_end = 0;  ///< steps and the size of the data lie before them
   };
   const Places& places() const { return places_; }
-  /// Of all fields, in their order.
+  /// The names of all fields, in the order of the message.
   const std::vector<std::string>& field_names() const { return field_names_; }
 
   /// By its name.

@@ -92,7 +92,7 @@ PointTimes range_of(const std::vector<double>& times, double least, double most)
   return range;
 }
 
-/// What the points of some scans say about their clock.
+/// Finds the clock of points from the times in some scans.
 class PointClockSearch {
  public:
   /// `period`: median time from scan to scan, s; 0: not known. `unit`: as of find_clock().
@@ -115,8 +115,7 @@ class PointClockSearch {
     if (samples_.empty()) return {std::nullopt, "found no point with a return and a finite time"};
     const std::string option =
         "; give the unit with --point-time-unit: s, ms, us, ns, or seconds, such as 0.1 for times "
-        "from 0 "
-        "to 1 in scans of 0.1 s";
+        "from 0 to 1 in scans of 0.1 s";
     constexpr std::size_t kFewPoints = 3;  // in a scan; they may have one time by chance
     if (duration(1.0) == 0.0) {
       if (points_ <= kFewPoints * samples_.size()) return {};

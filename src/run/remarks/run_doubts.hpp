@@ -12,7 +12,7 @@
 
 namespace dynains::run {
 
-/// What a run says of its poses and clouds.
+/// Doubts about the poses and clouds of a run.
 struct RunDoubts {
   std::vector<std::string> sentences;  ///< one for each doubt
   nlohmann::ordered_json json;         ///< "jumps", "suspicious" and "returns" of a report
