@@ -113,31 +113,34 @@ inline std::string drops_text(const LoopCounts& counts) {
 }
 
 /// The level and the message of a report: all that is wrong.
-inline void tell_problems(const LoopCounts& counts, const LoopState& state, Diagnosis& diagnosis) {
+inline void add_problems(const LoopCounts& counts, const LoopState& state, Diagnosis& diagnosis) {
   using Level = Diagnosis::Level;
-  const auto tell = [&diagnosis](Level level, const std::string& text) {
+  const auto report = [&diagnosis](Level level, const std::string& text) {
     diagnosis.level = std::max(diagnosis.level, level);
     diagnosis.message += (diagnosis.message.empty() ? "" : "; ") + text;
   };
-  if (counts.arrived == 0) tell(Level::kWarn, "no cloud arrives");
+  if (counts.arrived == 0) report(Level::kWarn, "no cloud arrives");
   if (counts.left_out() > 0) {
     if (counts.taken == 0) {
-      tell(Level::kError, "no cloud is taken: " + drops_text(counts));
+      report(Level::kError, "no cloud is taken: " + drops_text(counts));
     } else {
-      tell(Level::kWarn, "clouds are left out: " + drops_text(counts));
+      report(Level::kWarn, "clouds are left out: " + drops_text(counts));
     }
   }
-  if (state.suspicion != dynains::Suspicion::kNone) tell(Level::kError, text_of(state.suspicion));
-  if (state.time_doubt != dynains::TimeDoubt::kNone) tell(Level::kWarn, text_of(state.time_doubt));
+  if (state.suspicion != dynains::Suspicion::kNone) report(Level::kError, text_of(state.suspicion));
+  if (state.time_doubt != dynains::TimeDoubt::kNone) {
+    report(Level::kWarn, text_of(state.time_doubt));
+  }
   if (counts.lost > 0) {
-    tell(Level::kError, "track is lost: " + std::to_string(counts.lost) +
-                            " clouds pass with their moving points (" + counts.loss + ')');
+    report(Level::kError, "track is lost: " + std::to_string(counts.lost) +
+                              " clouds pass with their moving points (" + counts.loss + ')');
   }
   if (counts.misfits > 0) {
-    tell(Level::kWarn, "poses that do not fit to their scans: " + std::to_string(counts.misfits));
+    report(Level::kWarn, "poses that do not fit to their scans: " + std::to_string(counts.misfits));
   }
   if (counts.failures > 0) {
-    tell(Level::kWarn, "messages that could not be published: " + std::to_string(counts.failures));
+    report(Level::kWarn,
+           "messages that could not be published: " + std::to_string(counts.failures));
   }
   if (diagnosis.message.empty()) {
     diagnosis.message = counts.taken > 0 ? "clouds are cleaned" : "clouds wait for transforms";
@@ -150,7 +153,7 @@ inline void tell_problems(const LoopCounts& counts, const LoopState& state, Diag
 inline Diagnosis diagnose(const LoopCounts& counts, const LoopTotals& totals,
                           const LoopState& state, double seconds) {
   Diagnosis result;
-  detail::tell_problems(counts, state, result);
+  detail::add_problems(counts, state, result);
   const auto add = [&result](const std::string& name, std::string value) {
     result.values.emplace_back(name, std::move(value));
   };

@@ -10,7 +10,7 @@
 namespace dynains {
 
 /// Whether anything, a folder or a regular file is there; links are followed. Throw IoError if the
-/// system cannot tell.
+/// system cannot answer.
 bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);

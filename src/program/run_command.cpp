@@ -111,14 +111,14 @@ void run_as_asked(RunFlags& flags) {
   std::optional<Progress> progress;
   RunListener listener;
   listener.warn = print_warning;
-  const auto tell = [&](const char* unit) {
+  const auto show_progress = [&](const char* unit) {
     return [&, unit](std::size_t done, std::size_t total) {
       if (done == 0) progress.emplace(total, unit, flags.quiet);
       if (done > 0) progress->update(done);
     };
   };
-  listener.progress = tell("scans");
-  listener.revision_progress = tell("revised scans");
+  listener.progress = show_progress("scans");
+  listener.revision_progress = show_progress("revised scans");
   PoseEstimate estimate;
   const RunOutcome outcome = run::run(settings, open(flags, estimate), listener);
   progress.reset();

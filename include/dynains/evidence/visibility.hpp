@@ -52,8 +52,8 @@ class Visibility {
     }
   }
 
-  /// Most samples of bits(): a word that begins with the byte of a bit contains at least as many
-  /// bits from this bit on.
+  /// Maximum number of samples of bits(): a word that begins with the byte of a bit contains at
+  /// least as many bits from this bit on.
   static constexpr std::size_t kMaxBits = 56;
   struct Count {
     std::uint32_t free = 0;

@@ -8,7 +8,7 @@
 
 namespace dynains {
 
-/// Most decompressed bytes of each compressed one.
+/// Maximum ratio of decompressed to compressed bytes.
 inline constexpr std::uint64_t kMaxRatio = 1000;
 /// Largest block, and memory for the blocks that are kept, bytes.
 inline constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 28U;

@@ -29,7 +29,7 @@ struct TransformSource {
 /// Each frame has one parent. An edge is static, or a trajectory that is interpolated.
 class TransformTree {
  public:
-  /// Most edges between a frame and its root. Robots have fewer than 100.
+  /// Maximum number of edges between a frame and its root. Robots have fewer than 100.
   static constexpr std::size_t kDeepest = 256;
 
   /// `longest_gap`: s, between two poses of an edge that changes. The newest pose of an edge that

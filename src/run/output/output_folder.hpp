@@ -109,7 +109,7 @@ class ResultFolder {
   /// Replaces the marker, and lists one more file, whose content is that of `file` of this name. A
   /// file that is not listed counts as one of the user.
   void mark_with(nlohmann::ordered_json marker, const std::filesystem::path& file);
-  /// Removes the listed files, and at last the marker. Files of others stay.
+  /// Removes the listed files, then the marker. Files of others stay.
   void remove_results() const;
 
  private:

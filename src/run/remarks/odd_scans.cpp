@@ -30,7 +30,7 @@ std::string text_of(const std::vector<std::size_t>& scans, std::size_t first,
 /// Scans that do not fit as both beside, and up to 20 in which much more seems to move than in
 /// both.
 std::set<std::size_t> suspects(const std::vector<ScanCounts>& counts) {
-  constexpr std::size_t kMost = 20;
+  constexpr std::size_t kMaxPeaks = 20;
   constexpr double kTimesUsual = 4.0;  // changes from scan to scan
   std::set<std::size_t> scans;
   std::vector<double> changes;
@@ -44,7 +44,7 @@ std::set<std::size_t> suspects(const std::vector<ScanCounts>& counts) {
   }
   const double least = kTimesUsual * median(std::move(changes));
   std::sort(peaks.rbegin(), peaks.rend());
-  peaks.resize(std::min(kMost, peaks.size()));
+  peaks.resize(std::min(kMaxPeaks, peaks.size()));
   for (const auto& [height, i] : peaks) {
     if (height > least) scans.insert(i);
   }
