@@ -61,8 +61,8 @@ void add_check_command(CLI::App& app) {
   const auto flags = std::make_shared<CheckFlags>(command);
   command.footer(
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
-      "points, height\nand tilt of the sensor. Registers scans, and reports whether they agree with "
-      "the poses, which option\nmakes them agree, and the errors of the poses, in cm and deg. "
+      "points, height\nand tilt of the sensor. Registers scans, and reports whether they agree "
+      "with the poses,\nwhich option makes them agree, and the errors of the poses, in cm and deg. "
       "Exits with 1 if a file is cut off, if the poses\nneed another option or fit under none, or "
       "if scans are too far apart to be compared.");
   command.callback([flags] { check(*flags); });
