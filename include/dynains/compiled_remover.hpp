@@ -14,8 +14,9 @@
 #include "dynains/config.hpp"
 #include "dynains/descriptors/occupancy_descriptor.hpp"
 #include "dynains/errors.hpp"
+#include "dynains/ground/ground_segmenter.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
-#include "dynains/pipeline/remover_pipeline.hpp"
+#include "dynains/pipeline/interfaces.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
@@ -25,7 +26,7 @@
 namespace dynains {
 
 /// Types of the pipeline's stages. To replace a stage, derive from this struct and redefine its
-/// alias. pipeline/stage_interfaces.hpp lists the members that a stage needs.
+/// alias. pipeline/interfaces.hpp lists the members that a stage needs.
 struct DefaultStages {
   using Ground = GroundSegmenter;
   using Clusterer = CurvedVoxelClusterer;

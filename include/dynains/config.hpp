@@ -11,26 +11,12 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
-#include "dynains/ground/ground_config.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/pose.hpp"
 
 namespace dynains {
 
-class GroundSegmenter;
-
 namespace detail {
-
-template <class Stage>
-struct ConfigOfStage {
-  using type = typename Stage::Config;
-};
-template <>
-struct ConfigOfStage<GroundSegmenter> {
-  using type = GroundConfig;
-};
-template <class Stage>
-using ConfigOf = typename ConfigOfStage<Stage>::type;
 
 /// Whether `Operation<T>` is well-formed; detects optional members of T.
 template <template <class> class Operation, class T, class = void>
@@ -214,12 +200,12 @@ struct RemoverConfig {
 /// All parameters: `BasicDynaInsRemover<Stages>::Config`.
 template <class Stages>
 struct PipelineConfig : RemoverConfig {
-  detail::ConfigOf<typename Stages::Ground> ground;
-  detail::ConfigOf<typename Stages::Clusterer> clusterer;
-  detail::ConfigOf<typename Stages::Descriptor> descriptor;
-  detail::ConfigOf<typename Stages::Belief> belief;
+  typename Stages::Ground::Config ground;
+  typename Stages::Clusterer::Config clusterer;
+  typename Stages::Descriptor::Config descriptor;
+  typename Stages::Belief::Config belief;
   FreeSpaceConfig evidence;
-  detail::ConfigOf<typename Stages::Map> map;
+  typename Stages::Map::Config map;
 
   /// Method and parameters of the paper. Voxels, cells and ground, for which the paper gives no
   /// values, follow its public implementation. Ranges differ, see docs/algorithm.md.

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynains/pipeline/decisions.hpp"
+#include "dynains/pipeline/scan_ring.hpp"
 #include "dynains/pipeline/verdict_writer.hpp"
-#include "dynains/pipeline/window_votes.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -2,7 +2,7 @@
 # of the list below form a layer. A header may include headers of its own folder and of the layers
 # that precede its own in the list.
 set(layers
-  "^((simd|threads)/.*|errors|median|points|pose|parameters|plausibility|verdict|point_cloud_traits|version)\\.hpp$"
+  "^((simd|threads)/.*|errors|median|points|pose|parameters|verdict|point_cloud_traits|version)\\.hpp$"
   "^voxels/"
   "^sensor/"
   "^(ground|clusters|belief)/"

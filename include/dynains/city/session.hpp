@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dynains/evidence/free_space_config.hpp"
-#include "dynains/evidence/range_image_grid.hpp"
+#include "dynains/evidence/range_image.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/recording/world_cells.hpp"

@@ -14,7 +14,7 @@
 #include "dynains/city/session.hpp"
 #include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
-#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {

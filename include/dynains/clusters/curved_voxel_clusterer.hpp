@@ -16,7 +16,6 @@
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 

@@ -19,7 +19,6 @@
 #include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/evidence/moved_ground.hpp"
 #include "dynains/evidence/reference_scans.hpp"
-#include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/sensor/sensor_model.hpp"

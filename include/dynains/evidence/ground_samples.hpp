@@ -14,7 +14,6 @@
 #include "dynains/evidence/instance_samples.hpp"
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {

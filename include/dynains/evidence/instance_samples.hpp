@@ -12,7 +12,6 @@
 
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"

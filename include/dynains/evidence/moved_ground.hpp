@@ -15,7 +15,6 @@
 #include "dynains/points.hpp"
 #include "dynains/sensor/plane_fit.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"

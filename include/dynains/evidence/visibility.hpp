@@ -11,7 +11,6 @@
 #include "dynains/evidence/range_image.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 

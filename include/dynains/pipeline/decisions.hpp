@@ -16,8 +16,6 @@
 #include "dynains/config.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/pipeline/window_votes.hpp"
-#include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/registration/motion_stage.hpp"
@@ -233,7 +231,7 @@ class WindowDecision final : public ScanDecision {
   }
 
  private:
-  using DescriptorConfig = ConfigOf<typename Stages::Descriptor>;
+  using DescriptorConfig = typename Stages::Descriptor::Config;
   template <class Config>
   using BeliefGrid = decltype(std::declval<const Config&>().of_belief());
   template <class Config>

@@ -9,7 +9,6 @@
 #include "dynains/evidence/free_space_evidence.hpp"
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/scan_ring.hpp"
-#include "dynains/plausibility.hpp"
 #include "dynains/points.hpp"
 #include "dynains/registration/motion_stage.hpp"
 #include "dynains/registration/pose_correction.hpp"

@@ -13,7 +13,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"
 #include "dynains/points.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
 

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "dynains/plausibility.hpp"
 #include "dynains/verdict.hpp"
 
 namespace dynains::detail {

@@ -16,7 +16,7 @@
 #include "dynains/recording/cell_samples.hpp"
 #include "dynains/recording/paged_tiles.hpp"
 #include "dynains/recording/world_cells.hpp"
-#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 

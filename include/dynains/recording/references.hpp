@@ -17,7 +17,7 @@
 #include "dynains/pose.hpp"
 #include "dynains/recording/byte_store.hpp"
 #include "dynains/sensor/sensor_model.hpp"
-#include "dynains/simd/bits.hpp"
+#include "dynains/simd/pack_loops.hpp"
 
 namespace dynains {
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dynains/points.hpp"
-#include "dynains/simd/bits.hpp"
 #include "dynains/simd/pack_loops.hpp"
 
 namespace dynains::detail {
