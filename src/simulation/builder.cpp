@@ -173,7 +173,7 @@ void Builder::park(const Waypoint& at, Kind kind) {
   const Footprint footprint = t.footprint_of(object, at);
   if (!t.fixed.is_free(footprint, 0.25)) return t.objects.pop_back();
   t.fixed.add(footprint);
-  t.parked.push_back({static_cast<std::uint32_t>(object), at, 0, 0});
+  t.parked.push_back({object, at, 0, 0});
 }
 
 bool Builder::is_near_crossing(const Street& street, Vec2 p, double margin) const {

@@ -57,7 +57,7 @@ void add_changes(const World& layout, const Config& config, Traffic& traffic) {
       if (config.day < change.first_day || config.day > change.last_day) break;
       traffic.objects.push_back(std::move(object));
       traffic.fixed.add(place);
-      traffic.parked.push_back({static_cast<std::uint32_t>(traffic.objects.size() - 1), at, 0, 0});
+      traffic.parked.push_back({traffic.objects.size() - 1, at, 0, 0});
       break;
     }
   }

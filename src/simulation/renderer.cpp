@@ -171,13 +171,9 @@ void Renderer::draw() {
       split = first > last || (first == last && bounds.half_azimuth > 1);
     }
     for (int row = first_row; row <= last_row; ++row) {
-      if (split) {
-        draw_slots(drawn, near, beams_->first_slot(row, 0), beams_->last_slot(row, last));
-        draw_slots(drawn, near, beams_->first_slot(row, first),
-                   beams_->last_slot(row, BeamTable::kColumns - 1));
-      } else {
-        draw_slots(drawn, near, beams_->first_slot(row, first), beams_->last_slot(row, last));
-      }
+      if (split) draw_slots(drawn, near, beams_->first_slot(row, 0), beams_->last_slot(row, last));
+      draw_slots(drawn, near, beams_->first_slot(row, first),
+                 beams_->last_slot(row, split ? BeamTable::kColumns - 1 : last));
     }
   }
 }

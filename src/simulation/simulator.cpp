@@ -232,7 +232,7 @@ class Simulator::Implementation {
     const double interval = 1 / config_.rate;
     const int steps = std::max(1, static_cast<int>(std::ceil(interval / 0.05)));
     const double dt = interval / steps;
-    std::map<std::uint32_t, Vec2> first_seen;
+    std::map<std::size_t, Vec2> first_seen;
     ever_moved_.assign(world_.traffic.objects.size(), false);
     const int moments = config_.scans + (takes_time() ? 1 : 0);
     for (int i = 0; i < moments; ++i) {
@@ -387,7 +387,8 @@ class Simulator::Implementation {
       const Pose T_world_object =
           person ? upright(pose.at)
                  : stand_on(world_.terrain, pose.at, object.size.length, object.size.width);
-      const std::uint32_t instance = object.instance == 0 ? pose.object + 1 : object.instance;
+      const auto instance =
+          object.instance == 0 ? static_cast<std::uint32_t>(pose.object + 1) : object.instance;
       const std::uint32_t label = label_of(pose);
       states.push_back({instance, label, T_world_object, pose.speed, object.size.length,
                         object.size.width, object.size.height});

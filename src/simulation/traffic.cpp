@@ -14,7 +14,7 @@ bool Signal::is_red(double time, int stream) const {
 std::size_t Traffic::add_object(Kind kind) { return add_object(kind, random_size(kind, random_)); }
 
 std::size_t Traffic::add_object(Kind kind, const Size& size) {
-  Object object;
+  Object& object = objects.emplace_back();
   object.kind = kind;
   object.size = size;
   object.seed = random_.bits();
@@ -22,7 +22,6 @@ std::size_t Traffic::add_object(Kind kind, const Size& size) {
     Random random(object.seed);
     object.model = vehicle_model(kind, size, random);
   }
-  objects.push_back(std::move(object));
   return objects.size() - 1;
 }
 
@@ -33,14 +32,13 @@ std::size_t Traffic::add_lane(Route route, std::vector<StopLine> stop_lines) {
 
 Traffic::Driver& Traffic::add_driver(std::size_t object, std::size_t lane, double s,
                                      double cruise) {
-  Driver driver;
+  Driver& driver = drivers.emplace_back();
   driver.object = object;
   driver.lane = lane;
   driver.s = s;
   driver.speed = cruise;
   driver.cruise = cruise;
-  drivers.push_back(driver);
-  return drivers.back();
+  return driver;
 }
 
 Kind Traffic::random_kind(const Flow& flow) {
@@ -93,22 +91,10 @@ void Traffic::fill(const Flow& flow) {
 
 void Traffic::collect_bodies(Vec2 centre, double radius) {
   bodies_.clear();
-  auto add = [&](const Waypoint& at, double speed, std::size_t object, const Driver* driver) {
-    bodies_.push_back({footprint_of(object, at), speed * direction(at.heading), driver,
-                       objects[object].kind == Kind::kPedestrian});
-  };
-  for (const Driver& driver : drivers) {
-    if (!driver.active) continue;
-    const Waypoint at = place_of(driver);
-    if (norm(at.position - centre) < radius) add(at, driver.speed, driver.object, &driver);
-  }
-  for (const Walker& walker : walkers) {
-    if (norm(walker.position - centre) > radius) continue;
-    add({walker.position, walker.heading}, norm(walker.velocity), walker.object, nullptr);
-  }
-  for (const ObjectPose& pose : parked) {
-    if (norm(pose.at.position - centre) < radius) add(pose.at, 0, pose.object, nullptr);
-  }
+  visit_around(centre, radius, [this](const ObjectPose& pose, const Driver* driver) {
+    bodies_.push_back({footprint_of(pose.object, pose.at), pose.speed * direction(pose.at.heading),
+                       driver, objects[pose.object].kind == Kind::kPedestrian});
+  });
 }
 
 double Traffic::free_distance(const Driver& driver, double reach, double& speed_ahead) const {
@@ -128,20 +114,15 @@ double Traffic::free_distance(const Driver& driver, double reach, double& speed_
     if (s > lane.route.length()) break;
     const Waypoint at = lane.route.at(s);
     for (const Body* body : near) {
-      Footprint footprint = body->footprint;
-      bool blocked = distance(footprint, at.position) < clearance;
-      if (!blocked && body->person && d > 1) {
-        // Vehicles brake for people before these step onto the lane.
-        footprint.centre = footprint.centre + driver.foresight * body->velocity;
-        blocked = distance(footprint, at.position) < clearance;
-      }
-      if (!blocked && driver.yields && d > 2 && norm(body->velocity) > 1) {
-        for (const double ahead : {0.7, 1.4, 2.1}) {
-          footprint.centre = body->footprint.centre + ahead * body->velocity;
-          blocked = blocked || distance(footprint, at.position) < clearance + 0.3;
-        }
-      }
-      if (blocked) {
+      const auto blocks = [&](double seconds, double margin) {
+        Footprint footprint = body->footprint;
+        footprint.centre = footprint.centre + seconds * body->velocity;
+        return distance(footprint, at.position) < clearance + margin;
+      };
+      const bool is_near_mover = driver.yields && d > 2 && norm(body->velocity) > 1;
+      // Vehicles brake for people before these step onto the lane.
+      if (blocks(0, 0) || (body->person && d > 1 && blocks(driver.foresight, 0)) ||
+          (is_near_mover && (blocks(0.7, 0.3) || blocks(1.4, 0.3) || blocks(2.1, 0.3)))) {
         speed_ahead = std::max(0.0, dot(body->velocity, direction(at.heading)));
         return d;
       }
@@ -191,25 +172,24 @@ double Traffic::wanted_acceleration(const Driver& driver) const {
   double speed_ahead = 0;
   double gap = free_distance(driver, reach, speed_ahead);
   bool blocked = gap < reach;
+  const auto stop_at = [&](double distance) {
+    gap = distance;
+    speed_ahead = 0;
+    blocked = true;
+  };
   const double front = driver.s + size.length / 2;
   for (const StopLine& line : lane.stop_lines) {
     const double to_line = line.s - front;
     const bool can_stop = to_line > v * v / 7;
     if (to_line > -0.5 && to_line < gap && can_stop &&
         signals[line.signal].is_red(time_, line.stream)) {
-      gap = to_line + 1.5;
-      speed_ahead = 0;
-      blocked = true;
+      stop_at(to_line + 1.5);
     }
   }
   if (driver.stays_at_end) {
     const double to_end = lane.route.length() - driver.s;
-    if (to_end + 2 < gap || to_end < 0.3) {
-      gap = to_end + 2;
-      speed_ahead = 0;
-      blocked = true;
-      if (to_end < 0.1) return -v / 0.1;
-    }
+    if (to_end < 0.1) return -v / 0.1;
+    if (to_end + 2 < gap || to_end < 0.3) stop_at(to_end + 2);
   }
   constexpr double comfort = 1.5;  // m/s^2
   // Intelligent driver model: Treiber, Hennecke, Helbing, "Congested traffic states", 2000.
@@ -244,10 +224,10 @@ Vec2 Traffic::social_force(const Walker& walker, Vec2 wanted) const {
   for (const Body& body : bodies_) {
     const Vec2 apart = walker.position - body.footprint.centre;
     const double far = norm(apart);
-    if (far > 4 + body.footprint.half_length || far < 1e-6) continue;
+    // The nearest of all is the walker itself.
+    if (far > 4 + body.footprint.half_length || far < (body.person ? 0.05 : 0.01)) continue;
     const double gap = distance(body.footprint, walker.position);
-    if (gap > 2.5 || far < 0.01) continue;
-    if (body.person && far < 0.05) continue;
+    if (gap > 2.5) continue;
     const Vec2 away = (1 / far) * apart;
     const double strength = (body.person ? 4.0 : 7.0) * std::exp(-gap / 0.45);
     force = force + strength * (away + (-0.35) * left_of((1 / walker.pace) * wanted));
@@ -267,19 +247,18 @@ Vec2 Traffic::social_force(const Walker& walker, Vec2 wanted) const {
 }
 
 bool Traffic::is_blocked(const Walker& walker, Vec2 next) const {
+  const auto comes_too_near = [&](const Footprint& footprint, double keep) {
+    const double gap = distance(footprint, next);
+    return gap < keep && gap < distance(footprint, walker.position);
+  };
   bool blocked = false;
   fixed.visit_near(next, [&](const Footprint& footprint) {
-    blocked = blocked || (distance(footprint, next) < 0.25 &&
-                          distance(footprint, next) < distance(footprint, walker.position));
+    blocked = blocked || comes_too_near(footprint, 0.25);
   });
   for (const Body& body : bodies_) {
-    const double keep = body.person ? 0.2 : 0.35;
-    if (norm(body.footprint.centre - next) > 10) continue;
-    const double before = distance(body.footprint, walker.position);
-    if (body.person && norm(body.footprint.centre - walker.position) < 1e-6) continue;
-    if (distance(body.footprint, next) < keep && distance(body.footprint, next) < before) {
-      blocked = true;
-    }
+    const bool itself = body.person && norm(body.footprint.centre - walker.position) < 1e-6;
+    if (blocked || itself || norm(body.footprint.centre - next) > 10) continue;
+    blocked = comes_too_near(body.footprint, body.person ? 0.2 : 0.35);
   }
   return blocked;
 }
@@ -358,22 +337,9 @@ EgoPose Traffic::ego() const {
 
 std::vector<ObjectPose> Traffic::around(Vec2 centre, double radius) const {
   std::vector<ObjectPose> result;
-  auto add = [&](const ObjectPose& pose) {
-    if (norm(pose.at.position - centre) < radius) result.push_back(pose);
-  };
-  for (const ObjectPose& pose : parked) add(pose);
-  for (std::size_t i = 1; i < drivers.size(); ++i) {
-    const Driver& driver = drivers[i];
-    if (!driver.active) continue;
-    add({static_cast<std::uint32_t>(driver.object), place_of(driver), driver.speed,
-         1.1 * driver.s});
-  }
-  for (const Walker& walker : walkers) {
-    add({static_cast<std::uint32_t>(walker.object),
-         {walker.position, walker.heading},
-         norm(walker.velocity),
-         walker.phase});
-  }
+  visit_around(centre, radius, [&](const ObjectPose& pose, const Driver* driver) {
+    if (driver != &drivers[0]) result.push_back(pose);
+  });
   return result;
 }
 

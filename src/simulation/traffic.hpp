@@ -26,7 +26,7 @@ struct Object {
 
 /// Pose of an object at the time of one scan.
 struct ObjectPose {
-  std::uint32_t object = 0;
+  std::size_t object = 0;
   Waypoint at;
   double speed = 0;
   double phase = 0;  ///< of the gait, rad
@@ -141,6 +141,24 @@ class Traffic {
     const Driver* driver;  ///< null if it is none
     bool person;
   };
+
+  /// Calls `visit(pose, driver)` for everybody within `radius` of `centre`. `driver` is null if it
+  /// is none.
+  template <class Visitor>
+  void visit_around(Vec2 centre, double radius, Visitor&& visit) const {
+    const auto add = [&](const ObjectPose& pose, const Driver* driver) {
+      if (norm(pose.at.position - centre) < radius) visit(pose, driver);
+    };
+    for (const Driver& driver : drivers) {
+      if (!driver.active) continue;
+      add({driver.object, place_of(driver), driver.speed, 1.1 * driver.s}, &driver);
+    }
+    for (const Walker& walker : walkers) {
+      add({walker.object, {walker.position, walker.heading}, norm(walker.velocity), walker.phase},
+          nullptr);
+    }
+    for (const ObjectPose& pose : parked) add(pose, nullptr);
+  }
 
   Kind random_kind(const Flow& flow);
   void enter(Flow& flow, double s);
