@@ -131,6 +131,18 @@ TEST_CASE("only compact instances are presumed to move, from the third scan of a
   CHECK_FALSE(is_presumed({11.7F, 3.6F}));
 }
 
+TEST_CASE("the first scan of an epoch is evidence on the second one, without latency only") {
+  Watch watch(FreeSpaceConfig{});
+  watch.see(PointBuffer()).see(car());
+  CHECK(watch.causes(1, false).count(Cause::kFreeSpace) == 1);
+  watch.see(PointBuffer(), PointBuffer());
+  CHECK(watch.causes(1, true) == Causes{Cause::kNoEvidence});
+
+  Watch stays(FreeSpaceConfig{});
+  stays.see(car()).see(car());
+  CHECK(stays.causes(1, false) == Causes{Cause::kOccupied});
+}
+
 TEST_CASE("the evidence of scans before an instance and that of scans after it are kept apart") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = config.lookahead_scans = 2;

@@ -78,6 +78,7 @@ class FreeSpaceEvidence {
     if (scan == 0 || epoch_ != epoch) begin_epoch(scan, epoch, T_world_sensor);
     newest_ = scan;
     Record& record = record_of(scan);
+    if (scan == epoch_begin_ + 2) forget_adjacent(record_of(scan - 1).evidence);
     record.T_world_sensor = T_world_sensor;
     record.epoch = epoch;
     record.since_begin = scan - epoch_begin_;
@@ -219,11 +220,20 @@ class FreeSpaceEvidence {
   void test_against_earlier_references(std::uint64_t scan, Record& record) {
     const auto lookback = static_cast<std::uint64_t>(config_.lookback_scans);
     for (std::uint64_t age = 1; age <= record.since_begin && age <= lookback; ++age) {
-      if (!references_.span().compares(record.since_begin, static_cast<int>(age))) continue;
+      const bool is_compared =
+          references_.span().compares(record.since_begin, static_cast<int>(age));
+      if (!is_compared && record.since_begin != 1) continue;
       const detail::ReferenceScan* const reference = references_.find(scan - age, record.epoch);
       if (reference != nullptr) test(scan, record, *reference, newest_test_);
     }
     updater_.begin_later_references(record.evidence.beliefs);
+  }
+
+  // The first scan of an epoch is the only reference of the second one, and shows what moves fast.
+  // It is adjacent: what moves slowly still hides the places that it left. So its hits serve only
+  // for the verdict without latency.
+  void forget_adjacent(detail::InstanceEvidence& evidence) const {
+    updater_.begin(evidence.samples, evidence.beliefs);
   }
 
   // Scans since the latest reference.
