@@ -28,11 +28,11 @@ struct MapOptions {
 /// By whole_path(). Throws ConfigError.
 fs::path target_of(const std::string& name) {
   fs::path path = whole_path(name);
-  if (is_map_name(name) && is_map_name(path)) return path;
+  if (is_point_file(name) && is_point_file(path)) return path;
   throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
 }
 
-MapFileOptions file_options(const City& city) {
+std::unique_ptr<MapFile> open_map(const City& city, const fs::path& file) {
   double most = 0.0;
   Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
   for (const SessionInfo& session : city.sessions()) {
@@ -40,11 +40,10 @@ MapFileOptions file_options(const City& city) {
         {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
     lowest = session.lowest;
   }
-  MapFileOptions options;
-  options.las = las_options_near(lowest);
-  options.columns.label = options.columns.time = options.columns.session = true;
-  options.columns.double_xyz = most > kFloatCoordinateLimit;
-  return options;
+  PointColumns columns;
+  columns.label = columns.time = columns.session = true;
+  columns.double_xyz = most > kFloatCoordinateLimit;
+  return std::make_unique<MapFile>(file, columns, Pose::Identity(), las_options_near(lowest));
 }
 
 /// Writes points of a city with their session, its begin as time, and their label, as far as the
@@ -55,15 +54,15 @@ class CityPointFile {
   CityPointFile(const City& city, const std::string& name, bool force)
       : city_(city),
         output_(target_of(name), existing_by(force), InputFiles(city.folder())),
-        file_(MapFile::open(output_.path(), file_options(city))) {}
+        file_(open_map(city, output_.path())) {}
 
   void add(const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
-    MapAttributes attributes;
-    attributes.time = attributes.scan_time = city_.sessions()[session].begin;
-    attributes.label = attributes.instance = point.label;
-    attributes.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-    attributes.is_ground = point.is_ground != 0;
-    file_->add(position_of(city_.grid(), tile, point), attributes);
+    FilePoint of_map{position_of(city_.grid(), tile, point)};
+    of_map.time = of_map.scan_time = city_.sessions()[session].begin;
+    of_map.label = of_map.instance = point.label;
+    of_map.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+    of_map.is_ground = point.is_ground != 0;
+    file_->add(of_map);
   }
 
   std::size_t size() const { return file_->size(); }

@@ -159,7 +159,7 @@ class NewMap {
   /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   template <class Publish>
   void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
-    map.for_each([&](const Eigen::Vector3d& point) { writer_->add(point, MapAttributes()); });
+    map.for_each([&](const Eigen::Vector3d& point) { writer_->add({point}); });
     writer_->commit();
     if (!is_inside_) return file_->put_in_place(publish_more);
     Json report = out_.marker();

@@ -4,73 +4,20 @@
 #include <cmath>
 #include <limits>
 
-#include "io/text.hpp"
-
 namespace dynains::run {
 namespace {
 
-class PointMapFile final : public MapFile {
- public:
-  PointMapFile(const std::filesystem::path& path, const PointColumns& columns)
-      : writer_(path, columns) {}
-
-  void add(const Eigen::Vector3d& position, const MapAttributes& attributes) override {
-    FilePoint point;
-    point.position = position;
-    point.intensity = attributes.intensity;
-    point.label = attributes.label;
-    point.time = attributes.time;
-    point.session = attributes.session;
-    writer_.add(point);
-  }
-  std::size_t size() const override { return writer_.size(); }
-  void commit() override { writer_.commit(); }
-
- private:
-  PointFileWriter writer_;
-};
-
-class LasMapFile final : public MapFile {
- public:
-  LasMapFile(const std::filesystem::path& path, const MapFileOptions& options)
-      : writer_(path, options.las), intensity_scale_(options.intensity_scale) {}
-
-  void add(const Eigen::Vector3d& position, const MapAttributes& attributes) override {
-    const double intensity = std::round(intensity_scale_ * attributes.intensity);
-    LasPoint point;
-    point.position = position;
-    // NaN is not >= 0 and becomes 0.
-    point.intensity = intensity >= 0.0 ? static_cast<std::uint16_t>(std::min(intensity, 65535.0))
-                                       : std::uint16_t{0};
-    point.classification = attributes.is_ground ? LasClass::kGround : LasClass::kUnclassified;
-    point.time = attributes.scan_time;
-    point.belief = attributes.belief;
-    point.cause = static_cast<std::uint8_t>(attributes.cause);
-    point.instance = attributes.instance;
-    writer_.add(point);
-  }
-  std::size_t size() const override { return writer_.size(); }
-  void commit() override { writer_.commit(); }
-
- private:
-  LasWriter writer_;
-  double intensity_scale_;
-};
-
-/// Attributes of point i of a scan.
-MapAttributes attributes_of(const JudgedScan& judged, std::size_t i) {
-  const RecordedScan& scan = judged.scan;
+/// Point i of a scan, but for its position.
+FilePoint attributes_of(const JudgedScan& judged, std::size_t i) {
   const ScanVerdict& verdict = judged.verdict;
-  MapAttributes attributes;
-  attributes.scan_time = verdict.time;
-  if (!scan.time.empty()) attributes.time = scan.time[i];
-  attributes.intensity = scan.xyzi[4 * i + 3];
-  attributes.belief = verdict.beliefs[i];
-  if (!judged.truth.empty()) attributes.label = judged.truth[i];
-  attributes.instance = verdict.instances[i];
-  attributes.cause = verdict.causes[i];
-  attributes.is_ground = verdict.labels[i] == PointLabel::kGround;
-  return attributes;
+  FilePoint point = judged.scan.point(i);
+  point.scan_time = verdict.time;
+  point.belief = verdict.beliefs[i];
+  if (!judged.truth.empty()) point.label = judged.truth[i];
+  point.instance = verdict.instances[i];
+  point.cause = static_cast<std::uint8_t>(verdict.causes[i]);
+  point.is_ground = verdict.labels[i] == PointLabel::kGround;
+  return point;
 }
 
 /// Points lie around the poses; near the limit doubles cost little and lose nothing.
@@ -94,18 +41,6 @@ double las_intensity_scale(const RecordedScan& scan) {
 
 }  // namespace
 
-bool is_las(const std::filesystem::path& path) {
-  return text::lower_case(path.extension().string()) == ".las";
-}
-
-bool is_map_name(const std::filesystem::path& path) { return is_point_file(path) || is_las(path); }
-
-std::unique_ptr<MapFile> MapFile::open(const std::filesystem::path& path,
-                                       const MapFileOptions& options) {
-  if (is_las(path)) return std::make_unique<LasMapFile>(path, options);
-  return std::make_unique<PointMapFile>(path, options.columns);
-}
-
 LasOptions las_options_near(const Eigen::Vector3d& position) {
   constexpr double kKilometre = 1000.0;  // m
   LasOptions options;
@@ -116,19 +51,20 @@ LasOptions las_options_near(const Eigen::Vector3d& position) {
 std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
                                   const ScanRange& range, bool has_attributes,
                                   const std::string& crs) {
-  MapFileOptions options;
-  options.columns.double_xyz = is_far(recording, range);
+  PointColumns columns;
+  columns.double_xyz = is_far(recording, range);
   if (has_attributes) {
-    options.columns.intensity = recording.columns().intensity;
-    options.columns.time = recording.columns().time;
-    options.columns.label = recording.has_labels();
+    columns.intensity = recording.columns().intensity;
+    columns.time = recording.columns().time;
+    columns.label = recording.has_labels();
   }
+  LasOptions las;
   if (is_las(file)) {
-    options.las = las_options_near(recording.T_world_sensor(range.first).translation());
-    options.las.wkt = crs;
-    options.intensity_scale = las_intensity_scale(recording.read_scan(range.first));
+    las = las_options_near(recording.T_world_sensor(range.first).translation());
+    las.wkt = crs;
+    las.intensity_scale = las_intensity_scale(recording.read_scan(range.first));
   }
-  return MapFile::open(file, options);
+  return std::make_unique<MapFile>(file, columns, Pose::Identity(), las);
 }
 
 PointColumns moving_columns(const Recording& recording, const ScanRange& range) {
@@ -153,13 +89,15 @@ void MapAttributeTable::add(const JudgedScan& judged) {
   }
 }
 
-MapAttributes MapAttributeTable::at(const Eigen::Vector3d& position) const {
+FilePoint MapAttributeTable::at(const Eigen::Vector3d& position) const {
   const VoxelKey key = key_of(position);
   std::uint32_t found = voxels_.find(key);
   for_each_touching(key, [&](VoxelKey near) {
     if (found == kNoIndex) found = voxels_.find(near);
   });
-  return found == kNoIndex ? MapAttributes() : attributes_[found];
+  FilePoint point = found == kNoIndex ? FilePoint() : attributes_[found];
+  point.position = position;
+  return point;
 }
 
 VoxelKey MapAttributeTable::key_of(const Eigen::Vector3d& position) const {

@@ -244,7 +244,7 @@ ScanRange select_scans(const Recording& sequence, const ScanWindow& window) {
 
 fs::path map_path(const std::string& name, const fs::path& out) {
   fs::path map = whole_path(name);
-  if (!is_map_name(name) || !is_map_name(map)) {
+  if (!is_point_file(name) || !is_point_file(map)) {
     throw ConfigError("--map " + name + ": expected a name that ends in .ply, .pcd or .las");
   }
   if (map == out / "dynamic_points.ply") {

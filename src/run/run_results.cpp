@@ -191,7 +191,7 @@ void RunResults::hand_out() {
 }
 
 void RunResults::add_map_point(const Eigen::Vector3d& point) {
-  map_->add(point, map_attributes_ ? map_attributes_->at(point) : MapAttributes());
+  map_->add(map_attributes_ ? map_attributes_->at(point) : FilePoint{point});
 }
 
 void RunResults::commit() {

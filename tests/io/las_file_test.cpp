@@ -1,6 +1,4 @@
 // Maps in LAS files, and coordinate reference systems.
-#include "dynains/io/las_file.hpp"
-
 #include <limits>
 #include <string>
 
@@ -18,12 +16,12 @@ TEST_CASE("LAS: written points are read back to half a millimetre, in coordinate
   LasOptions options;
   options.offset = {691000.0, 5334000.0, 500.0};
   options.wkt = "PROJCS[\"a name\"]";
-  LasWriter writer(folder / "map.las", options);
-  LasPoint point;
+  PointFileWriter writer(folder / "map.las", {}, Pose::Identity(), options);
+  FilePoint point;
   point.position = {691234.5678, 5334567.8912, 499.0004};
   point.intensity = 65535;
-  point.classification = LasClass::kGround;
-  point.time = 1571234567.25;
+  point.is_ground = true;
+  point.scan_time = 1571234567.25;
   point.belief = 0.75F;
   point.cause = 10;
   point.instance = 70000;
@@ -52,8 +50,8 @@ TEST_CASE("LAS: written points are read back to half a millimetre, in coordinate
 TEST_CASE("LAS: points that the file cannot hold are refused, and no file appears") {
   const TemporaryFolder folder;
   {
-    LasWriter writer(folder / "map.las");
-    LasPoint point;
+    PointFileWriter writer(folder / "map.las");
+    FilePoint point;
     writer.add(point);
     for (const double x : {2.2e6, -2.2e6, std::numeric_limits<double>::quiet_NaN()}) {
       point.position.x() = x;
@@ -64,8 +62,8 @@ TEST_CASE("LAS: points that the file cannot hold are refused, and no file appear
   CHECK(count_entries(folder.path()) == 0);
   LasOptions options;
   options.wkt.assign(65535, 'x');
-  CHECK_THROWS_AS(LasWriter(folder / "map.las", options), IoError);
-  LasWriter(folder / "empty.las").commit();
+  CHECK_THROWS_AS(PointFileWriter(folder / "map.las", {}, Pose::Identity(), options), IoError);
+  PointFileWriter(folder / "empty.las").commit();
   CHECK(read_points(folder / "empty.las").positions.empty());
 }
 

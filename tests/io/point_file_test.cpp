@@ -121,13 +121,14 @@ TEST_CASE("A point file without commit leaves no file") {
   CHECK(count_entries(folder.path()) == 1);
 }
 
-TEST_CASE("Only .ply and .pcd are point files") {
+TEST_CASE("Only .ply, .pcd and .las are written as point files") {
   CHECK(is_point_file("a/b.ply"));
   CHECK(is_point_file("b.PCD"));
   CHECK_FALSE(is_point_file("ply"));
-  CHECK_FALSE(is_point_file("a.las"));
-  CHECK_THAT(message_of<IoError>([] { PointFileWriter("a.las"); }),
-             ContainsSubstring("a.las: expected a name that ends in .ply or .pcd"));
+  CHECK(is_point_file("a.las"));
+  CHECK_FALSE(is_point_file("a.xyz"));
+  CHECK_THAT(message_of<IoError>([] { PointFileWriter("a.xyz"); }),
+             ContainsSubstring("a.xyz: expected a name that ends in .ply, .pcd or .las"));
   CHECK_THAT(message_of<IoError>([] { read_points("a.las"); }), ContainsSubstring("a.las"));
 }
 

@@ -9,7 +9,7 @@ set(exceptions
   "^program/program\\.cpp$"           # /dev/null for closed standard streams
   "^city/(city|session_writer)\\.cpp$") # sessions of a locked map are removed by their names
 # Commands leave it to OutputFile and OutputFolder where a file is written.
-set(writers "AtomicFile|PointFileWriter|LasWriter")
+set(writers "AtomicFile|PointFileWriter")
 
 set(found "")
 file(GLOB_RECURSE sources RELATIVE ${SOURCE_DIR} ${SOURCE_DIR}/*.cpp ${SOURCE_DIR}/*.hpp)

@@ -1,7 +1,8 @@
-// Reader of point clouds in PLY, PCD, LAS, NumPy and text files; writer of PLY and PCD.
+// Reader of point clouds in PLY, PCD, LAS, NumPy and text files; writer of PLY, PCD and LAS.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -27,9 +28,15 @@ struct FilePoint {
   std::uint16_t ring = 0;
   double time = 0.0;
   std::uint16_t session = 0;
+  // Of LAS alone, beside position and intensity.
+  double scan_time = 0.0;      ///< s, in the field of the time of GPS
+  bool is_ground = false;      ///< class 2 of ASPRS; others are of class 1
+  float belief = 0.0F;         ///< extra bytes `belief`: probability of being dynamic, [0, 1]
+  std::uint8_t cause = 0;      ///< extra bytes `cause`: see Cause
+  std::uint32_t instance = 0;  ///< extra bytes `instance`: 0 for none
 };
 
-/// Columns in addition to x y z.
+/// Columns of PLY and PCD in addition to x y z.
 struct PointColumns {
   bool double_xyz = false;  ///< x y z as double; some PCD readers support floats only
   bool intensity = false;   ///< float `intensity`
@@ -39,17 +46,24 @@ struct PointColumns {
   bool session = false;     ///< uint16 `session`, of a map of many sessions
 };
 
+struct LasOptions {
+  /// Origin of the integer coordinates, m. Points are within 2,147 km of it.
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  std::string wkt;               ///< coordinate reference system (OGC 01-009); empty: none
+  double intensity_scale = 1.0;  ///< from intensities to 16 bits, at which they are cut
+};
+
 /// Writes a binary point file, point by point, with few points in memory. The number of points need
 /// not be known in advance. `commit()` creates or replaces the file atomically.
 class PointFileWriter {
  public:
-  /// The extension .ply or .pcd determines the format. `viewpoint`: pose of the sensor for the
-  /// header of PCD; ignored for PLY. Throws IoError for another extension, or a folder that is not
-  /// writable.
+  /// The extension determines the format: .ply, .pcd, or .las (1.4, point format 6, steps of 1 mm).
+  /// `viewpoint`: pose of the sensor for the header of PCD. Throws IoError for another extension, a
+  /// folder that is not writable, or a reference system of 65,535 bytes or more.
   explicit PointFileWriter(const std::filesystem::path& path, const PointColumns& columns = {},
-                           const Pose& viewpoint = Pose::Identity());
+                           const Pose& viewpoint = Pose::Identity(), const LasOptions& las = {});
 
-  /// Adds one point. commit() reports failures.
+  /// Adds one point. commit() reports failures. Throws IoError for a position that LAS cannot hold.
   void add(const FilePoint& point);
   std::size_t size() const { return size_; }
   /// Puts the file in place. Throws IoError unless it was written completely.
@@ -59,16 +73,21 @@ class PointFileWriter {
   std::string header() const;
   void write_buffer();
 
+  std::filesystem::path path_;
   PointColumns columns_;
   Pose viewpoint_;
-  bool pcd_;
+  bool is_las_;
+  LasOptions las_;
+  std::array<std::int32_t, 3> least_, most_;  ///< of the coordinates of LAS, mm
   std::size_t size_ = 0;
   std::string buffer_;  ///< bytes of points that are not in the file yet
   AtomicFile file_;
 };
 
-/// Whether PointFileWriter writes files with this extension: .ply or .pcd.
+/// Whether PointFileWriter writes files with this extension.
 bool is_point_file(const std::filesystem::path& path);
+/// Whether the extension is .las.
+bool is_las(const std::filesystem::path& path);
 
 /// For a known format that is not read (.laz, .e57, .pcap, a dump of GLIM): its name and the way to
 /// convert it. Else empty.

@@ -1,6 +1,4 @@
 // LAS files, versions 1.0 to 1.4 (ASPRS).
-#include "dynains/io/las_file.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -225,7 +223,8 @@ std::string extra_bytes_vlr() {
                  extra_description("instance", Scalar::kUint32, "0: none"));
 }
 
-constexpr std::uint8_t kLasPointFormat = 6;
+constexpr std::uint8_t kLasPointFormat = 6;  // of written files
+constexpr double kLasStep = 0.001;           // m, of written coordinates
 
 }  // namespace
 
@@ -257,21 +256,15 @@ std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool 
   return header.point_count;
 }
 
-LasWriter::LasWriter(const std::filesystem::path& path, const LasOptions& options)
-    : path_(path), options_(options), file_(path) {
+/// Has the same length for every number of points.
+std::string las_header(const std::filesystem::path& path, const LasOptions& options,
+                       std::size_t count, const LasSteps& least, const LasSteps& most) {
   if (options.wkt.size() >= std::numeric_limits<std::uint16_t>::max()) {
     fail(path, "expected a reference system of less than 65535 bytes");
   }
-  least_.fill(std::numeric_limits<std::int32_t>::max());
-  most_.fill(std::numeric_limits<std::int32_t>::min());
-  file_.stream() << header();
-}
-
-/// Has the same length for every number of points.
-std::string LasWriter::header() const {
   std::string records = extra_bytes_vlr();
-  if (!options_.wkt.empty()) {
-    records += vlr("LASF_Projection", 2112, "OGC WKT", options_.wkt + '\0');
+  if (!options.wkt.empty()) {
+    records += vlr("LASF_Projection", 2112, "OGC WKT", options.wkt + '\0');
   }
   ByteWriter out;
   // Bit 4: coordinate systems are texts (WKT).
@@ -284,54 +277,49 @@ std::string LasWriter::header() const {
   out.zeros(4);  // without a day, so that equal points give equal files
   out.number(static_cast<std::uint16_t>(las::kSizes.header_1_4));
   out.number(static_cast<std::uint32_t>(las::kSizes.header_1_4 + records.size()));
-  out.number(std::uint32_t{options_.wkt.empty() ? 1U : 2U});
+  out.number(std::uint32_t{options.wkt.empty() ? 1U : 2U});
   const std::size_t extra =
-      sizeof(LasPoint::belief) + sizeof(LasPoint::cause) + sizeof(LasPoint::instance);
+      sizeof(FilePoint::belief) + sizeof(FilePoint::cause) + sizeof(FilePoint::instance);
   out.number(kLasPointFormat);
   out.number(static_cast<std::uint16_t>(las::kPointFormats[kLasPointFormat].size + extra));
   out.zeros(24);  // numbers of points as in older versions
-  for (int axis = 0; axis < 3; ++axis) out.number(options_.scale);
-  for (const double offset : options_.offset) out.number(offset);
+  for (int axis = 0; axis < 3; ++axis) out.number(kLasStep);
+  for (const double offset : options.offset) out.number(offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const auto* limit : {&most_, &least_}) {
-      const double steps = size_ == 0 ? 0.0 : (*limit)[axis];
-      out.number(options_.offset[static_cast<Eigen::Index>(axis)] + steps * options_.scale);
+    for (const LasSteps* limit : {&most, &least}) {
+      const double steps = count == 0 ? 0.0 : (*limit)[axis];
+      out.number(options.offset[static_cast<Eigen::Index>(axis)] + steps * kLasStep);
     }
   }
   out.zeros(20);  // no records behind the points
-  out.number(std::uint64_t{size_}).number(std::uint64_t{size_}).zeros(14 * 8);  // all first returns
+  out.number(std::uint64_t{count}).number(std::uint64_t{count}).zeros(14 * 8);  // all first returns
   return out.bytes() + records;
 }
 
-void LasWriter::add(const LasPoint& point) {
-  const double most = std::numeric_limits<std::int32_t>::max();
-  std::array<std::int32_t, 3> steps{};
+std::string las_record(const std::filesystem::path& path, const LasOptions& options,
+                       const FilePoint& point, LasSteps& least, LasSteps& most) {
+  const double limit = std::numeric_limits<std::int32_t>::max();
+  ByteWriter record;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<Eigen::Index>(axis);
-    const double value = std::round((point.position[i] - options_.offset[i]) / options_.scale);
-    if (!(std::abs(value) <= most)) {
-      fail(path_, "expected points within " + std::to_string(most * options_.scale) +
-                      " m of the first one");
+    const double value = std::round((point.position[i] - options.offset[i]) / kLasStep);
+    if (!(std::abs(value) <= limit)) {
+      fail(path,
+           "expected points within " + std::to_string(limit * kLasStep) + " m of the first one");
     }
-    steps[axis] = static_cast<std::int32_t>(value);
-    least_[axis] = std::min(least_[axis], steps[axis]);
-    most_[axis] = std::max(most_[axis], steps[axis]);
+    const auto steps = static_cast<std::int32_t>(value);
+    least[axis] = std::min(least[axis], steps);
+    most[axis] = std::max(most[axis], steps);
+    record.number(steps);
   }
-  ByteWriter record;
-  for (const std::int32_t step : steps) record.number(step);
+  const double intensity = std::round(options.intensity_scale * point.intensity);
+  // NaN is not >= 0 and becomes 0.
+  record.number(static_cast<std::uint16_t>(intensity >= 0.0 ? std::min(intensity, 65535.0) : 0.0));
   // Return 1 of 1.
-  record.number(point.intensity).number(std::uint8_t{1U << 4U | 1U}).number(std::uint8_t{0});
-  record.number(point.classification).number(std::uint8_t{0});
-  record.number(std::int16_t{0}).number(std::uint16_t{0}).number(point.time);
-  record.number(point.belief).number(point.cause).number(point.instance);
-  file_.stream() << record.bytes();
-  ++size_;
-}
-
-void LasWriter::commit(AtomicFile::Sync sync) {
-  file_.stream().seekp(0);
-  file_.stream() << header();
-  file_.commit(sync);
+  record.number(std::uint8_t{1U << 4U | 1U}).number(std::uint8_t{0});
+  record.number(static_cast<std::uint8_t>(point.is_ground ? 2 : 1)).number(std::uint8_t{0});
+  record.number(std::int16_t{0}).number(std::uint16_t{0}).number(point.scan_time);
+  return record.number(point.belief).number(point.cause).number(point.instance).bytes();
 }
 
 }  // namespace dynains

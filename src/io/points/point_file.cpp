@@ -21,10 +21,9 @@ std::string extension_in_lower_case(const fs::path& path) {
   return text::lower_case(path.extension().string());
 }
 
-/// Whether the writer writes PCD, and not PLY.
-bool is_pcd(const fs::path& path) {
-  if (!is_point_file(path)) fail(path, "expected a name that ends in .ply or .pcd");
-  return extension_in_lower_case(path) == ".pcd";
+const fs::path& checked(const fs::path& path) {
+  if (!is_point_file(path)) fail(path, "expected a name that ends in .ply, .pcd or .las");
+  return path;
 }
 
 struct PointFileFormat {
@@ -109,14 +108,22 @@ std::string pcd_header(std::size_t count, const PointColumns& columns, const std
 }  // namespace
 
 PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& columns,
-                                 const Pose& viewpoint)
-    : columns_(columns), viewpoint_(viewpoint), pcd_(is_pcd(path)), file_(path) {
+                                 const Pose& viewpoint, const LasOptions& las)
+    : path_(checked(path)),
+      columns_(columns),
+      viewpoint_(viewpoint),
+      is_las_(is_las(path)),
+      las_(las),
+      file_(path) {
+  least_.fill(std::numeric_limits<std::int32_t>::max());
+  most_.fill(std::numeric_limits<std::int32_t>::min());
   file_.stream() << header();
 }
 
 /// Has the same length for every number of points: a comment is padded.
 std::string PointFileWriter::header() const {
-  const auto text = pcd_ ? pcd_header : ply_header;
+  if (is_las_) return las_header(path_, las_, size_, least_, most_);
+  const auto text = extension_in_lower_case(path_) == ".pcd" ? pcd_header : ply_header;
   const std::size_t most = std::numeric_limits<std::size_t>::max();
   const std::size_t length = text(most, columns_, "", viewpoint_).size();
   const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
@@ -124,7 +131,11 @@ std::string PointFileWriter::header() const {
 }
 
 void PointFileWriter::add(const FilePoint& point) {
-  visit_columns(columns_, point, [&](const char*, auto value) { append_number(value, buffer_); });
+  if (is_las_) {
+    buffer_ += las_record(path_, las_, point, least_, most_);
+  } else {
+    visit_columns(columns_, point, [&](const char*, auto value) { append_number(value, buffer_); });
+  }
   ++size_;
   if (buffer_.size() >= 1U << 16U) write_buffer();
 }
@@ -141,9 +152,11 @@ void PointFileWriter::commit(AtomicFile::Sync sync) {
   file_.commit(sync);
 }
 
+bool is_las(const fs::path& path) { return extension_in_lower_case(path) == ".las"; }
+
 bool is_point_file(const fs::path& path) {
   const std::string extension = extension_in_lower_case(path);
-  return extension == ".ply" || extension == ".pcd";
+  return extension == ".ply" || extension == ".pcd" || extension == ".las";
 }
 
 std::optional<std::string> conversion_of(const fs::path& path) {

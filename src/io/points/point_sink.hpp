@@ -1,4 +1,4 @@
-// The readers of point files, one for each format, and what they store values in.
+// The readers of point files, one for each format, what they store values in, and the parts of LAS.
 #pragma once
 
 #include <array>
@@ -61,5 +61,14 @@ std::uint64_t read_pcd(const std::filesystem::path& path, PointSink& sink, bool 
 std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool with_points);
 std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool with_points);
 std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool with_points);
+
+/// Coordinates of a written LAS file, mm from its offset.
+using LasSteps = std::array<std::int32_t, 3>;
+/// The header of a LAS file of `count` points between `least` and `most`. Throws IoError.
+std::string las_header(const std::filesystem::path& path, const LasOptions& options,
+                       std::size_t count, const LasSteps& least, const LasSteps& most);
+/// The bytes of a point, which widens the limits. Throws IoError.
+std::string las_record(const std::filesystem::path& path, const LasOptions& options,
+                       const FilePoint& point, LasSteps& least, LasSteps& most);
 
 }  // namespace dynains
