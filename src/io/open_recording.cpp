@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <map>
 #include <memory>
 #include <optional>
@@ -114,49 +113,6 @@ void list_scans(RecordingContents& r) {
                               " and " + r.scans[i].file.filename().string());
     }
   }
-}
-
-/// Takes the sensors of the log.
-void take_sensors(RecordingContents& r, const LogScans& log) {
-  if (r.options.sensors.empty()) r.options.sensors = log.sensors();
-  if (!r.options.sensors.empty() || r.options.sensor_frame.empty()) return;
-  r.options.sensor_origin = log.T_cloud_frame(r.options.sensor_frame).translation();
-}
-
-/// Takes scans, times and poses of a log. Poses of a file belong to the clouds by time.
-std::unique_ptr<ScanReader> open_log(RecordingContents& r) {
-  if (!r.options.times.empty()) {
-    fail(r.options.times, "expected no file of times: " + r.folder.string() + " has stamps");
-  }
-  const bool has_file = !r.options.poses.empty();
-  auto log = std::make_unique<LogScans>(r.folder, r.options, !has_file && !r.options.without_poses);
-  r.scan_folder = r.folder;
-  r.format = ScanFormat::kLog;
-  r.frame = log->is_in_world() ? PointFrame::kWorld : PointFrame::kSensor;
-  r.files = log->log().files();
-  r.early_end = log->log().early_end();
-  if (r.early_end) {
-    r.warnings.push_back(*r.early_end + "; " + std::to_string(log->size()) +
-                         " scans before it are read");
-  }
-  if (log->log().missing_parts()) r.warnings.push_back(*log->log().missing_parts());
-  r.notes = log->notes();
-  r.warnings.insert(r.warnings.end(), log->warnings().begin(), log->warnings().end());
-  r.is_numbered = true;
-  for (std::size_t i = 0; i < log->size(); ++i) {
-    std::ostringstream name;
-    text::exact(name);
-    name << std::setw(6) << std::setfill('0') << i;
-    r.scans.push_back({r.folder, name.str(), i, log->times()[i]});
-  }
-  take_sensors(r, *log);
-  if (log->is_merged() && !log->is_in_world()) r.clock = std::make_shared<const PointClock>();
-  if (!has_file && !r.options.without_poses) {
-    r.trajectory = log->trajectory();
-    if (r.options.deskew || r.clock) r.motion = log->motion();
-  }
-  pose_by_stamps(r, r.folder);
-  return log;
 }
 
 /// Takes the sweeps of one scene. Poses of a file belong to the sweeps by time.
@@ -291,7 +247,7 @@ void leave_out_broken(RecordingContents& r, const ScanReader& reader) {
 /// Finds the format, and takes scans, times and poses.
 std::unique_ptr<ScanReader> open_scans(RecordingContents& r) {
   const auto tables = is_folder(r.folder) ? nuscenes_tables(r.folder) : std::nullopt;
-  if (is_log(r.folder)) return open_log(r);
+  if (is_log(r.folder)) return open_log_scans(r);
   if (tables) {
     open_nuscenes(r, *tables);
   } else {
@@ -299,7 +255,7 @@ std::unique_ptr<ScanReader> open_scans(RecordingContents& r) {
       const auto conversion = conversion_of(r.folder);
       fail(r.folder, conversion ? *conversion : std::string("is not a folder; ") + kAccepted);
     }
-    if (!find_scan_folder(r) && has_logs(r.folder)) return open_log(r);
+    if (!find_scan_folder(r) && has_logs(r.folder)) return open_log_scans(r);
     list_scans(r);
     r.options.without_poses ? leave_unplaced(r) : read_poses(r);
   }

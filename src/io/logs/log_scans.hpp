@@ -12,11 +12,9 @@
 #include "../points/point_clock.hpp"
 #include "../scan_reader.hpp"
 #include "dynains/io/recording.hpp"
-#include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 #include "log_file.hpp"
 #include "ros_messages.hpp"
-#include "transform_tree.hpp"
 
 namespace dynains {
 
@@ -32,20 +30,14 @@ struct LogCloud {
   std::size_t points = 0;
 };
 
-/// Finds the clouds and the poses of a log. Reads it once from begin to end, checks every cloud,
-/// and keeps the poses and the addresses of the clouds. Throws IoError, also if the choice of a
-/// topic is not clear.
-///
-/// A scan is one cloud, or, of several topics, all clouds within half a period of the stamp of one
-/// on the first topic, in the frame of that topic. Clouds without one there are a scan of their
-/// own.
+/// Reads the clouds of a log. A scan is one cloud, or, of several topics, all clouds within half a
+/// period of the stamp of one on the first topic, in the frame of that topic. Clouds without one
+/// there are a scan of their own.
 class LogScans final : public ScanReader {
  public:
-  /// Without `with_poses`, poses of the log are not looked for.
-  LogScans(const std::filesystem::path& path, const RecordingOptions& options, bool with_poses);
+  explicit LogScans(std::unique_ptr<LogFile> log) : log_(std::move(log)) {}
 
   const LogFile& log() const { return *log_; }
-  std::size_t size() const { return scans_.size(); }
   /// The clouds of scan i, whose points follow each other in it. Their topics may have further
   /// clouds, which are no scans.
   const std::vector<LogCloud>& clouds(std::size_t i) const { return scans_.at(i); }
@@ -54,23 +46,6 @@ class LogScans final : public ScanReader {
   /// Whether scans have clouds of several topics: then the times of their points are in s from the
   /// stamp of the scan.
   bool is_merged() const { return sources_.size() > 1; }
-  /// Poses of the sensors in the frame of the clouds, m; empty if there is only one.
-  const std::vector<Pose>& sensors() const { return sensors_; }
-  /// Stamps of the scans, s, increasing.
-  const std::vector<double>& times() const { return times_; }
-  /// T_world_sensor (T_world_body if the extrinsic calibration is the user's), at the times of the
-  /// scans that have a pose plus `time_offset`; empty without poses.
-  const Trajectory& trajectory() const { return trajectory_; }
-  /// As trajectory(), at all times of poses, for de-skewing.
-  Trajectory motion() const;
-  /// Whether the frame of the clouds is the fixed frame of the poses.
-  bool is_in_world() const { return is_in_world_; }
-  /// Pose of `frame` in the frame of the clouds at the time of the first one. Throws IoError if the
-  /// log does not connect them.
-  Pose T_cloud_frame(const std::string& frame) const;
-  const std::vector<std::string>& notes() const { return notes_; }
-  /// Defects that results depend on.
-  const std::vector<std::string>& warnings() const { return warnings_; }
 
   /// Columns of the first clouds.
   PointColumns columns(const ScanEntry&) const override { return columns_; }
@@ -81,6 +56,8 @@ class LogScans final : public ScanReader {
   const LogScans* log_scans() const override { return this; }
 
  private:
+  friend class LogOpener;
+
   /// A topic of clouds.
   struct Source {
     std::uint32_t topic = 0;
@@ -92,53 +69,25 @@ class LogScans final : public ScanReader {
     std::optional<PointClock> clock;            ///< if times of points count
   };
 
-  void choose_cloud_topics();
-  void choose_pose_topic();
-  void read_log();
-  void take_cloud(const LogMessage& message, Source& source);
-  void take_poses(const LogMessage& message);
-  void check_clouds(const Source& source) const;
-  void note_disordered();
-  void form_scans();
-  void find_sensors();
-  void find_concatenated();
-  void find_clocks();
+  SerialisedMessage load(const LogMessage& message) const;
   void read(const LogCloud& cloud, RecordedScan& scan) const;
   void read_sensors(double time, RecordedScan& scan) const;
   void merge(const LogCloud& cloud, double time, RecordedScan& scan) const;
-  void place_scans();
-  void choose_frames();
-  std::string body_frame() const;
-  void fail_without_poses() const;
-  void refuse_conflict(const std::string& target, const std::string& source) const;
-  void describe_extrinsic();
-  std::optional<Pose> pose_at(double time) const;
-  SerialisedMessage load(const LogMessage& message) const;
 
   std::unique_ptr<LogFile> log_;
-  RecordingOptions options_;
-  bool with_poses_;
   std::vector<Source> sources_;
-  std::optional<std::uint32_t> pose_topic_;  ///< without, poses come from transforms
-  std::string cloud_frame_;                  ///< of the first source
-  std::string pose_frame_;                   ///< fixed frame of the poses
-  std::string posed_frame_;  ///< whose poses come from transforms: the sensor, or a body
-  std::string pose_child_;   ///< moving frame of the poses; empty: the sensor
   std::vector<std::vector<LogCloud>> scans_;
-  std::vector<double> times_;
-  std::vector<Pose> sensors_;
+  PointColumns columns_;
   std::map<double, std::vector<Concatenation::Part>> concatenations_;  ///< by stamp
   std::vector<std::string> concatenated_;  ///< frames of their sensors, in order
-  std::size_t disordered_ = 0;  ///< clouds whose stamp is not after that of the cloud before
-  PointColumns columns_;
-  Trajectory poses_;  ///< of the pose topic
-  TransformTree transforms_;
-  bool is_in_world_ = false;
-  Trajectory trajectory_;
-  std::vector<std::string> notes_, warnings_;
-  mutable std::mutex mutex_;  ///< the log has one place in its file
+  mutable std::mutex mutex_;               ///< the log has one place in its file
   mutable std::vector<std::uint8_t> bytes_, compressed_;
   mutable RecordedScan part_;
 };
+
+/// Opens the log of a recording, and gives it scans, times and poses: those of a file belong to the
+/// clouds by time. Reads the log once from begin to end, checks every cloud, and keeps the poses
+/// and the addresses of the clouds. Throws IoError, also if the choice of a topic is not clear.
+std::unique_ptr<LogScans> open_log_scans(RecordingContents& r);
 
 }  // namespace dynains

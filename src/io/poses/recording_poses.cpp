@@ -340,18 +340,16 @@ void find_point_clock(RecordingContents& r, const ScanReader& reader) {
   std::vector<double> times;
   for (const ScanEntry& scan : r.scans) times.push_back(scan.time);
   RecordedScan scan;
-  const PointClockFinding finding = find_clock(times, r.has_times, r.options.point_time_unit,
-                                               [&](std::size_t i) -> const RecordedScan& {
-                                                 reader.read(r.scans[i], nullptr, scan);
-                                                 return scan;
-                                               });
-  if (!finding.clock && !finding.text.empty()) {
-    fail(r.folder, "cannot be de-skewed: " + finding.text);
+  const auto read = [&](std::size_t i) -> const RecordedScan& {
+    reader.read(r.scans[i], nullptr, scan);
+    return scan;
+  };
+  std::optional<PointClock> clock = found_clock(r, "", times, read);
+  if (!clock) {
+    clock.emplace();
+    if (r.options.point_time_unit > 0.0) clock->unit = r.options.point_time_unit;
   }
-  if (!finding.text.empty()) r.warnings.push_back(finding.text);
-  PointClock clock = finding.clock.value_or(PointClock());
-  if (!finding.clock && r.options.point_time_unit > 0.0) clock.unit = r.options.point_time_unit;
-  r.clock = std::make_shared<const PointClock>(clock);
+  r.clock = std::make_shared<const PointClock>(*clock);
 }
 
 }  // namespace
@@ -413,6 +411,19 @@ void read_poses(RecordingContents& r) {
   read_calibration(r, file);
   match_scans(r, file);
   place_scans(r, r.has_viewpoints ? r.scan_folder : file);
+}
+
+std::optional<PointClock> found_clock(RecordingContents& r, const std::string& topic,
+                                      const std::vector<double>& times,
+                                      const std::function<const RecordedScan&(std::size_t)>& read) {
+  const PointClockFinding finding = find_clock(times, r.has_times, r.options.point_time_unit, read);
+  if (!finding.clock && !finding.text.empty()) {
+    fail(r.folder, (topic.empty() ? "" : topic + ' ') + "cannot be de-skewed: " + finding.text);
+  }
+  if (!finding.text.empty()) {
+    r.warnings.push_back((topic.empty() ? "" : topic + ": ") + finding.text);
+  }
+  return finding.clock;
 }
 
 /// The trajectory if it has times of its own, else the poses of the scans.

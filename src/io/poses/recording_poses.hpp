@@ -3,9 +3,12 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "../points/point_clock.hpp"
 #include "../scan_reader.hpp"
 #include "dynains/io/recording.hpp"
 
@@ -22,6 +25,11 @@ void pose_by_stamps(RecordingContents& r, const std::filesystem::path& origin);
 void leave_unplaced(RecordingContents& r);
 /// See Recording::take_poses().
 void take_poses(RecordingContents& r, std::size_t first, const std::vector<Pose>& T_world_sensor);
+/// The clock of points by the times (s) of their scans, of which `read(i)` gives one with raw
+/// times. `topic`: of the scans, for the warning about it; may be empty. Empty without times.
+std::optional<PointClock> found_clock(RecordingContents& r, const std::string& topic,
+                                      const std::vector<double>& times,
+                                      const std::function<const RecordedScan&(std::size_t)>& read);
 /// Finds the clock of the points, and the trajectory by which they are moved: rows with times of
 /// their own, else the poses of the scans.
 void prepare_deskewing(RecordingContents& r, const ScanReader& reader);
