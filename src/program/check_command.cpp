@@ -1,5 +1,4 @@
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,16 +55,15 @@ void check(const CheckFlags& given) {
 }  // namespace
 
 void add_check_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand(
-      "check", "Report within seconds whether a recording will work, and which options it needs");
-  const auto flags = std::make_shared<CheckFlags>(command);
-  command.footer(
+  add_command<CheckFlags>(
+      app, "check",
+      "Report within seconds whether a recording will work, and which options it needs",
       "Looks at the size of every scan file, and at a sample of scans: counts, units, invalid "
       "points, height\nand tilt of the sensor. Registers scans, and reports whether they agree "
       "with the poses,\nwhich option makes them agree, and the errors of the poses, in cm and deg. "
       "Exits with 1 if a file is cut off, if the poses\nneed another option or fit under none, or "
-      "if scans are too far apart to be compared.");
-  command.callback([flags] { check(*flags); });
+      "if scans are too far apart to be compared.",
+      check);
 }
 
 }  // namespace dynains::program

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <iostream>
 #include <iterator>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -160,26 +159,31 @@ class MapAlignment {
 
 struct CleanOptions {
   explicit CleanOptions(CLI::App& command)
-      : map_option(command.add_option("MAP", map, "map of the recording, .ply or .pcd")),
-        run_option(command.add_option("OUT", run, "folder of `dynains run` over the recording")),
+      : map(command, "MAP", "map of the recording, .ply or .pcd"),
+        run(command, "OUT", "folder of `dynains run` over the recording"),
         sequence(command, "recording of the run", false) {
-    map_option->required()->type_name("");
-    run_option->required()->type_name("");
+    const SettingFlags flags{command};
+    flags(plain_text("map", cleaned, "FILE",
+                     "the cleaned map, in the format of MAP [MAP with _static before its ending]"));
+    flags(Parameter{"voxel", voxel, closed(0.01, 10.0), "m",
+                    "edge of the voxels in which points of the scans decide about those of the "
+                    "map; more by default if the map is coarser"});
+    voxel_option = command.get_option("--voxel");
+    command.add_flag("--force", force, "replace the cleaned map if it exists");
+    command.add_flag("-q,--quiet", quiet, "print errors only");
   }
 
-  std::string map, run;
-  CLI::Option* map_option;  // the first positional arguments
-  CLI::Option* run_option;
+  Argument map, run;
   RecordingFlags sequence;
   std::string cleaned;
   double voxel = 0.2;  // m
-  CLI::Option* voxel_option = nullptr;
+  CLI::Option* voxel_option;
   bool force = false;
   bool quiet = false;
 };
 
 fs::path target_of(const CleanOptions& options) {
-  const fs::path map = options.map;
+  const fs::path map = options.map.value;
   const fs::path target =
       options.cleaned.empty()
           ? map.parent_path() / (map.stem().string() + "_static" + map.extension().string())
@@ -256,22 +260,23 @@ Verdicts judge(const MapVotes& votes, std::size_t count, const fs::path& map) {
 }
 
 void clean(CleanOptions& options) {
+  const std::string& map = options.map.value;
   const fs::path target = whole_path(target_of(options));
-  const ResultFolder out = open_finished_run(options.run);
+  const ResultFolder out = open_finished_run(options.run.value);
   const Recording recording =
-      options.sequence.open_of_run(out, "dynains clean " + options.map + ' ' + options.run);
-  InputFiles inputs(recording, options.map);
+      options.sequence.open_of_run(out, "dynains clean " + map + ' ' + options.run.value);
+  InputFiles inputs(recording, map);
   inputs.add_results(out.path());
   OutputFile cleaned(target, existing_by(options.force), inputs);
-  const std::vector<Eigen::Vector3d> positions = read_points(options.map).positions;
+  const std::vector<Eigen::Vector3d> positions = read_points(map).positions;
 
   const InterruptGuard interrupt;
   const bool is_given = options.voxel_option->count() > 0;
   MapVotes votes(positions, is_given ? options.voxel : voxel_of(positions, options.voxel));
   MapAlignment alignment(positions);
   add_scans(recording, out, options.quiet, alignment, votes);
-  const Verdicts verdicts = judge(votes, positions.size(), options.map);
-  cleaned.write([&](std::ostream& file) { copy_points(options.map, verdicts.keep, file); });
+  const Verdicts verdicts = judge(votes, positions.size(), map);
+  cleaned.write([&](std::ostream& file) { copy_points(map, verdicts.keep, file); });
 
   if (2 * verdicts.unseen > positions.size()) {
     print_warning(std::to_string(verdicts.unseen) + " of " + std::to_string(positions.size()) +
@@ -297,24 +302,12 @@ void clean(CleanOptions& options) {
 }  // namespace
 
 void add_clean_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand(
-      "clean", "Remove moving points from a map that another program has made of a recording");
-  const auto options = std::make_shared<CleanOptions>(command);
-  command
-      .add_option("--map", options->cleaned,
-                  "the cleaned map, in the format of MAP [MAP with _static before its ending]")
-      ->type_name("FILE");
-  SettingFlags{command}(Parameter{"voxel", options->voxel, closed(0.01, 10.0), "m",
-                                  "edge of the voxels in which points of the scans decide about "
-                                  "those of the map; more by default if the map is coarser"});
-  options->voxel_option = command.get_option("--voxel");
-  command.add_flag("--force", options->force, "replace the cleaned map if it exists");
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  command.footer(
+  add_command<CleanOptions>(
+      app, "clean", "Remove moving points from a map that another program has made of a recording",
       "A point of the map leaves if its voxel holds more moving than static points of the scans.\n"
       "The map must lie in the frame of the poses of the run, but for about a metre.\n"
-      "All columns of the points stay.");
-  command.callback([options] { clean(*options); });
+      "All columns of the points stay.",
+      clean);
 }
 
 }  // namespace dynains::program

@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "run/estimate_poses.hpp"
 
@@ -26,6 +28,27 @@ void add_eval_command(CLI::App& app);
 void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 void add_grid_command(CLI::App& app);
+
+/// Adds a command to `app`. `Options(CLI::App&)` declares its arguments and flags; `work(options)`
+/// is its callback.
+template <class Options, class Work>
+void add_command(CLI::App& app, const char* name, const char* help, const char* footer, Work work) {
+  CLI::App& command = *app.add_subcommand(name, help);
+  command.footer(footer);
+  const auto options = std::make_shared<Options>(command);
+  command.callback([options, work] { work(*options); });
+}
+
+/// An argument without a flag, which must be given. It is not moved: the command refers to it.
+struct Argument {
+  Argument(CLI::App& command, const char* name, const char* help) {
+    command.add_option(name, value, help)->required()->type_name("");
+  }
+  Argument(const Argument&) = delete;
+  Argument& operator=(const Argument&) = delete;
+
+  std::string value;
+};
 
 /// Adds --no-deskew.
 void add_compensated_flag(CLI::App& command, bool& is_compensated);

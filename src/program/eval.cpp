@@ -1,5 +1,4 @@
 #include <iostream>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +21,24 @@ namespace {
 
 struct EvalOptions {
   explicit EvalOptions(CLI::App& command)
-      : sequence(command, "labelled sequence"), evaluation(command, "ignore") {}
+      : sequence(command, "labelled sequence"), evaluation(command, "ignore") {
+    command.add_option("runs", runs, "output folders of `dynains run`");
+    command
+        .add_option("--map", maps,
+                    "map file to judge (PLY or PCD, world frame of the poses); can be repeated")
+        ->allow_extra_args(false);
+    ScanWindow::visit(window, SettingFlags{command});
+    command.add_flag("--online", online, "judge the zero-latency labels, OUT/online");
+    command.add_flag(
+        "--errors", errors,
+        "also report where the first run is wrong: by class, instance, range and cause");
+    command.add_flag("--unfinished", unfinished,
+                     "also judge runs, and maps of runs, whose report.json says \"complete\": "
+                     "false");
+    command.add_option("--json", json, "write everything to this file, errors included");
+    command.add_option("--csv", csv, "write the table to this file");
+    command.add_flag("--force", force, "replace the files of --json and --csv");
+  }
 
   RecordingFlags sequence;
   std::vector<std::string> runs;
@@ -106,25 +122,10 @@ void eval(const EvalOptions& options) {
 }  // namespace
 
 void add_eval_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand(
-      "eval",
-      "Judge runs or maps of any tool by a labelled sequence: PR, RR, F1 and SA, DA, AA, HA");
-  const auto options = std::make_shared<EvalOptions>(command);
-  command.add_option("runs", options->runs, "output folders of `dynains run`");
-  command
-      .add_option("--map", options->maps,
-                  "map file to judge (PLY or PCD, world frame of the poses); can be repeated")
-      ->allow_extra_args(false);
-  ScanWindow::visit(options->window, SettingFlags{command});
-  command.add_flag("--online", options->online, "judge the zero-latency labels, OUT/online");
-  command.add_flag("--errors", options->errors,
-                   "also report where the first run is wrong: by class, instance, range and cause");
-  command.add_flag("--unfinished", options->unfinished,
-                   "also judge runs, and maps of runs, whose report.json says \"complete\": false");
-  command.add_option("--json", options->json, "write everything to this file, errors included");
-  command.add_option("--csv", options->csv, "write the table to this file");
-  command.add_flag("--force", options->force, "replace the files of --json and --csv");
-  command.callback([options] { eval(*options); });
+  add_command<EvalOptions>(
+      app, "eval",
+      "Judge runs or maps of any tool by a labelled sequence: PR, RR, F1 and SA, DA, AA, HA", "",
+      eval);
 }
 
 }  // namespace dynains::program

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -356,25 +355,21 @@ void runtime(const RuntimeOptions& options) {
   table.write();
 }
 
-/// Adds an experiment with its options.
-template <class Options>
-void add(CLI::App& experiments, const char* name, const char* help, void (*work)(const Options&)) {
-  CLI::App& command = *experiments.add_subcommand(name, help);
-  const auto options = std::make_shared<Options>(command);
-  command.callback([options, work] { work(*options); });
-}
-
 }  // namespace
 
 void add_experiment_command(CLI::App& app) {
   CLI::App& command =
       *app.add_subcommand("experiment", "The paper's experiments on any labelled sequence");
   command.require_subcommand(1);
-  add(command, "table1",
-      "Table I: PR, RR and F1 with and without belief update, beside published numbers", table1);
-  add(command, "sweep",
-      "Fig. 5: PR, RR and F1 against a parameter (the similarity threshold by default)", sweep);
-  add(command, "runtime", "Fig. 7: time per component, without file reading", runtime);
+  add_command<Table1Options>(
+      command, "table1",
+      "Table I: PR, RR and F1 with and without belief update, beside published numbers", "",
+      table1);
+  add_command<SweepOptions>(
+      command, "sweep",
+      "Fig. 5: PR, RR and F1 against a parameter (the similarity threshold by default)", "", sweep);
+  add_command<RuntimeOptions>(command, "runtime",
+                              "Fig. 7: time per component, without file reading", "", runtime);
 }
 
 }  // namespace dynains::program

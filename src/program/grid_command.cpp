@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,14 +25,19 @@ namespace fs = std::filesystem;
 
 struct GridOptions {
   explicit GridOptions(CLI::App& command)
-      : source_option(command.add_option(
-            "MAP", source, "static map (.ply, .pcd, .las), or folder of `dynains run`")),
+      : source(command, "MAP", "static map (.ply, .pcd, .las), or folder of `dynains run`"),
         sequence(command, "recording of the run", false) {
-    source_option->required()->type_name("");
+    command.add_option("-o,--out", out, "description of the grid; its image, .pgm, lies beside it")
+        ->capture_default_str()
+        ->type_name("FILE.yaml");
+    grid::Config::visit(config, SettingFlags{command});
+    command.add_flag("--keep-moving", keep_moving,
+                     "what moved counts as if it were static, to see what removal changes");
+    command.add_flag("--force", force, "replace the grid if it exists");
+    command.add_flag("-q,--quiet", quiet, "print errors only");
   }
 
-  std::string source;
-  CLI::Option* source_option;  // the first positional argument
+  Argument source;
   RecordingFlags sequence;
   std::string out = "map.yaml";
   grid::Config config;
@@ -65,26 +69,27 @@ PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
 
 void write(GridOptions& options) {
   const fs::path file = grid_file(options.out);
+  const std::string& source = options.source.value;
   options.config.validate();
   std::optional<ResultFolder> run;
   std::optional<Recording> recording;
   InputFiles inputs;
-  if (fs::is_directory(options.source)) {
-    run.emplace(open_finished_run(options.source));
-    recording.emplace(options.sequence.open_of_run(*run, "dynains grid " + options.source));
+  if (fs::is_directory(source)) {
+    run.emplace(open_finished_run(source));
+    recording.emplace(options.sequence.open_of_run(*run, "dynains grid " + source));
     inputs = InputFiles(*recording);
     inputs.add_results(run->path());
   } else if (options.keep_moving) {
     throw ConfigError(
         "--keep-moving needs a folder of `dynains run`: a map has nothing that moves");
   }
-  if (!run) inputs.add(options.source);
+  if (!run) inputs.add(source);
   OutputFile image(grid_image(file), existing_by(options.force), inputs);
   OutputFile description(file, existing_by(options.force), inputs);
 
   const InterruptGuard interrupt;
-  const PlacedGrid made = recording ? grid_of_results(options, *run, *recording)
-                                    : grid_of_map(options.source, options.config);
+  const PlacedGrid made =
+      recording ? grid_of_results(options, *run, *recording) : grid_of_map(source, options.config);
   grid::write_grid(image.path(), description.path(), made.grid, made.origin);
   image.put_in_place([&] { description.put_in_place(); });
   if (!options.quiet) print_grid(description.target(), made.summary());
@@ -100,24 +105,12 @@ void print_grid(const fs::path& file, const nlohmann::ordered_json& summary) {
 }
 
 void add_grid_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand(
-      "grid", "Write an occupancy grid for nav2 of the static map or the results of a run");
-  const auto options = std::make_shared<GridOptions>(command);
-  command
-      .add_option("-o,--out", options->out,
-                  "description of the grid; its image, .pgm, lies beside it")
-      ->capture_default_str()
-      ->type_name("FILE.yaml");
-  grid::Config::visit(options->config, SettingFlags{command});
-  command.add_flag("--keep-moving", options->keep_moving,
-                   "what moved counts as if it were static, to see what removal changes");
-  command.add_flag("--force", options->force, "replace the grid if it exists");
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  command.footer(
+  add_command<GridOptions>(
+      app, "grid", "Write an occupancy grid for nav2 of the static map or the results of a run",
       "Occupied are static points at least --min-height and at most --max-height above the ground "
       "around them. Free is\nwhere the ground was seen or, for results of a run, where beams have "
-      "passed low. SEQ and its flags are those of\nthe run unless you give them.");
-  command.callback([options] { write(*options); });
+      "passed low. SEQ and its flags are those of\nthe run unless you give them.",
+      write);
 }
 
 }  // namespace dynains::program

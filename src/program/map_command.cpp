@@ -10,8 +10,10 @@
 #include "dynains/city/city.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
+#include "parameter_flags.hpp"
 #include "run/map_file.hpp"
 #include "run/output/output_folder.hpp"
+#include "run/settings/recording_settings.hpp"
 
 namespace dynains::program {
 namespace {
@@ -21,7 +23,7 @@ namespace fs = std::filesystem;
 struct MapOptions {
   std::string city;
   std::string session, later_session;
-  std::string file, added, removed;
+  std::string file, added = "added.ply", removed = "removed.ply";
   bool force = false;
 };
 
@@ -159,48 +161,39 @@ void check(const MapOptions& options) {
 
 void add_map_command(CLI::App& app) {
   CLI::App& map = *app.add_subcommand("map", "Read and change a map of many sessions");
-  auto options = std::make_shared<MapOptions>();
-  map.add_option("CITY", options->city, "folder of the map, see `dynains run --update`")
-      ->required()
-      ->type_name("");
+  const auto options = std::make_shared<MapOptions>();
+  const auto add_argument = [](CLI::App& command, const char* name, std::string& value,
+                               const char* help) {
+    command.add_option(name, value, help)->required()->type_name("");
+  };
+  add_argument(map, "CITY", options->city, "folder of the map, see `dynains run --update`");
   map.require_subcommand(1);
-
-  const auto add = [&](const char* name, const char* help, void (*work)(const MapOptions&)) {
+  const auto add = [&](const char* name, const char* help,
+                       void (*work)(const MapOptions&)) -> CLI::App& {
     CLI::App& command = *map.add_subcommand(name, help);
     command.callback([options, work] { work(*options); });
-    return &command;
+    return command;
   };
-  const auto add_session = [&](CLI::App* command, const char* name, std::string& value) {
-    command->add_option(name, value, "name of a session")->required()->type_name("");
+  const auto add_session = [&](CLI::App& command, const char* name, std::string& value) {
+    add_argument(command, name, value, "name of a session");
   };
-  const auto add_file = [&](CLI::App* command) {
-    command->add_option("FILE", options->file, "points, .ply, .pcd or .las")
-        ->required()
-        ->type_name("");
-  };
-  const auto add_force = [&](CLI::App* command) {
-    command->add_flag("--force", options->force, "replace files");
+  const auto add_file = [&](CLI::App& command) {
+    add_argument(command, "FILE", options->file, "points, .ply, .pcd or .las");
+    command.add_flag("--force", options->force, "replace files");
   };
 
   add("list", "Print the sessions in the order of their time", list);
-  CLI::App* const export_command = add("export", "Write the map after all sessions", export_map);
-  add_file(export_command);
-  add_force(export_command);
-  CLI::App* const at_command = add("at", "Write the map after one session", write_map_at);
-  add_session(at_command, "SESSION", options->session);
-  add_file(at_command);
-  add_force(at_command);
-  CLI::App* const diff_command =
-      add("diff", "Write what came and what left between two sessions", diff);
-  add_session(diff_command, "A", options->session);
-  add_session(diff_command, "B", options->later_session);
-  options->added = "added.ply";
-  options->removed = "removed.ply";
-  diff_command->add_option("--added", options->added, "points that came [added.ply]")
-      ->type_name("FILE");
-  diff_command->add_option("--removed", options->removed, "points that left [removed.ply]")
-      ->type_name("FILE");
-  add_force(diff_command);
+  add_file(add("export", "Write the map after all sessions", export_map));
+  CLI::App& at = add("at", "Write the map after one session", write_map_at);
+  add_session(at, "SESSION", options->session);
+  add_file(at);
+  CLI::App& changes = add("diff", "Write what came and what left between two sessions", diff);
+  add_session(changes, "A", options->session);
+  add_session(changes, "B", options->later_session);
+  const SettingFlags flags{changes};
+  flags(plain_text("added", options->added, "FILE", "points that came [added.ply]"));
+  flags(plain_text("removed", options->removed, "FILE", "points that left [removed.ply]"));
+  changes.add_flag("--force", options->force, "replace files");
   add_session(add("drop", "Remove one session: the map is as if it had never come", drop),
               "SESSION", options->session);
   add("check",

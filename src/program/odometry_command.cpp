@@ -1,5 +1,4 @@
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -16,7 +15,16 @@ namespace dynains::program {
 namespace {
 
 struct OdometryFlags {
-  explicit OdometryFlags(CLI::App& command) : recording(command, "recording") {}
+  explicit OdometryFlags(CLI::App& command) : recording(command, "recording") {
+    command.add_option("-o,--out", out, "file of poses, rows of time x y z qx qy qz qw (TUM)")
+        ->required()
+        ->type_name("FILE");
+    command.add_flag("--force", force, "replace the file of --out if it exists");
+    ScanWindow::visit(window, SettingFlags{command});
+    add_compensated_flag(command, is_compensated);
+    command.add_flag("--one-thread", one_thread, "the thread that registers also reads");
+    command.add_flag("-q,--quiet", quiet, "print errors only");
+  }
 
   RecordingFlags recording;
   std::string out;
@@ -87,23 +95,12 @@ PoseEstimate estimate_with_progress(Recording& recording, const ScanWindow& wind
 }
 
 void add_odometry_command(CLI::App& app) {
-  CLI::App& command =
-      *app.add_subcommand("odometry", "Estimate the poses of a recording from its scans");
-  const auto flags = std::make_shared<OdometryFlags>(command);
-  command.add_option("-o,--out", flags->out, "file of poses, rows of time x y z qx qy qz qw (TUM)")
-      ->required()
-      ->type_name("FILE");
-  command.add_flag("--force", flags->force, "replace the file of --out if it exists");
-  ScanWindow::visit(flags->window, SettingFlags{command});
-  add_compensated_flag(command, flags->is_compensated);
-  command.add_flag("--one-thread", flags->one_thread, "the thread that registers also reads");
-  command.add_flag("-q,--quiet", flags->quiet, "print errors only");
-  command.footer(
+  add_command<OdometryFlags>(
+      app, "odometry", "Estimate the poses of a recording from its scans",
       "Registers each scan to a map of earlier ones, without what moves. The first scan is the "
       "frame of the poses. Exits with\n3 if it loses track for good, after it has written the "
-      "poses "
-      "before.");
-  command.callback([flags] { write_poses(*flags); });
+      "poses before.",
+      write_poses);
 }
 
 }  // namespace dynains::program

@@ -12,6 +12,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
+#include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/output_folder.hpp"
@@ -33,10 +34,24 @@ constexpr const char* kRemappedMap = "static_map_remapped.ply";
 
 /// Flags of `dynains remap`.
 struct RemapOptions {
-  explicit RemapOptions(CLI::App& command) : sequence(command, "recording of the run") {}
+  explicit RemapOptions(CLI::App& command)
+      : sequence(command, "recording of the run"),
+        run(command, "OUT", "folder of the results of dynains run over SEQ") {
+    const SettingFlags flags{command};
+    flags(plain_text("map", map, "FILE",
+                     "static map, .ply or .pcd [static_map_remapped.ply in OUT]"));
+    flags(TextParameter{"map_voxel", map_voxel, &read_number<double>, "M",
+                        "resolution of the static map; 0 keeps all points [of the run]"});
+    flags(plain_text("update", update, "CITY",
+                     "also replaces the session of the run in this map of many sessions: its "
+                     "points and references move to the corrected poses"));
+    flags(plain_text("session", session, "NAME", "name of the session in --update [of the run]"));
+    command.add_flag("--force", force, "replace the file of --map if it exists");
+    command.add_flag("-q,--quiet", quiet, "print errors only");
+  }
 
   RecordingFlags sequence;
-  std::string run;
+  Argument run;
   std::string map;
   std::string update;               // folder of a map of many sessions; empty: none
   std::string session;              // its name there; empty: that of the run
@@ -195,7 +210,7 @@ Json point_flags(const ResultFolder& out) {
 }
 
 void remap(RemapOptions& options) {
-  ResultFolder out = open_finished_run(options.run);
+  ResultFolder out = open_finished_run(options.run.value);
   const bool has_points_in_world = out.field<bool>("/request/points_in_world");
   const double map_voxel = out.field<double>("/configuration/map_voxel");
   options.sequence.settings.complete(point_flags(out));
@@ -240,35 +255,13 @@ void remap(RemapOptions& options) {
 }  // namespace
 
 void add_remap_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand(
-      "remap", "Build the static map of a finished run again, under corrected poses");
-  auto options = std::make_shared<RemapOptions>(command);
-  command.add_option("OUT", options->run, "folder of the results of dynains run over SEQ")
-      ->required()
-      ->type_name("");
-  command
-      .add_option("--map", options->map,
-                  std::string("static map, .ply or .pcd [") + kRemappedMap + " in OUT]")
-      ->type_name("FILE");
-  command
-      .add_option("--map-voxel", options->map_voxel,
-                  "resolution of the static map; 0 keeps all points [of the run]")
-      ->type_name("M");
-  command
-      .add_option("--update", options->update,
-                  "also replaces the session of the run in this map of many sessions: its points "
-                  "and references move to the corrected poses")
-      ->type_name("CITY");
-  command.add_option("--session", options->session, "name of the session in --update [of the run]")
-      ->type_name("NAME");
-  command.add_flag("--force", options->force, "replace the file of --map if it exists");
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  command.footer(
+  add_command<RemapOptions>(
+      app, "remap", "Build the static map of a finished run again, under corrected poses",
       "The verdicts of the run stay: they were made between neighbouring scans, and a correction "
       "moves these\ntogether. The map is built from the points that OUT/labels calls static, in "
       "the order of the scans and of\ntheir points. Nothing in OUT changes but the map and its "
-      "entry in report.json; earlier maps of remap are\nreplaced.");
-  command.callback([options] { remap(*options); });
+      "entry in report.json; earlier maps of remap are\nreplaced.",
+      remap);
 }
 
 }  // namespace dynains::program

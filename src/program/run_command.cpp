@@ -2,7 +2,6 @@
 #include <cmath>
 #include <iomanip>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -19,7 +18,21 @@ namespace {
 
 struct RunFlags {
   explicit RunFlags(CLI::App& command)
-      : recording(command, "recording"), remover(command, "default") {}
+      : recording(command, "recording"), remover(command, "default") {
+    command
+        .add_option_function<std::string>(
+            "-o,--out", [this](const std::string& out) { settings.outputs.folder = out; },
+            "folder for the results; created, must be empty (see --force)")
+        ->required()
+        ->type_name("FOLDER");
+    RunSettings::visit_common(settings, SettingFlags{command});
+    RunSettings::visit_more(settings, SettingFlags{command, "More outputs, and memory"});
+    command.add_flag("--odometry", odometry,
+                     "estimate the poses from the scans, for a recording without poses (see "
+                     "`dynains odometry`); also writes them to poses.txt");
+    add_compensated_flag(command, is_compensated);
+    command.add_flag("-q,--quiet", quiet, "print errors only");
+  }
 
   RecordingFlags recording;
   RemoverOptions remover;
@@ -136,23 +149,8 @@ void run_as_asked(RunFlags& flags) {
 }  // namespace
 
 void add_run_command(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("run", "Remove what moves from a recorded sequence");
-  auto flags = std::make_shared<RunFlags>(command);
-  RunSettings* const options = &flags->settings;
-  command
-      .add_option_function<std::string>(
-          "-o,--out", [options](const std::string& out) { options->outputs.folder = out; },
-          "folder for the results; created, must be empty (see --force)")
-      ->required()
-      ->type_name("FOLDER");
-  RunSettings::visit_common(*options, SettingFlags{command});
-  RunSettings::visit_more(*options, SettingFlags{command, "More outputs, and memory"});
-  command.add_flag("--odometry", flags->odometry,
-                   "estimate the poses from the scans, for a recording without poses (see `dynains "
-                   "odometry`); also writes them to poses.txt");
-  add_compensated_flag(command, flags->is_compensated);
-  command.add_flag("-q,--quiet", flags->quiet, "print errors only");
-  command.footer(
+  add_command<RunFlags>(
+      app, "run", "Remove what moves from a recorded sequence",
       "Writes labels/NNNNNN.label (uint32 a point: 251 moving, 9 static, 0 not judged; instance id "
       "above\nthe 16th bit), causes/NNNNNN.cause (uint8 a point: why, see `dynains eval "
       "--errors`), static_map.ply,\ndynamic_points.ply, overview.png (before, after, removed), "
@@ -161,8 +159,8 @@ void add_run_command(CLI::App& app) {
       "130: the results so far stay in OUT.partial until the next run. Other exit codes: 0; 1 if a "
       "file cannot be read or written; 2 for wrong flags, refused outputs and\nposes that the "
       "scans disagree with; 3 if the odometry loses track: the results of the scans before are "
-      "complete.");
-  command.callback([flags] { run_as_asked(*flags); });
+      "complete.",
+      run_as_asked);
 }
 
 }  // namespace dynains::program

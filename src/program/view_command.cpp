@@ -1,5 +1,4 @@
 #include <iostream>
-#include <memory>
 #include <string>
 
 #include "command.hpp"
@@ -13,13 +12,18 @@ namespace fs = std::filesystem;
 
 struct ViewOptions {
   explicit ViewOptions(CLI::App& command)
-      : out_option(command.add_option("OUT", out, "folder of `dynains run`")),
+      : out(command, "OUT", "folder of `dynains run`"),
         sequence(command, "recording of the run", false) {
-    out_option->required()->type_name("");
+    command
+        .add_option("--max-points", max_points,
+                    "points on the page; a larger map and more moving points are thinned")
+        ->check(CLI::Range(std::size_t{1000}, std::size_t{100000000}))
+        ->capture_default_str()
+        ->type_name("N");
+    command.add_flag("-q,--quiet", quiet, "print errors only");
   }
 
-  std::string out;
-  CLI::Option* out_option;  // the first positional argument
+  Argument out;
   RecordingFlags sequence;
   std::size_t max_points = kDefaultViewPoints;
   bool quiet = false;
@@ -27,9 +31,9 @@ struct ViewOptions {
 
 void view(ViewOptions& options) {
   const fs::path page = add_page(
-      options.out,
+      options.out.value,
       [&](const ResultFolder& out) {
-        return options.sequence.open_of_run(out, "dynains view " + options.out);
+        return options.sequence.open_of_run(out, "dynains view " + options.out.value);
       },
       options.max_points);
   if (!options.quiet) std::cout << "page: " << page.string() << std::endl;
@@ -38,20 +42,11 @@ void view(ViewOptions& options) {
 }  // namespace
 
 void add_view_command(CLI::App& app) {
-  CLI::App& command =
-      *app.add_subcommand("view", "Write a page that shows the results of a run in a browser");
-  const auto options = std::make_shared<ViewOptions>(command);
-  command
-      .add_option("--max-points", options->max_points,
-                  "points on the page; a larger map and more moving points are thinned")
-      ->check(CLI::Range(std::size_t{1000}, std::size_t{100000000}))
-      ->capture_default_str()
-      ->type_name("N");
-  command.add_flag("-q,--quiet", options->quiet, "print errors only");
-  command.footer(
+  add_command<ViewOptions>(
+      app, "view", "Write a page that shows the results of a run in a browser",
       "Writes OUT/view.html: one file that needs no server and no network. SEQ and its flags are\n"
-      "those of the run unless you give them.");
-  command.callback([options] { view(*options); });
+      "those of the run unless you give them.",
+      view);
 }
 
 }  // namespace dynains::program
