@@ -14,11 +14,8 @@
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
 #include "dynains/points.hpp"
-#include "evaluation/detail/cell_groups.hpp"
-#include "evaluation/detail/located_points.hpp"
-#include "evaluation/detail/preservation.hpp"
-#include "evaluation/detail/voxel_grid.hpp"
 #include "evaluation/voxel_protocol.hpp"
+#include "evaluation/voxels.hpp"
 
 namespace dynains::evaluation {
 namespace detail {

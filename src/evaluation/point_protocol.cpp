@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "detail/located_points.hpp"
+#include "voxels.hpp"
 
 namespace dynains::evaluation {
 namespace {

@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "dynains/evaluation/causes.hpp"
 #include "dynains/evaluation/config.hpp"
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"

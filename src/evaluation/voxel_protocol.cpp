@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "detail/cell_groups.hpp"
+#include "voxels.hpp"
 
 namespace dynains::evaluation {
 

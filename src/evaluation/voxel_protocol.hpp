@@ -11,9 +11,7 @@
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
-#include "evaluation/detail/located_points.hpp"
-#include "evaluation/detail/preservation.hpp"
-#include "evaluation/detail/voxel_grid.hpp"
+#include "evaluation/voxels.hpp"
 
 namespace dynains::evaluation {
 

@@ -5,8 +5,8 @@
 
 #include "command.hpp"
 #include "run/output/output_folder.hpp"
-#include "run/remarks/pose_returns.hpp"
 #include "run/remarks/recording_check.hpp"
+#include "run/remarks/run_doubts.hpp"
 #include "shared_options.hpp"
 
 namespace dynains::program {

@@ -24,7 +24,6 @@
 #include "progress.hpp"
 #include "run/interrupt.hpp"
 #include "run/map_file.hpp"
-#include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"

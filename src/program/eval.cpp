@@ -11,7 +11,6 @@
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/labelled_sequence.hpp"
-#include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/write_view.hpp"
 #include "shared_options.hpp"

@@ -11,7 +11,6 @@
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/interrupt.hpp"
-#include "run/output/input_files.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_grid.hpp"

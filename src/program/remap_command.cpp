@@ -18,7 +18,6 @@
 #include "run/output/output_folder.hpp"
 #include "run/recorded_scans.hpp"
 #include "run/run_plan.hpp"
-#include "run/session_request.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
 #include "shared_options.hpp"

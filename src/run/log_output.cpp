@@ -111,17 +111,22 @@ void check_log_output(const RunPlan& plan) {
   if (plan.sequence.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 
-std::optional<std::size_t> write_log(const RunPlan& plan, const PointStore& labels,
-                                     const fs::path& file) {
+bool write_log(const RunPlan& plan, const PointStore& labels, const fs::path& file,
+               const Warn& warn) {
   const CloudEditor editor(plan, labels);
   try {
     const auto log =
         open_log(plan.sequence.log()->log().path(), plan.sequence.options().accept_missing);
     copy_log(*log, file, std::cref(editor));
   } catch (const Interrupted&) {
-    return std::nullopt;
+    return false;
   }
-  return editor.unjudged();
+  if (editor.unjudged() > 0) {
+    warn(plan.settings.outputs.log.string() + ": " + std::to_string(editor.unjudged()) +
+         " clouds have no verdict, for lack of a pose, by their stamps or by --start and --end; "
+         "they keep all points");
+  }
+  return true;
 }
 
 }  // namespace dynains::run

@@ -1,10 +1,9 @@
 // The log of a recording, written again with its clouds cleaned or marked.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
-#include <optional>
 
+#include "run.hpp"
 #include "run_plan.hpp"
 #include "verdict_files.hpp"
 
@@ -14,10 +13,10 @@ namespace dynains::run {
 /// MCAP.
 void check_log_output(const RunPlan& plan);
 
-/// Copies the log with the final labels of the scans of the run, in their order, to `file`. Returns
-/// the number of clouds on the topic that have none, which stay as they are; nothing after a
-/// signal. Throws IoError.
-std::optional<std::size_t> write_log(const RunPlan& plan, const PointStore& labels,
-                                     const std::filesystem::path& file);
+/// Copies the log with the final labels of the scans of the run, in their order, to `file`. Warns
+/// of clouds on the topic that have none, which stay as they are. False after a signal. Throws
+/// IoError.
+bool write_log(const RunPlan& plan, const PointStore& labels, const std::filesystem::path& file,
+               const Warn& warn);
 
 }  // namespace dynains::run

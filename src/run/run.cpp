@@ -201,18 +201,6 @@ bool adds_session(const RunPlan& plan, const OutputFolder& out) {
   return !out.had("/request/session", plan.session.info.name) || !plan.session.is_fulfilled();
 }
 
-/// Writes the log with its clouds cleaned or marked. False after a signal.
-bool write_log(const fs::path& file, const RunPlan& plan, const PointStore& labels,
-               const Warn& warn) {
-  const std::optional<std::size_t> unjudged = write_log(plan, labels, file);
-  if (unjudged.value_or(0) > 0) {
-    warn(plan.settings.outputs.log.string() + ": " + std::to_string(*unjudged) +
-         " clouds have no verdict, for lack of a pose, by their stamps or by --start and --end; "
-         "they keep all points");
-  }
-  return unjudged.has_value();
-}
-
 /// Writes the grid. Returns PlacedGrid::summary(), null after a signal.
 nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& plan,
                                   const PointStore& labels, const Warn& warn) {
@@ -309,7 +297,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
   if (outputs.write_poses) write_trajectory(outputs.folder / kResultNames.poses, plan.sequence);
   bool is_complete = results.finished() == plan.range.size() && results.is_revised();
   if (is_complete && !outside.log.empty()) {
-    is_complete = write_log(outside.log, plan, labels, warn);
+    is_complete = write_log(plan, labels, outside.log, warn);
   }
   nlohmann::ordered_json grid;
   if (is_complete && !outside.grid.empty()) {

@@ -1,17 +1,41 @@
 // Everything about a run that is known before anything is written.
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
+#include "dynains/city/session.hpp"
 #include "dynains/io/recording.hpp"
-#include "run/output/input_files.hpp"
+#include "dynains/pose.hpp"
 #include "run/output/output_folder.hpp"
 #include "run_settings.hpp"
 #include "scan_range.hpp"
-#include "session_request.hpp"
 
 namespace dynains::run {
+
+/// Which session goes into which map of many sessions.
+struct SessionRequest {
+  std::filesystem::path city;  ///< by whole_path(); empty: none
+  SessionInfo info;            ///< without counts
+  SessionGrid grid;
+  std::optional<Pose> T_city_start;  ///< of the alignment; empty: none is asked for
+
+  /// Whether the city has this session already, from the same scans, poses, times and
+  /// configuration. Throws IoError.
+  bool is_fulfilled() const;
+};
+
+/// A session of the map in `folder`, to be written again under poses of this fingerprint: begin,
+/// recording and configuration stay, an alignment ends. Throws ConfigError if there is none of this
+/// name, IoError.
+SessionRequest reposed_session(const std::filesystem::path& folder, const std::string& name,
+                               const std::string& fingerprint);
+
+/// The request with the alignment that it asks for. Nothing changes in the map. Throws ConfigError
+/// if the scans do not fit, IoError.
+SessionRequest aligned(SessionRequest request, const Recording& recording, const ScanRange& range);
 
 struct RunPlan {
   RunSettings settings;  ///< complete

@@ -9,7 +9,7 @@
 #include <locale>
 #include <map>
 
-#include "dynains/evaluation/text_table.hpp"
+#include "dynains/evaluation/report.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/extrinsic.hpp"
 

@@ -1,11 +1,14 @@
 // The results of a run: verdicts as they come, handed to all that is made of them.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -13,15 +16,51 @@
 #include "dynains/io/recording.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/recording/second_pass.hpp"
+#include "dynains/simd/pack_loops.hpp"
 #include "dynains/threads/background.hpp"
 #include "dynains/verdict.hpp"
 #include "map_file.hpp"
 #include "overview.hpp"
+#include "run/remarks/odd_scans.hpp"
 #include "run_settings.hpp"
-#include "tally.hpp"
 #include "verdict_files.hpp"
 
 namespace dynains::run {
+
+/// Numbers of points in the final verdicts of a run.
+struct Tally {
+  std::uint64_t points = 0;
+  std::array<std::uint64_t, 5> labels{};  ///< by PointLabel
+  std::uint64_t unclustered = 0;   ///< static points that are neither ground nor in a cluster
+  std::uint64_t below_movers = 0;  ///< removed points of the ground
+  std::vector<ScanCounts> scans;
+
+  std::uint64_t operator[](PointLabel label) const {
+    return labels[static_cast<std::size_t>(label)];
+  }
+
+  void add(const ScanVerdict& verdict) {
+    const std::uint64_t moving_before = (*this)[PointLabel::kDynamic];
+    points += verdict.labels.size();
+    detail::with_packs([&](auto) {
+      for (std::size_t value = 0; value < labels.size(); ++value) {
+        std::uint32_t count = 0;
+        for (const PointLabel label : verdict.labels) {
+          count += label == static_cast<PointLabel>(value);
+        }
+        labels[value] += count;
+      }
+    });
+    scans.push_back({verdict.labels.size(), (*this)[PointLabel::kDynamic] - moving_before});
+    unclustered += std::inner_product(
+        verdict.labels.begin(), verdict.labels.end(), verdict.causes.begin(), std::uint32_t{0},
+        std::plus<>(), [](PointLabel label, Cause cause) {
+          return label == PointLabel::kStatic && cause == Cause::kNotJudged ? 1U : 0U;
+        });
+    below_movers += static_cast<std::uint64_t>(
+        std::count(verdict.causes.begin(), verdict.causes.end(), Cause::kUnderInstance));
+  }
+};
 
 /// A moving object in a scan.
 struct TrackRow {

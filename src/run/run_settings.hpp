@@ -30,6 +30,11 @@ struct ResultNames {
 };
 inline constexpr ResultNames kResultNames;
 
+/// Of clean scans, for scans of this format.
+inline const char* clean_extension(ScanFormat format) {
+  return format == ScanFormat::kBin ? ".bin" : format == ScanFormat::kPly ? ".ply" : ".pcd";
+}
+
 /// The names that a run accepts, a part of those of DynaInsRemover::Config::preset().
 inline const std::vector<std::string>& preset_names() {
   static const std::vector<std::string> names = {"default", "offline", "paper", "published"};

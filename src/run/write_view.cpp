@@ -9,7 +9,7 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "run/output/json_file.hpp"
+#include "run/output/output_folder.hpp"
 #include "run_report.hpp"
 #include "run_settings.hpp"
 #include "verdict_files.hpp"

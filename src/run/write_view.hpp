@@ -12,7 +12,6 @@
 #include "scan_range.hpp"
 #include "verdict_files.hpp"
 #include "viewer/page.hpp"
-#include "viewer/thinning.hpp"
 
 namespace dynains::run {
 

@@ -3,9 +3,11 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <ostream>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "dynains/evaluation/truth.hpp"
@@ -61,6 +63,29 @@ struct ViewData {
   ViewCounts counts;
   bool has_truth = false;
   bool has_beliefs = false;
+};
+
+/// Keeps one point per cell and scan, the first one. Cells grow until at most `budget` points are
+/// left; when they are 0.6 m wide, more and more scans share them first. Same input, same points.
+class ThinnedPoints {
+ public:
+  /// `cell`: edge of the first cells, m. `scans`: so many in a row share the first cells.
+  ThinnedPoints(std::size_t budget, double cell, std::size_t scans);
+
+  void add(const ViewPoint& point);
+
+  /// At most `most` points, which is at most `budget`. Call it after the last point.
+  std::vector<ViewPoint> take(std::size_t most);
+
+ private:
+  bool is_first(const ViewPoint& point);
+  void thin();
+
+  std::size_t budget_;
+  double cell_;
+  std::size_t scans_per_cell_;
+  std::vector<ViewPoint> points_;
+  std::unordered_set<std::uint64_t> occupied_;
 };
 
 /// Writes the page of a run with its style, its program and the points. Needs WebGL 2 and

@@ -1,5 +1,5 @@
 // Static points of a session: the first one of each voxel, against plain double precision.
-#include "dynains/city/session_points.hpp"
+#include "dynains/city/session_writer.hpp"
 
 #include <Eigen/Geometry>
 #include <array>

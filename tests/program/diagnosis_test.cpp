@@ -10,7 +10,7 @@
 
 #include "dynains/io/extrinsic.hpp"
 #include "program/start.hpp"
-#include "run/remarks/pose_advice.hpp"
+#include "run/remarks/recording_check.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/written_drive.hpp"

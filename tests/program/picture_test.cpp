@@ -1,4 +1,4 @@
-#include "run/picture.hpp"
+#include "run/overview.hpp"
 
 #include <png.h>
 

@@ -1,11 +1,13 @@
 // Counts and scores of both protocols.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include "dynains/evaluation/truth.hpp"
+#include "dynains/verdict.hpp"
 
 namespace dynains::evaluation {
 
@@ -64,6 +66,30 @@ struct ClassScore {
   /// Number of points that are not in the map.
   std::uint64_t removed() const { return points - points_kept; }
 };
+
+using dynains::Cause;
+using dynains::kCauseCount;
+
+/// Names of causes in the error analysis.
+inline constexpr std::array<const char*, kCauseCount> kCauseNames = {"unknown",
+                                                                     "called ground",
+                                                                     "similarity too high",
+                                                                     "belief reverted",
+                                                                     "too few points",
+                                                                     "too few scans",
+                                                                     "not judged",
+                                                                     "proposed by occupancy",
+                                                                     "seen free",
+                                                                     "with dynamic instance",
+                                                                     "under an instance",
+                                                                     "no evidence",
+                                                                     "along its track",
+                                                                     "presumed",
+                                                                     "seen occupied",
+                                                                     "seen free too little",
+                                                                     "dynamic occupancy",
+                                                                     "came or went",
+                                                                     "stands"};
 
 /// Numbers of wrong and right verdicts with one cause.
 struct CauseErrors {

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include "io/failure.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
+#include "io/scan_files.hpp"
 
 namespace dynains::run {
 namespace {
@@ -57,7 +59,86 @@ void move_rest(const Folder& from, const Folder& to) {
   }
 }
 
+[[noreturn]] void fail_at(const fs::path& path, std::string_view text, std::size_t byte,
+                          const std::string& what) {
+  const std::string_view before = text.substr(0, byte);
+  const auto line = 1 + std::count(before.begin(), before.end(), '\n');
+  const std::size_t line_begin = before.rfind('\n') + 1;  // npos + 1 is 0
+  throw IoError(path.string() + ":" + std::to_string(line) + ": column " +
+                std::to_string(before.size() - line_begin + 1) + ": " + what);
+}
+
+/// The part of the JSON library's message with the found and the expected content.
+std::string reason_of(const nlohmann::json::exception& error) {
+  const std::string what = error.what();
+  const std::size_t reason = what.find("syntax error");
+  return reason == std::string::npos ? what.substr(what.find("] ") + 2) : what.substr(reason);
+}
+
 }  // namespace
+
+Json read_json_file(const fs::path& path) {
+  const std::string text = read_text_file(path);
+  // Many functions of the JSON library call themselves for each level.
+  const auto check_depth = [&](int depth, Json::parse_event_t event, const Json&) {
+    const bool begins =
+        event == Json::parse_event_t::array_start || event == Json::parse_event_t::object_start;
+    if (!begins || depth < kMaxJsonDepth) return true;
+    throw IoError(path.string() + ": expected at most " + std::to_string(kMaxJsonDepth) +
+                  " arrays and objects within each other");
+  };
+  try {
+    return Json::parse(text, check_depth);
+  } catch (const Json::parse_error& error) {
+    fail_at(path, text, error.byte == 0 ? 0 : error.byte - 1, "expected JSON: " + reason_of(error));
+  } catch (const Json::exception& error) {  // a number that is too large: at no place
+    throw IoError(path.string() + ": expected JSON: " + reason_of(error));
+  }
+}
+
+std::string to_text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+void InputFiles::add(const Recording& recording) {
+  for (const fs::path& file : recording.files()) add(file);
+  const fs::path& folder = recording.folder();
+  const bool has_scans =
+      recording.format() != ScanFormat::kLog && recording.scan_folder() == folder;
+  add_owner(folder, has_scans);
+  if (!has_scans) add(recording.scan_folder());
+  add(folder / "labels");
+}
+
+void InputFiles::add_results(const fs::path& out) {
+  add_owner(out, false);
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out, error)) {
+    if (entry.is_directory(error)) add(entry.path());
+  }
+}
+
+void InputFiles::refuse(const FileIdentity& identity, const fs::path& output) const {
+  const auto input = paths_.find(identity);
+  if (input == paths_.end()) return;
+  throw IoError(output.string() + ": is read by this command, as " + input->second.string() +
+                ", and would be changed; choose another place to write to");
+}
+
+void InputFiles::refuse_part(const Folder& folder, const std::string& name, bool is_there) const {
+  const auto owner = owners_.find(folder.identity());
+  if (owner == owners_.end()) return;
+  const auto& [place, has_scans] = owner->second;
+  if (!is_there && !(has_scans && scan_format_of(name))) return;
+  throw IoError((folder.path() / name).string() + (is_there ? ": is" : ": would be") +
+                " a part of " + place.string() +
+                ", which this command reads; choose another place to write to");
+}
+
+void InputFiles::add_owner(const fs::path& folder, bool has_scans) {
+  if (const auto identity = identity_of(folder))
+    owners_.emplace(*identity, std::pair(folder, has_scans));
+}
 
 std::string listed_name(const std::string& name) {
   std::string text;

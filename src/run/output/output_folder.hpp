@@ -14,12 +14,95 @@
 #include <ostream>
 #include <set>
 #include <string>
+#include <type_traits>
+#include <utility>
 
-#include "input_files.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/recording.hpp"
 #include "io/folder.hpp"
-#include "json_file.hpp"
 
 namespace dynains::run {
+
+/// Arrays and objects within each other that a JSON file may have.
+inline constexpr int kMaxJsonDepth = 64;
+
+/// Reads a JSON file. Throws IoError with path, line, column and expectation.
+nlohmann::ordered_json read_json_file(const std::filesystem::path& path);
+
+/// Text of a JSON file. Bytes that are not UTF-8, as of paths, are replaced.
+std::string to_text(const nlohmann::ordered_json& json);
+
+/// The field of `json` that `pointer` ("/static_map/file") names; nothing if there is none or if it
+/// is null. Throws IoError with path, pointer and expected type for a value of another type. T is
+/// bool, double or std::string. `path` is the file that `json` was read from.
+template <class T>
+std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
+                            const std::string& pointer) {
+  const nlohmann::ordered_json::json_pointer where(pointer);
+  if (!json.contains(where) || json[where].is_null()) return std::nullopt;
+  const nlohmann::ordered_json& value = json[where];
+  const char* expected = "a string";
+  bool fits = value.is_string();
+  if constexpr (std::is_same_v<T, bool>) {
+    expected = "true or false";
+    fits = value.is_boolean();
+  } else if constexpr (std::is_same_v<T, double>) {
+    expected = "a number";
+    fits = value.is_number();
+  }
+  if (fits) return value.get<T>();
+  throw IoError(path.string() + ": " + pointer + ": expected " + expected + ", found " +
+                value.type_name());
+}
+
+/// A field that must exist; see json_field.
+template <class T>
+T required_json_field(const std::filesystem::path& path, const nlohmann::ordered_json& json,
+                      const std::string& pointer) {
+  if (std::optional<T> value = json_field<T>(path, json, pointer)) return *std::move(value);
+  throw IoError(path.string() + ": " + pointer + ": not found; expected a value");
+}
+
+/// The files that a command reads, and the recordings and results that it is given. It changes none
+/// of them.
+class InputFiles {
+ public:
+  InputFiles() = default;
+  explicit InputFiles(const std::filesystem::path& path) { add(path); }
+  /// A recording, and one more file, unless `file` is empty.
+  explicit InputFiles(const Recording& recording, const std::filesystem::path& file = {})
+      : InputFiles(file) {
+    add(recording);
+  }
+
+  /// The files of a recording, and its folders: those of scans and labels take no files as outputs,
+  /// and the one above them keeps the files that it has.
+  void add(const Recording& recording);
+  /// The folder OUT of a run.
+  void add_results(const std::filesystem::path& out);
+  /// A file, or a folder that takes no files as outputs. A path that leads nowhere is left out.
+  void add(const std::filesystem::path& path) {
+    if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
+  }
+
+  /// Throws IoError that names both paths if `output`, the file or folder with this identity, is
+  /// read.
+  void refuse(const FileIdentity& identity, const std::filesystem::path& output) const;
+  /// Refuses the file or folder that `output` leads to, if it exists and is read.
+  void refuse(const std::filesystem::path& output) const {
+    if (const auto identity = identity_of(output)) refuse(*identity, output);
+  }
+  /// Throws IoError if the file `name` in `folder` is a part of a recording or of results, or would
+  /// be one, unless it `is_there` already.
+  void refuse_part(const Folder& folder, const std::string& name, bool is_there) const;
+
+ private:
+  void add_owner(const std::filesystem::path& folder, bool has_scans);
+
+  std::map<FileIdentity, std::filesystem::path> paths_;
+  // Folders that keep their files, and whether a file with the extension of a scan would be one.
+  std::map<FileIdentity, std::pair<std::filesystem::path, bool>> owners_;
+};
 
 /// The name in printable ASCII: other bytes, and `%`, become `%XX`. Names need not be UTF-8.
 std::string listed_name(const std::string& name);

@@ -12,6 +12,13 @@
 
 namespace dynains::run {
 
+/// The flags of `dynains run` that change the given options into `proposal`, such as
+/// `--invert-poses --pose-units mm`; empty if nothing changes, or if a flag has to be left out.
+std::string proposed_flags(const Recording& recording, const RecordingOptions& proposal);
+
+/// One sentence with the verdict on the poses and the proposed flags.
+std::string advice(const Recording& recording, const Diagnosis& diagnosis);
+
 struct RecordingCheck {
   Diagnosis diagnosis;
   std::string findings;  ///< counts, units, sensor, motion, agreement, remarks; lines of text

@@ -1,4 +1,4 @@
-// Decodes the points of the page. Columns: see point_packer.hpp.
+// Decodes the points of the page. Columns: see PackedPoints in page.cpp.
 
 const VERTEX_BYTES = 16;
 
