@@ -1,7 +1,6 @@
 #include "simulation/simulator.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -45,41 +44,17 @@ const std::vector<Mount>& mounts_of(Rig rig) {
   return kMounts[static_cast<std::size_t>(rig)];
 }
 
-/// Rotation Rz(yaw) Ry(pitch) Rx(roll) in doubles, without vector instructions that might differ.
-Eigen::Matrix3d rotation(double yaw, double pitch, double roll) {
-  const double cy = std::cos(yaw), sy = std::sin(yaw);
-  const double cp = std::cos(pitch), sp = std::sin(pitch);
-  const double cr = std::cos(roll), sr = std::sin(roll);
-  Eigen::Matrix3d m;
-  m << cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr,  //
-      sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr,   //
-      -sp, cp * sr, cp * cr;
-  return m;
-}
-
-Pose product(const Pose& a, const Pose& b) {
-  Pose result = Pose::Identity();
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 4; ++c) {
-      double sum = c == 3 ? a(r, 3) : 0.0;
-      for (int k = 0; k < 3; ++k) sum += a(r, k) * b(k, c);
-      result(r, c) = sum;
-    }
-  }
-  return result;
+/// At (x, y, z), turned by Rz(yaw) Ry(pitch) Rx(roll).
+Pose pose_of(double yaw, double pitch, double roll, double x = 0, double y = 0, double z = 0) {
+  using Eigen::AngleAxisd, Eigen::Vector3d;
+  return Eigen::Translation3d(x, y, z) * AngleAxisd(yaw, Vector3d::UnitZ()) *
+         AngleAxisd(pitch, Vector3d::UnitY()) * AngleAxisd(roll, Vector3d::UnitX());
 }
 
 Rigid to_rigid(const Pose& t) {
   auto f = [&t](int r, int c) { return static_cast<float>(t(r, c)); };
   return {{{f(0, 0), f(0, 1), f(0, 2)}, {f(1, 0), f(1, 1), f(1, 2)}, {f(2, 0), f(2, 1), f(2, 2)}},
           {f(0, 3), f(1, 3), f(2, 3)}};
-}
-
-Pose isometry(const Eigen::Matrix3d& r, double x, double y, double z) {
-  Pose result = Pose::Identity();
-  result.linear() = r;
-  result.translation() << x, y, z;
-  return result;
 }
 
 /// A body of the given length and width on uneven ground.
@@ -100,7 +75,7 @@ Pose stand_on(Terrain& terrain, const Waypoint& at, double length, double width)
   const double pitch = -std::atan2(front - rear, 0.6 * length);
   const double roll = std::atan2(left - right, 0.8 * width);
   const double z = 0.5 * (front + rear);
-  return isometry(rotation(at.heading, pitch, roll), at.position.x, at.position.y, z);
+  return pose_of(at.heading, pitch, roll, at.position.x, at.position.y, z);
 }
 
 float power_of(const Surface& surface, float share) {
@@ -168,14 +143,14 @@ class Simulator::Implementation {
       const double middle = 0.5 * (columns.first + columns.last) / model_.columns;
       Moment now =
           between(moment, moments_.at(index + 1), mount == nullptr ? middle : mount->clock);
-      if (mount != nullptr) now.T_world_sensor = product(now.T_world_sensor, mount_pose(*mount));
+      if (mount != nullptr) now.T_world_sensor = now.T_world_sensor * mount_pose(*mount);
       const std::size_t first = result.labels.size();
       measure_part(index, now, columns, mix(scan_seed, static_cast<std::uint64_t>(part)), result);
       if (has_times) {
         result.times.resize(result.labels.size(), static_cast<float>(now.time - moment.time));
         continue;
       }
-      const Pose step = product(detail::inverted(moment.T_world_sensor), now.T_world_sensor);
+      const Pose step = moment.T_world_sensor.inverse() * now.T_world_sensor;
       move_points(mount == nullptr ? share_of(step, config_.deskewed) : step, first, result);
       if (mount != nullptr)
         result.sensors.resize(result.labels.size(), static_cast<std::uint8_t>(part));
@@ -197,10 +172,10 @@ class Simulator::Implementation {
 
   /// A part of a small motion.
   static Pose share_of(const Pose& step, double share) {
-    const Eigen::Matrix3d turn =
-        rotation(share * 0.5 * (step(1, 0) - step(0, 1)), share * 0.5 * (step(0, 2) - step(2, 0)),
-                 share * 0.5 * (step(2, 1) - step(1, 2)));
-    return isometry(turn, share * step(0, 3), share * step(1, 3), share * step(2, 3));
+    const double half = 0.5 * share;
+    return pose_of(half * (step(1, 0) - step(0, 1)), half * (step(0, 2) - step(2, 0)),
+                   half * (step(2, 1) - step(1, 2)), share * step(0, 3), share * step(1, 3),
+                   share * step(2, 3));
   }
 
   /// Moves the points from number `first` on.
@@ -216,9 +191,8 @@ class Simulator::Implementation {
   }
 
   Pose mount_pose(const Mount& mount) const {
-    return product(isometry(rotation(mount.yaw * kPi / 180, mount.pitch * kPi / 180, 0), mount.x,
-                            mount.y, mount.z),
-                   isometry(rotation(model_.yaw, 0, 0), 0, 0, 0));
+    return pose_of(mount.yaw * kPi / 180, mount.pitch * kPi / 180, 0, mount.x, mount.y, mount.z) *
+           pose_of(model_.yaw, 0, 0);
   }
 
   /// Seed for a purpose, which differs from day to day.
@@ -283,30 +257,29 @@ class Simulator::Implementation {
   /// With a rig, that of the body.
   Pose sensor_pose(const EgoPose& ego, double time) {
     if (config_.rig != Rig::kNone) return body_pose(ego, time);
-    const Eigen::Matrix3d tilt =
-        rotation(0, config_.mounting_pitch * kPi / 180, config_.mounting_roll * kPi / 180);
-    const Pose T_body_mount = isometry(tilt, 0, 0, model_.height);
-    const Pose T_mount_sensor = isometry(rotation(model_.yaw, 0, 0), 0, 0, 0);
-    return product(product(body_pose(ego, time), T_body_mount), T_mount_sensor);
+    const double pitch = config_.mounting_pitch * kPi / 180;
+    const double roll = config_.mounting_roll * kPi / 180;
+    return body_pose(ego, time) * pose_of(0, pitch, roll, 0, 0, model_.height) *
+           pose_of(model_.yaw, 0, 0);
   }
 
   /// Pose of the body that carries the sensor, at the ground.
   Pose body_pose(const EgoPose& ego, double time) {
     switch (config_.gait) {
       case Gait::kHandHeld:
-        return product(upright(ego.at), hand_held_sway(std::min(1.0, ego.speed), time));
+        return upright(ego.at) * hand_held_sway(std::min(1.0, ego.speed), time);
       case Gait::kLegged:
-        return product(stand_on(world_.terrain, ego.at, 0.9, 0.5),
-                       trot(std::min(1.0, ego.speed / 0.5), time));
+        return stand_on(world_.terrain, ego.at, 0.9, 0.5) *
+               trot(std::min(1.0, ego.speed / 0.5), time);
       case Gait::kVehicle:
         break;
     }
-    return product(stand_on(world_.terrain, ego.at, 4.3, 1.8), springs(ego, time));
+    return stand_on(world_.terrain, ego.at, 4.3, 1.8) * springs(ego, time);
   }
 
   Pose upright(const Waypoint& at) {
-    return isometry(rotation(at.heading, 0, 0), at.position.x, at.position.y,
-                    world_.terrain.height(at.position));
+    return pose_of(at.heading, 0, 0, at.position.x, at.position.y,
+                   world_.terrain.height(at.position));
   }
 
   /// Braking, bends, and a little swaying while driving.
@@ -316,7 +289,7 @@ class Simulator::Implementation {
                          sway * (std::sin(2 * kPi * 1.3 * time) + std::sin(2 * kPi * 0.71 * time));
     const double roll = 0.004 * std::clamp(ego.speed * ego.turn_rate, -3.0, 3.0) +
                         sway * std::sin(2 * kPi * 0.93 * time + 1);
-    return isometry(rotation(0, pitch, roll), 0, 0, 0);
+    return pose_of(0, pitch, roll);
   }
 
   /// A person looks around all the time, and bobs with `stride` (0 to 1) at 1.8 steps a second.
@@ -326,45 +299,45 @@ class Simulator::Implementation {
     const double yaw = 0.6 * std::sin(look);
     const double pitch = deg * (2.5 * std::sin(0.5 * look) + stride * std::sin(step));
     const double roll = deg * 2 * std::sin(0.7 * look + 1);
-    return isometry(rotation(yaw, pitch, roll), 0, 0.03 * stride * std::sin(step / 2),
-                    0.03 * stride * std::sin(step));
+    return pose_of(yaw, pitch, roll, 0, 0.03 * stride * std::sin(step / 2),
+                   0.03 * stride * std::sin(step));
   }
 
   /// A robot on four legs, with two steps of each pair of legs a second.
   static Pose trot(double stride, double time) {
     const double step = 2 * kPi * 2 * time, deg = kPi / 180;
-    return isometry(
-        rotation(stride * deg * 2 * std::sin(step / 2), stride * deg * 1.2 * std::sin(2 * step),
-                 stride * deg * 1.5 * std::sin(step)),
-        0.01 * stride * std::sin(2 * step), 0, 0.015 * stride * std::sin(2 * step));
+    return pose_of(stride * deg * 2 * std::sin(step / 2), stride * deg * 1.2 * std::sin(2 * step),
+                   stride * deg * 1.5 * std::sin(step), 0.01 * stride * std::sin(2 * step), 0,
+                   0.015 * stride * std::sin(2 * step));
+  }
+
+  static Eigen::Vector3d draw_normal(double sigma, Random& random) {
+    Eigen::Vector3d result;
+    for (double& v : result) v = sigma * random.normal();
+    return result;
   }
 
   Pose with_noise(const Pose& pose, std::size_t index) const {
     Random random(mix(seed_of_day(600), index));
-    double offset[3], turn[3];
-    for (double& v : offset) v = config_.pose_noise_translation * random.normal();
-    for (int i = 0; i < 3; ++i) offset[i] += drift_.at(index)[static_cast<std::size_t>(i)];
-    for (double& v : turn) v = config_.pose_noise_rotation * kPi / 180 * random.normal();
-    Pose result = product(pose, isometry(rotation(turn[0], turn[1], turn[2]), 0, 0, 0));
-    for (int i = 0; i < 3; ++i) result(i, 3) = pose(i, 3) + offset[i];
+    const Eigen::Vector3d offset = draw_normal(config_.pose_noise_translation, random);
+    const Eigen::Vector3d turn = draw_normal(config_.pose_noise_rotation * kPi / 180, random);
+    Pose result = pose * pose_of(turn.x(), turn.y(), turn.z());
+    result.translation() = pose.translation() + offset + drift_.at(index);
     return result;
   }
 
   /// A random walk of the written poses with the way.
   void draw_drift() {
     Random random(seed_of_day(700));
-    drift_.assign(moments_.size(), {0, 0, 0});
+    drift_.assign(moments_.size(), Eigen::Vector3d::Zero());
     for (std::size_t i = 1; i < moments_.size(); ++i) {
       const double way = norm(moments_[i].ego.at.position - moments_[i - 1].ego.at.position);
-      for (std::size_t k = 0; k < 3; ++k) {
-        drift_[i][k] =
-            drift_[i - 1][k] + config_.pose_drift * std::sqrt(way / 100) * random.normal();
-      }
+      drift_[i] = drift_[i - 1] + draw_normal(config_.pose_drift * std::sqrt(way / 100), random);
     }
   }
 
   void draw_world(const Moment& moment, std::vector<ObjectState>& states) {
-    const Pose T_sensor_world = detail::inverted(moment.T_world_sensor);
+    const Pose T_sensor_world = moment.T_world_sensor.inverse();
     const Rigid T_world_sensor = to_rigid(moment.T_world_sensor);
     const Rigid turn{transposed(T_world_sensor.rotation), {}};
     const Vec3 origin = T_world_sensor.translation;
@@ -392,7 +365,7 @@ class Simulator::Implementation {
       const std::uint32_t label = label_of(pose);
       states.push_back({instance, label, T_world_object, pose.speed, object.size.length,
                         object.size.width, object.size.height});
-      const Rigid T_sensor_object = to_rigid(product(T_sensor_world, T_world_object));
+      const Rigid T_sensor_object = to_rigid(T_sensor_world * T_world_object);
       Model shape;
       if (person) {
         const double stride = std::min(1.0, pose.speed / 1.0);
@@ -577,7 +550,7 @@ class Simulator::Implementation {
   World world_;
   std::vector<Moment> moments_;
   std::vector<bool> ever_moved_;
-  std::vector<std::array<double, 3>> drift_;  ///< m, of each moment
+  std::vector<Eigen::Vector3d> drift_;  ///< m, of each moment
   BeamTable beams_;
   Renderer renderer_;
   std::vector<std::optional<Surface>> surfaces_;  ///< in the order of measurement
