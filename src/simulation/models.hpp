@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "simulation/materials.hpp"
+#include "simulation/primitive.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulation/materials.hpp"
+#include "simulation/primitive.hpp"
 #include "simulation/random.hpp"
 
 namespace dynains::simulation {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "simulation/beams.hpp"
-#include "simulation/materials.hpp"
+#include "simulation/primitive.hpp"
 #include "simulation/random.hpp"
 #include "simulation/renderer.hpp"
 #include "simulation/world.hpp"

@@ -7,9 +7,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "simulation/materials.hpp"
+#include "simulation/ground_plan.hpp"
+#include "simulation/primitive.hpp"
 #include "simulation/random.hpp"
-#include "simulation/street.hpp"
 
 namespace dynains::simulation {
 

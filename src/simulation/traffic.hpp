@@ -7,10 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "simulation/footprints.hpp"
+#include "simulation/ground_plan.hpp"
 #include "simulation/models.hpp"
 #include "simulation/random.hpp"
-#include "simulation/street.hpp"
 
 namespace dynains::simulation {
 

@@ -1,8 +1,7 @@
 #include <cmath>
 
-#include "simulation/footprints.hpp"
+#include "simulation/ground_plan.hpp"
 #include "simulation/primitive.hpp"
-#include "simulation/street.hpp"
 #include "simulation/terrain.hpp"
 #include "support/catch.hpp"
 
