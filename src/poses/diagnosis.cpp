@@ -225,35 +225,6 @@ double describe_motion(const Recording& recording, Diagnosis& d) {
   return median(std::move(extents));
 }
 
-/// Largest distance of which all coordinates of an axis are multiples, m; 0 if they are finer than
-/// a tenth of the way from scan to scan.
-double coarse_step(const std::vector<Pose>& poses) {
-  constexpr double kNear = 0.01;  // of a step
-  constexpr std::size_t kMin = 5;
-  double coarsest = 0.0;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::vector<double> values, differences;
-    for (const Pose& T : poses) values.push_back(T.translation()[axis]);
-    std::sort(values.begin(), values.end());
-    values.erase(std::unique(values.begin(), values.end()), values.end());
-    if (values.size() < kMin) continue;
-    double step = kNever, widest = 0.0;
-    for (std::size_t i = 1; i < values.size(); ++i) {
-      step = std::min(step, values[i] - values[i - 1]);
-      widest = std::max(widest, values[i] - values[i - 1]);
-    }
-    // Poses at an even speed lie on a grid, too.
-    const bool is_even = values.size() == poses.size() && widest < (1.0 + kNear) * step;
-    const bool is_grid = std::all_of(values.begin(), values.end(), [&](double value) {
-      const double steps = (value - values[0]) / step;
-      return std::abs(steps - std::round(steps)) < kNear;
-    });
-    const double way = (values.back() - values[0]) / static_cast<double>(poses.size());
-    if (is_grid && !is_even && step > 0.1 * way) coarsest = std::max(coarsest, step);
-  }
-  return coarsest;
-}
-
 /// PoseFlaws::period, by scans in the middle of the recording.
 std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
   constexpr std::size_t kMaxPeriod = 80;
@@ -271,13 +242,12 @@ std::size_t period_of_views(const Recording& recording, ScanSample& sample) {
   return 0;
 }
 
-PoseFlaws flaws_of(const Recording& recording) {
-  std::vector<Pose> poses;
-  for (std::size_t i = 0; i < recording.size(); ++i) poses.push_back(recording.T_world_sensor(i));
-  const bool are_equal = std::all_of(poses.begin(), poses.end(), [&](const Pose& T) {
-    return T.linear().isApprox(poses[0].linear(), 1e-9);
-  });
-  return {are_equal, coarse_step(poses), 0};
+bool have_equal_orientations(const Recording& recording) {
+  for (std::size_t i = 1; i < recording.size(); ++i) {
+    const Pose T = motion_between(recording, 0, i);
+    if (!T.linear().isIdentity(1e-9)) return false;
+  }
+  return true;
 }
 
 /// Whether poses and scans do not move alike at a fourth of the pairs between which one of them
@@ -478,11 +448,10 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
   const BodyMotion given = given_motion(recording);
   const MotionError all = motion_error(motions, given);
   const bool are_inexact = measure_errors(evidence, d);
-  if (!is_exact(all)) d.flaws = flaws_of(recording);
-  const bool is_flawed = d.flaws.has_equal_orientations || d.flaws.step > 0.0;
+  d.flaws.has_equal_orientations = !is_exact(all) && have_equal_orientations(recording);
   // Overlaps shift motions. This does not prove another reading, but a fit would explain it by one.
   const bool may_differ = evidence.overlaps ? !is_exact(all) : all.at_points > kExact;
-  if (may_differ && !is_flawed) {
+  if (may_differ && !d.flaws.has_equal_orientations) {
     std::vector<Reading> readings = usual_readings(recording);
     if (!is_exact(all) && !evidence.overlaps) {
       for (const Reading& fitted : fitted_readings(recording, motions)) readings.push_back(fitted);

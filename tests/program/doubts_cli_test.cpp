@@ -434,7 +434,7 @@ TEST_CASE("check proposes to de-skew points whose times explain what the poses d
   CHECK_THAT(deskewed.out, ContainsSubstring("agree as they are"));
 }
 
-TEST_CASE("check names poses without orientation, and coordinates in coarse steps") {
+TEST_CASE("check names poses without orientation, and proposes nothing for coarse coordinates") {
   const Drive drive(drive_of(simulation::Scene::kHill, simulation::Sensor::kVlp16, 60, 7));
   drive.with_poses([](std::size_t, Pose T) {
     T.linear().setIdentity();
@@ -447,7 +447,8 @@ TEST_CASE("check names poses without orientation, and coordinates in coarse step
     T.translation() = T.translation().array().round();
     return T;
   });
-  CHECK_THAT(start({"check", drive.path()}).out, ContainsSubstring("in steps of 1.00 m"));
+  CHECK_THAT(start({"check", drive.path()}).out,
+             !ContainsSubstring("pass --") && !ContainsSubstring("agree as they are"));
 }
 
 TEST_CASE("Options that do not fit a right recording are refused") {

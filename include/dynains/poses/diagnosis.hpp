@@ -27,7 +27,6 @@ constexpr std::array<const char*, 6> value_names(PoseVerdict) {
 /// Faults of poses that no option corrects.
 struct PoseFlaws {
   bool has_equal_orientations = false;  ///< all orientations are equal, though the way bends
-  double step = 0.0;  ///< m, the coordinates of the poses are multiples of it; 0: no coarse step
   /// Scans this many apart agree clearly better than neighbours, because several sensors, or parts
   /// of a revolution, take turns; 0: no such period.
   std::size_t period = 0;

@@ -111,10 +111,6 @@ std::string text_on_flaws(const PoseFlaws& flaws) {
   if (flaws.has_equal_orientations) {
     return " All orientations of the poses are equal: they have positions alone, or are frozen.";
   }
-  if (flaws.step > 0.0) {
-    return " The coordinates of the poses are in steps of " + text::fixed(flaws.step, 2) +
-           " m: write them with all digits.";
-  }
   return "";
 }
 
