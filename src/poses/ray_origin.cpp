@@ -1,7 +1,6 @@
 #include "dynains/poses/ray_origin.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -18,14 +17,14 @@ namespace dynains {
 namespace {
 
 constexpr double kRadians = M_PI / 180.0;
-constexpr double kSharp = 0.02 * kRadians;  // rad, spread of the elevations of one beam
+constexpr double kNear = 1.2 * kRadians;  // of azimuth, more than the step of any sensor
 
 using Points = std::vector<Eigen::Vector3d>;
 using RayEquations = detail::NormalEquations<5>;
 
 /// Beams that turn about an axis through their origin.
 struct Rays {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // m
+  Eigen::Vector3d origin;  // m
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
 
   Eigen::Vector3d side() const { return Eigen::Vector3d::UnitY().cross(axis).normalized(); }
@@ -47,156 +46,183 @@ struct Rays {
   }
 };
 
-struct Neighbours {
-  Eigen::Vector3d first, second;  // m
+/// A point as it is seen from the origin of the beams, rad.
+struct SeenPoint {
+  double azimuth, elevation;
+  std::size_t point;
 };
 
-/// For about 4,000 of `points`, the nearest point within the next step of azimuth. Both are of the
-/// same beam, also under a wrong origin, unless rings lie closer than the points on a ring.
-std::vector<Neighbours> neighbours(const Points& points, const Rays& rays) {
-  constexpr std::size_t kCount = 4000;
-  constexpr double kNear = 1.2 * kRadians;  // of azimuth, more than the step of any sensor
-  constexpr double kSteep = 0.5;            // ratio of the changes of elevation and azimuth
-  struct Seen {
-    double azimuth, elevation;
-    std::size_t point;
-  };
-  std::vector<Seen> seen;
+/// The points by their azimuth.
+std::vector<SeenPoint> seen_points(const Points& points, const Rays& rays) {
+  std::vector<SeenPoint> seen;
   const Eigen::Vector3d side = rays.side(), front = rays.front();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d q = points[i] - rays.origin;
     if (!(q.norm() > 0.5 * kMinPoint)) continue;
     seen.push_back({std::atan2(front.dot(q), side.dot(q)), rays.elevation(points[i]), i});
   }
-  std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) {
+  std::sort(seen.begin(), seen.end(), [](const SeenPoint& a, const SeenPoint& b) {
     return std::pair(a.azimuth, a.point) < std::pair(b.azimuth, b.point);
   });
-  std::vector<Neighbours> result;
+  return seen;
+}
+
+/// Change of the elevation (rad) from a point to its neighbour on a beam.
+struct Change {
+  double size;
+  RayEquations::Vector derivative;  // see Rays::derivative()
+};
+
+/// For about 4,000 of `points`, the nearest point within the next step of azimuth. Both are of the
+/// same beam, also under a wrong origin, unless rings lie closer than the points on a ring.
+std::vector<Change> changes_along_beams(const Points& points, const std::vector<SeenPoint>& seen,
+                                        const Rays& rays) {
+  constexpr std::size_t kCount = 4000;
+  constexpr double kSteep = 0.5;  // ratio of the changes of elevation and azimuth
+  std::vector<Change> changes;
   for (std::size_t i = 0; i < seen.size(); i += 1 + seen.size() / kCount) {
-    const Seen* next = nullptr;
+    const Eigen::Vector3d& first = points[seen[i].point];
+    const SeenPoint* next = nullptr;
     double nearest = 0.0;
     for (std::size_t k = i + 1; k < seen.size(); ++k) {
-      const double along = seen[k].azimuth - seen[i].azimuth;
-      if (along > kNear) break;
-      const double distance = (points[seen[k].point] - points[seen[i].point]).squaredNorm();
+      if (seen[k].azimuth - seen[i].azimuth > kNear) break;
+      const double distance = (points[seen[k].point] - first).squaredNorm();
       if (next != nullptr && distance >= nearest) continue;
       next = &seen[k];
       nearest = distance;
     }
     if (next == nullptr) continue;
-    const double across = std::abs(next->elevation - seen[i].elevation);
-    if (across < kSteep * (next->azimuth - seen[i].azimuth))
-      result.push_back({points[seen[i].point], points[next->point]});
+    const double across = next->elevation - seen[i].elevation;
+    if (!(std::abs(across) < kSteep * (next->azimuth - seen[i].azimuth))) continue;
+    Change change{across, rays.derivative(points[next->point])};
+    const RayEquations::Vector before = rays.derivative(first);
+    for (std::size_t k = 0; k < before.size(); ++k) change.derivative[k] -= before[k];
+    changes.push_back(change);
   }
-  return result;
+  return changes;
 }
 
-double weight_of(double change, double scale) {
-  return 1.0 / (1.0 + change * change / (scale * scale));
+double median_size(const std::vector<Change>& changes) {
+  std::vector<double> sizes;
+  for (const Change& change : changes) sizes.push_back(std::abs(change.size));
+  return median(std::move(sizes));
 }
 
-/// Ratio of the neighbours that are of one beam if beams begin as `rays` says, [0, 1]. Points
-/// without beams have about 0.3.
-double share_of_beams(const Points& points, const Rays& rays) {
-  double sum = 0.0;
-  const std::vector<Neighbours> all = neighbours(points, rays);
-  for (const Neighbours& pair : all) {
-    sum += weight_of(rays.elevation(pair.second) - rays.elevation(pair.first), kSharp);
-  }
-  return sum / static_cast<double>(std::max<std::size_t>(1, all.size()));
-}
-
-/// Gauss-Newton steps with Cauchy weights, whose scale shrinks.
-Rays refine(const Points& points, Rays rays) {
-  constexpr double kMaxStep = 1.0;  // m
-  for (const double degrees : {0.1, 0.1, 0.05, 0.05, 0.03, 0.03}) {
-    const std::vector<Neighbours> pairs = neighbours(points, rays);
-    for (int k = 0; k < 2; ++k) {
-      RayEquations equations;
-      for (const Neighbours& pair : pairs) {
-        const double change = rays.elevation(pair.second) - rays.elevation(pair.first);
-        const RayEquations::Vector first = rays.derivative(pair.first);
-        RayEquations::Vector J = rays.derivative(pair.second);
-        for (std::size_t i = 0; i < J.size(); ++i) J[i] -= first[i];
-        equations.add(J, change, weight_of(change, degrees * kRadians));
-      }
-      // Keeps what the points do not determine.
-      const double some = 1e-9 * static_cast<double>(pairs.size());
-      for (std::size_t i = 0; i < 5; ++i) equations.attract(i, 0.0, some * (i < 3 ? 1.0 : 100.0));
-      const RayEquations::Vector step = equations.solve();
-      const Eigen::Vector3d way(step[0], step[1], step[2]);
-      const double ratio = std::min(1.0, kMaxStep / way.norm());
-      const Eigen::Vector3d tilt = step[3] * rays.side() + step[4] * rays.front();
-      if (!way.allFinite() || !tilt.allFinite()) return rays;
-      rays.origin += ratio * way;
-      rays.axis = (rays.axis + ratio * tilt).normalized();
+/// How many more of the points than of directions above them have an elevation (within `near`, rad)
+/// that occurs again behind the next step of azimuth, as a share. About 0 unless beams turn.
+double share_on_rings(const std::vector<SeenPoint>& seen, double near) {
+  constexpr std::size_t kCount = 1000;
+  std::size_t on_rings = 0, by_chance = 0, count = 0;
+  for (std::size_t i = 0, aside = 0; i < seen.size(); i += 1 + seen.size() / kCount) {
+    const double elevation = seen[i].elevation, begin = seen[i].azimuth + kNear;
+    while (aside < seen.size() && seen[aside].azimuth < begin) ++aside;
+    const double above = elevation + kNear * std::fmod(0.618 * double(++count), 1.0);
+    bool is_on_ring = false, is_by_chance = false;
+    for (std::size_t k = aside; k < seen.size() && seen[k].azimuth < begin + kNear; ++k) {
+      is_on_ring = is_on_ring || std::abs(seen[k].elevation - elevation) < near;
+      is_by_chance = is_by_chance || std::abs(seen[k].elevation - above) < near;
     }
+    on_rings += is_on_ring ? 1 : 0;
+    by_chance += is_by_chance ? 1 : 0;
   }
-  return rays;
+  return (double(on_rings) - double(by_chance)) / double(count - by_chance + 1);
 }
 
-/// Median distance of the elevations of points from their median, rad.
-double spread_of(const Points& points, const Rays& rays) {
-  std::vector<double> elevations;
-  for (const Eigen::Vector3d& p : points) elevations.push_back(rays.elevation(p));
-  const double middle = median(elevations);
-  for (double& elevation : elevations) elevation = std::abs(elevation - middle);
-  return median(std::move(elevations));
+/// Equations of the origin and the axis, with Cauchy weights of this scale (rad).
+RayEquations equations_of(const std::vector<Change>& changes, double scale) {
+  RayEquations equations;
+  for (const auto& [size, derivative] : changes) {
+    equations.add(derivative, size, 1.0 / (1.0 + size * size / (scale * scale)));
+  }
+  // Keeps what the points do not determine.
+  const double some = 1e-9 * static_cast<double>(changes.size());
+  for (std::size_t i = 0; i < 5; ++i) equations.attract(i, 0.0, some * (i < 3 ? 1.0 : 100.0));
+  return equations;
 }
 
-/// The origin of the beams in a scan, m, if it is certain and not that of the scan.
-std::optional<Eigen::Vector3d> other_origin_of(const RecordedScan& scan) {
-  constexpr double kRight = 0.9;     // share of beams of a right origin
-  constexpr double kCertain = 0.96;  // the same; then no other is searched for
+/// The origin of beams, m, and its deviation by axis, m.
+struct RayOrigin {
+  Eigen::Vector3d place, deviation;
+};
+
+/// Gauss-Newton steps from an origin at this height (m). The scale of their weights is the median
+/// change of the elevation along a beam, which shrinks to the noise of the directions. Empty if
+/// there is no end, or if points do not lie on rings around it. Straight above the given origin if
+/// noise hides the rest.
+std::optional<RayOrigin> fit_origin(const Points& points, double height) {
+  constexpr int kMaxSteps = 15;
+  constexpr double kMinScale = 1e-5;                // rad, as coordinates are rounded
+  constexpr double kMinOnRings = 0.3, kSame = 1.3;  // ratios
+  constexpr double kFarthest = 6.0;  // m, beyond any vehicle; from afar, other patterns seem flat
+  Rays rays{{0.0, 0.0, height}};
+  for (int k = 0; k < kMaxSteps; ++k) {
+    const std::vector<SeenPoint> seen = seen_points(points, rays);
+    const std::vector<Change> changes = changes_along_beams(points, seen, rays);
+    const double scale = std::max(median_size(changes), kMinScale);
+    const RayEquations equations = equations_of(changes, scale);
+    const RayEquations::Vector step = equations.solve();
+    const RayEquations::Matrix covariance = equations.inverse();
+    const Eigen::Vector3d way(step[0], step[1], step[2]);
+    const Eigen::Vector3d tilt = step[3] * rays.side() + step[4] * rays.front();
+    if (!way.allFinite() || !tilt.allFinite()) return std::nullopt;
+    const Eigen::Vector3d deviation =
+        scale * Eigen::Vector3d(covariance[0][0], covariance[1][1], covariance[2][2]).cwiseSqrt();
+    const double ratio = 1.0 / std::max(1.0, way.norm());  // 1 m at most
+    rays.origin += ratio * way;
+    rays.axis = (rays.axis + ratio * tilt).normalized();
+    if (rays.origin.norm() > kFarthest) break;
+    // The pairs change from step to step, and the result with them by its deviation.
+    const double rest = way.norm() / (0.002 + deviation.norm());
+    if (rest > (k + 1 < kMaxSteps ? 0.5 : 3.0)) continue;
+    if (share_on_rings(seen, 3.0 * scale) < kMinOnRings) break;
+    const Rays above{{0.0, 0.0, rays.origin.z()}, rays.axis};
+    const double change =
+        median_size(changes_along_beams(points, seen_points(points, above), above));
+    return RayOrigin{change < kSame * scale ? above.origin : rays.origin, deviation};
+  }
+  return std::nullopt;
+}
+
+/// The origin of the beams in a scan if it is certain.
+std::optional<RayOrigin> origin_of(const RecordedScan& scan) {
   const PointBuffer finite = finite_points(scan);
   Points points;
   for (std::size_t i = 0; i < finite.size(); ++i) {
     points.push_back(Eigen::Vector3f(finite.x[i], finite.y[i], finite.z[i]).cast<double>());
   }
-  const double as_given = share_of_beams(points, {});
-  if (as_given > kCertain) return std::nullopt;
-  Rays best;
-  double share = 0.0;
   for (const double height : {0.0, 1.0, 2.0}) {  // m
-    const Rays rays = refine(points, {Eigen::Vector3d(0.0, 0.0, height)});
-    const double found = share_of_beams(points, rays);
-    if (found <= share) continue;
-    share = found;
-    best = rays;
-    if (share > kRight) break;
+    if (const auto origin = fit_origin(points, height)) return origin;
   }
-  if (share < kRight || 1.0 - share > 0.5 * (1.0 - as_given)) return std::nullopt;
-  // From within a plane, all of its points seem to be of one beam.
-  if (spread_of(points, best) < 10.0 * kSharp) return std::nullopt;
-  return best.origin;
+  return std::nullopt;
 }
 
 }  // namespace
 
 std::optional<Eigen::Vector3d> other_ray_origin(const Recording& recording) {
   constexpr std::size_t kScans = 3;
-  constexpr double kSame = 0.2;  // m
-  constexpr double kFar = 0.3;   // m
+  constexpr double kFar = 0.3;  // m
   if (recording.size() < 2 || !recording.sensors().empty()) return std::nullopt;
   const auto found = in_two_threads(kScans, [&](std::size_t k) {
-    return other_origin_of(recording.read_scan((2 * k + 1) * recording.size() / (2 * kScans)));
+    return origin_of(recording.read_scan((2 * k + 1) * recording.size() / (2 * kScans)));
   });
-  std::array<std::vector<double>, 3> places;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(), tolerance = Eigen::Vector3d::Zero();  // m
   for (const auto& one : found) {
     if (!one) return std::nullopt;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) places[std::size_t(axis)].push_back((*one)[axis]);
+    origin += one->place / double(kScans);
   }
-  const Eigen::Vector3d origin(median(places[0]), median(places[1]), median(places[2]));
-  const bool is_one = std::all_of(found.begin(), found.end(),
-                                  [&](const auto& one) { return (*one - origin).norm() < kSame; });
+  for (const auto& one : found) {
+    const Eigen::Vector3d error = (one->place - origin).cwiseAbs().cwiseMax(one->deviation);
+    tolerance = tolerance.cwiseMax(3.0 * error);
+  }
   // Where the motion within scans was compensated, beams begin along the way of the sensor.
   std::vector<double> ways;
   for (std::size_t i = 1; i < recording.size(); ++i) {
     ways.push_back(motion_between(recording, i - 1, i).translation().norm());
   }
-  const bool is_far =
-      std::abs(origin.z()) > kFar || origin.head<2>().norm() > kFar + median(std::move(ways));
-  if (!is_one || !is_far) return std::nullopt;
+  const double aside = tolerance.head<2>().norm() + kFar + median(std::move(ways));
+  if (origin.head<2>().norm() < aside) origin.head<2>().setZero();
+  const bool is_far = std::abs(origin.z()) > tolerance.z() + kFar || !origin.head<2>().isZero(0.0);
+  if (!is_far) return std::nullopt;
   return recording.sensor_origin() + (origin.array() * 100.0).round().matrix() / 100.0;
 }
 

@@ -252,8 +252,13 @@ int main(int argc, char** argv) {
         fs::remove(drive.path() / "times.txt");
         kind.write(drive.path(), truth);
         auto& [good, count] = right_of[kind.name];
-        good += is_right(drive.path(), kind, truth) ? 1 : 0;
         ++count;
+        if (is_right(drive.path(), kind, truth)) {
+          ++good;
+        } else {
+          std::cout << "wrong: " << scene << ' ' << sensor << ' ' << config.seed << ", "
+                    << kind.name << std::endl;
+        }
       }
     }
   }

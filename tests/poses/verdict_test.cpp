@@ -278,6 +278,20 @@ TEST_CASE("The origin of clouds in another frame is measured from their beams, a
   }
 }
 
+TEST_CASE("The height of an origin is measured also from beams with noise of their directions") {
+  auto config = drive_of(simulation::Scene::kMixed, simulation::Sensor::kOs1_64, 20, 42001);
+  config.direction_noise = 0.045;
+  const Drive drive(config);
+  CHECK(diagnose(Recording(drive.path())).proposal.sensor_origin.isZero(0.0));
+  const Eigen::Vector3d origin(1.0, 0.0, 1.5);
+  drive.move_points(
+      [&](const simulation::SimulatedScan&, const Eigen::Vector3d& p) { return p + origin; });
+  const Diagnosis d = diagnose(drive.with_poses(
+      [&](std::size_t, const Pose& T) { return T * Eigen::Translation3d(-origin); }));
+  CHECK_FALSE(d.sound());
+  CHECK(std::abs(d.proposal.sensor_origin.z() - origin.z()) < 0.1);
+}
+
 TEST_CASE("Clouds without rings, of one time or not, say nothing of the origin of their beams") {
   const auto sensor = GENERATE(simulation::Sensor::kMid360, simulation::Sensor::kLivox);
   const Drive drive(drive_of(simulation::Scene::kUrban, sensor, 12, 5));
