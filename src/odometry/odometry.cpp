@@ -23,10 +23,10 @@ void OdometryConfig::validate() const {
 
 namespace {
 
-/// A pose, and the same turned in steps of 10 deg by up to `most` (deg).
-std::vector<Pose> turned(const Pose& T_map_near, int most) {
+/// A pose, and the same turned in steps of 10 deg by up to 60 deg.
+std::vector<Pose> turned(const Pose& T_map_near) {
   std::vector<Pose> poses = {T_map_near};
-  for (int degrees = -most; degrees <= most; degrees += 10) {
+  for (int degrees = -60; degrees <= 60; degrees += 10) {
     if (degrees == 0) continue;
     poses.push_back(T_map_near *
                     Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()));
@@ -184,11 +184,8 @@ class Odometry::Loop {
       const Pose T_predicted = T_world_last_ * T_last_newest;
       std::optional<Registration> best;
       if (turn > 0 || is_predictable(period)) best = register_near(map_, points, T_predicted);
-      if (turn == 0 && (!best || !is_overlap(best->score))) {
-        best = register_scans(map_, points, turned(T_predicted, 30));
-      }
-      if (turn == 0 && !first_ && (!best || best->score < kPoor * fit_before_)) {
-        const auto other = register_scans(map_, points, turned(without_turn(T_predicted), 60));
+      if (turn == 0 && (!best || best->score < kPoor * fit_before_ || !is_overlap(best->score))) {
+        const auto other = register_scans(map_, points, turned(without_turn(T_predicted)));
         if (other && (!best || best->score < kAlmost * other->score)) best = other;
       }
       if (first_ && turn == 0 && best) search_first_motion(*best, period);
