@@ -143,7 +143,7 @@ TEST_CASE("the first scan of an epoch is evidence on the second one, without lat
   CHECK(stays.causes(1, false) == Causes{Cause::kOccupied});
 }
 
-TEST_CASE("the evidence of scans before an instance and that of scans after it are kept apart") {
+TEST_CASE("scans before an instance and scans after it are evidence") {
   FreeSpaceConfig config = every_scan_a_reference();
   config.lookback_scans = config.lookahead_scans = 2;
   // The only references are the first scan and the last one. Each has a wall
@@ -165,7 +165,7 @@ TEST_CASE("the evidence of scans before an instance and that of scans after it a
   config.tau_free = 0.86;
   CHECK(causes(true, false) == Causes{Cause::kTooLittleFree});
   CHECK(causes(false, true) == Causes{Cause::kTooLittleFree});
-  CHECK(causes(true, true) == Causes{Cause::kTooLittleFree});
+  CHECK(causes(true, true).count(Cause::kFreeSpace) == 1);
 }
 
 TEST_CASE("scans of another epoch give no evidence about an instance and no predecessor") {

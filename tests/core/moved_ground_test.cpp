@@ -200,7 +200,7 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
   return removed_with_box(MovedGround(FreeSpaceConfig()), ground, samples, Cause::kFreeSpace);
 }
 
-TEST_CASE("ground is removed if it is free in two references and hit in few") {
+TEST_CASE("ground is removed if it is free in two references, however many hit it") {
   // Two voxels of 1.2 m beside the box, visited alternately, and one point far from both.
   PointBuffer ground;
   for (const float x : {22.1F, 22.2F, 22.3F, 23.1F, 23.2F, 23.3F, 22.4F, 22.5F, 30.0F}) {
@@ -214,10 +214,7 @@ TEST_CASE("ground is removed if it is free in two references and hit in few") {
   CHECK(ground_seen_free(ground, {}).empty());
   CHECK(ground_seen_free(ground, {free}).empty());
   CHECK(ground_seen_free(ground, {free, free}) == all);
-  std::vector<Reference> references = {free, hit, hit, hit, hit, hit, hit, free};
-  CHECK(ground_seen_free(ground, references) == all);  // 2 are more than 0.3 of 6
-  references.push_back(hit);
-  CHECK(ground_seen_free(ground, references).empty());  // 2 are less than 0.3 of 7
+  CHECK(ground_seen_free(ground, {free, hit, hit, hit, hit, hit, hit, hit, free}) == all);
   const Reference near_free = [](float x) {
     return x < 22.8F ? BeamResult::kFree : BeamResult::kUnknown;
   };

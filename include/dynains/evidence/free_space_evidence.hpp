@@ -29,8 +29,8 @@
 namespace dynains {
 
 /// Tests the samples of each scan against the range images of reference scans before and after it.
-/// Sums the results as log-odds by supervoxel, separately for the past and the future, and counts
-/// the supervoxels that moved along the tracks of instances.
+/// Sums the results as log-odds by supervoxel, and counts the supervoxels that moved along the
+/// tracks of instances.
 class FreeSpaceEvidence {
  public:
   using Config = FreeSpaceConfig;
@@ -226,7 +226,6 @@ class FreeSpaceEvidence {
       const detail::ReferenceScan* const reference = references_.find(scan - age, record.epoch);
       if (reference != nullptr) test(scan, record, *reference, newest_test_);
     }
-    updater_.begin_later_references(record.evidence.beliefs);
   }
 
   // The first scan of an epoch is the only reference of the second one, and shows what moves fast.
@@ -252,10 +251,8 @@ class FreeSpaceEvidence {
                          record.T_world_sensor, reference, memory, evidence.samples.reach.data());
     const Pose T_sensor_reference =
         detail::composed(detail::inverted(record.T_world_sensor), reference.T_world_level);
-    const detail::InstanceViews::Position position = {static_cast<float>(T_sensor_reference(0, 3)),
-                                                      static_cast<float>(T_sensor_reference(1, 3)),
-                                                      static_cast<float>(T_sensor_reference(2, 3))};
-    updater_.update(evidence.samples, visibility, position, evidence.beliefs);
+    updater_.update(evidence.samples, visibility, T_sensor_reference.translation().cast<float>(),
+                    evidence.beliefs);
   }
 
   // Scans are numbered by phase: 0 for references, then 1, 2, ... up to the next reference. Tests

@@ -1,8 +1,8 @@
 // Free-space beliefs of the supervoxels and the instances of one scan.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -26,9 +26,6 @@ inline constexpr std::uint8_t kFirmHits = 7;
 /// references on the side of the scan hit the instance and none of them saw it free.
 class InstanceViews {
  public:
-  /// Position, m, in the sensor frame of the scan.
-  using Position = std::array<float, 3>;
-
   /// Forgets all references. Computes the centres of the instances of a new scan.
   void begin(const InstanceSamples& samples) {
     views_.resize(samples.instance_count());
@@ -38,9 +35,8 @@ class InstanceViews {
       at += samples.count(instance);
       views_[instance] = View();
       for (std::uint32_t i = begin; i < at; ++i) {
-        views_[instance].sum[0] += samples.points.x[i];
-        views_[instance].sum[1] += samples.points.y[i];
-        views_[instance].sum[2] += samples.points.z[i];
+        views_[instance].sum +=
+            Eigen::Vector3f(samples.points.x[i], samples.points.y[i], samples.points.z[i]);
       }
       views_[instance].count = static_cast<float>(at - begin);
     }
@@ -60,24 +56,18 @@ class InstanceViews {
   }
 
   /// Whether the directions from an instance to the sensor and to a reference differ by more than
-  /// the largest angle of one side.
-  bool is_other_side(std::size_t instance, const Position& reference) const {
+  /// the largest angle of one side. `reference`: m, in the sensor frame of the scan.
+  bool is_other_side(std::size_t instance, const Eigen::Vector3f& reference) const {
     const View& view = views_[instance];  // all vectors are scaled by the number of samples
-    float product = 0.0F, to_sensor = 0.0F, to_reference = 0.0F;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float other = view.sum[i] - view.count * reference[i];
-      product += view.sum[i] * other;
-      to_sensor += view.sum[i] * view.sum[i];
-      to_reference += other * other;
-    }
-    return product < kCosine * std::sqrt(to_sensor) * std::sqrt(to_reference);
+    const Eigen::Vector3f other = view.sum - view.count * reference;
+    return view.sum.dot(other) < kCosine * view.sum.norm() * other.norm();
   }
 
  private:
   static constexpr float kCosine = 0.9396926F;  // of 20 deg, the largest angle of one side
 
   struct View {
-    Position sum = {};  // of the positions of the samples
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();  // of the samples, m, sensor frame
     float count = 0.0F;
     std::uint8_t hits = 0;  // references on the side of the scan that hit the instance
     bool was_free = false;  // a reference on the side of the scan saw the instance free
@@ -91,8 +81,8 @@ struct InstanceBeliefs {
   /// Log-odds that a supervoxel was free, a FreeSpaceSum. Thin objects, which some beams pass, have
   /// too many hits for the sum to grow.
   struct Belief {
-    float level = 0.0F;          ///< log-odds by the references of one side of time, >= 0
-    float peak = 0.0F;           ///< maximum of `level`, over both sides of time
+    float level = 0.0F;          ///< log-odds by the references so far, >= 0
+    float peak = 0.0F;           ///< maximum of `level`
     std::uint8_t contested = 0;  ///< 1 after a reference with mostly hits
     std::uint8_t hits = 0;       ///< references with hits on enough samples, at most kFirmHits
     std::uint8_t turns = 0;  ///< number of changes from hit to free and back; odd while it is free
@@ -148,18 +138,10 @@ class InstanceBeliefUpdater {
     out.views.begin(samples);
   }
 
-  /// Restarts the sums for the references on the other side of time; keeps the peaks.
-  void begin_later_references(InstanceBeliefs& beliefs) const {
-    for (Belief& belief : beliefs.supervoxels) {
-      belief.level = 0.0F;
-      belief.turns &= static_cast<std::uint8_t>(~1U);
-    }
-  }
-
   /// Updates the beliefs by the visibility of `samples` from one reference. `reference`: its
   /// position, m, in the sensor frame of the scan.
   void update(const InstanceSamples& samples, const Visibility& visibility,
-              const InstanceViews::Position& reference, InstanceBeliefs& beliefs) const {
+              const Eigen::Vector3f& reference, InstanceBeliefs& beliefs) const {
     // AVX2 processors have an instruction that counts bits.
     with_packs([&](auto) {
       for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
@@ -225,7 +207,7 @@ class InstanceBeliefUpdater {
 
   // Updates what is known of an instance as a whole. `all`: its visible samples, at least one.
   // Returns the weight of the free ones.
-  float update_instance(const Visibility::Count& all, const InstanceViews::Position& reference,
+  float update_instance(const Visibility::Count& all, const Eigen::Vector3f& reference,
                         std::size_t instance, InstanceBeliefs& beliefs) const {
     const auto visible = static_cast<float>(all.free + all.hit);
     const float least = kMinVisible * static_cast<float>(beliefs.counts[instance].total);

@@ -161,7 +161,6 @@ class MovedGround {
  private:
   static constexpr double kMinCell = 0.1;       // m, smallest cell of the footprint
   static constexpr std::uint32_t kMinFree = 2;  // "free" references of a moved voxel
-  static constexpr float kMinRatio = 0.3F;      // "free" to "hit" references of a moved voxel
   static constexpr std::uint32_t kMinHit = 3;   // "hit" references of a voxel that is ground
   static constexpr float kMaxGap = 0.1F;        // m between two beams whose hits show the ground
 
@@ -193,7 +192,7 @@ class MovedGround {
     seen_.assign(samples.size() + 2, Seen::kUnknown);
     for (std::size_t sample = 0; sample < samples.size(); ++sample) {
       const std::uint8_t free = samples.free[sample], hit = samples.hit[sample];
-      if (free >= kMinFree && static_cast<float>(free) >= kMinRatio * static_cast<float>(hit)) {
+      if (free >= kMinFree) {
         seen_[sample + 1] = Seen::kMoved;
         any = true;
       } else if (free == 0 && hit >= kMinHit) {
