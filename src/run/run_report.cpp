@@ -11,7 +11,7 @@
 
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/atomic_file.hpp"
-#include "dynains/io/extrinsic.hpp"
+#include "dynains/io/trajectory.hpp"
 
 namespace dynains::run {
 namespace {

@@ -1,9 +1,8 @@
-#include "dynains/io/extrinsic.hpp"
-
 #include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "dynains/io/extrinsic.hpp"
+#include "dynains/io/trajectory.hpp"
 #include "program/start.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "support/catch.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bytes.hpp"
+#include "../byte_reader.hpp"
 #include "log_file.hpp"
 
 namespace dynains {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "bytes.hpp"
+#include "../byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "ros_messages.hpp"
 

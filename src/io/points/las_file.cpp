@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../logs/bytes.hpp"
 #include "../scalar.hpp"
 #include "point_sink.hpp"
 

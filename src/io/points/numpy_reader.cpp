@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../logs/bytes.hpp"
 #include "../scalar.hpp"
 #include "point_sink.hpp"
 

@@ -10,7 +10,6 @@
 #include "../byte_reader.hpp"
 #include "../text.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/extrinsic.hpp"
 #include "kitti_files.hpp"
 
 namespace dynains {

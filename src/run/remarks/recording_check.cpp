@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cloud_remarks.hpp"
-#include "dynains/io/extrinsic.hpp"
+#include "dynains/io/trajectory.hpp"
 #include "dynains/poses/ray_origin.hpp"
 #include "dynains/poses/sensor_agreement.hpp"
 #include "io/text.hpp"

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "dynains/io/extrinsic.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/io/trajectory.hpp"
 #include "dynains/parameters.hpp"
 
 namespace dynains::run {
