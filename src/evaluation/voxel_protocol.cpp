@@ -1,7 +1,6 @@
 #include "voxel_protocol.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "voxels.hpp"
 
@@ -46,26 +45,50 @@ void VoxelProtocol::voxelise(const LabelledScan& scan, IsNeeded&& is_needed, Vis
 
 void VoxelProtocol::add(const LabelledScan& scan) {
   if (!grid_) grid_.emplace(config_.voxel, scan.T_world_sensor.translation());
-  voxelise(
-      scan, [](VoxelKey) { return true; }, [this](const ScanVoxel& voxel) { accumulate(voxel); });
+  const auto is_needed = [](VoxelKey) { return true; };
+  voxelise(scan, is_needed, [&](const ScanVoxel& found) {
+    const std::size_t number = index_.insert(found.key);
+    if (number == keys_.size()) {
+      keys_.push_back(found.key);
+      cells_.resize(cells_.size() + layers_);
+    }
+    for (std::size_t layer = 0; layer < layers_; ++layer) {
+      if ((found.layers >> layer & 1U) == 0) continue;
+      Cell& cell = cells_[number * layers_ + layer];
+      cell.sum += found.point.p_world;
+      ++cell.count;
+      cell.truths |= detail::truth_bit(found.point.truth);
+    }
+  });
 }
 
+// The class of a cell with points of both is that of the nearest one.
 void VoxelProtocol::resolve(const LabelledScan& scan) {
-  nearest_.resize(forks_.size(), std::numeric_limits<double>::infinity());
-  const auto is_forked = [this](VoxelKey key) { return forked_.find(key) != kNoIndex; };
-  voxelise(scan, is_forked, [this](const ScanVoxel& voxel) { compare(voxel); });
+  const auto cells_of = [&](VoxelKey key) { return &cells_[index_.find(key) * layers_]; };
+  const auto is_mixed = [&](VoxelKey key) {
+    if (index_.find(key) == kNoIndex) return false;
+    return std::any_of(cells_of(key), cells_of(key) + layers_,
+                       [](const Cell& cell) { return detail::is_mixed(cell.truths); });
+  };
+  voxelise(scan, is_mixed, [&](const ScanVoxel& found) {
+    for (std::size_t layer = 0; layer < layers_; ++layer) {
+      if ((found.layers >> layer & 1U) == 0) continue;
+      Cell& cell = cells_of(found.key)[layer];
+      const double squared = (found.point.p_world - cell.centroid()).squaredNorm();
+      if (!detail::is_nearer(squared, cell.nearest)) continue;
+      cell.nearest = squared;
+      cell.nearest_truth = found.point.truth;
+    }
+  });
 }
 
 Score VoxelProtocol::score(std::size_t row) const {
   Score score;
-  const auto point_at = [&](std::uint32_t number) { return point(voxels_[number], row); };
-  for (std::size_t number = 0; number < voxels_.size(); ++number) {
-    const Voxel& voxel = voxels_[number];
-    if (voxel.fork == kNoIndex) {  // the estimate has the same point
-      score.add(voxel.shared.truth(), 1, 1);
-      continue;
-    }
-    const VoxelPoint raw = *point(voxel, kIdentity);
+  const auto point_at = [&](std::uint32_t number) {
+    return cells_[number * layers_ + row].point();
+  };
+  for (std::size_t number = 0; number < keys_.size(); ++number) {
+    const VoxelPoint raw = *cells_[number * layers_ + kIdentity].point();
     const bool is_kept = detail::is_preserved(raw, keys_[number], *grid_, index_, point_at);
     score.add(raw.truth, 1, is_kept ? 1 : 0);
   }
@@ -78,40 +101,6 @@ VoxelProtocol::LayerMask VoxelProtocol::layers_of(const LabelledScan& scan, std:
   if (truth == Truth::kStatic) layers |= 1U << kOracle;
   if (!scan.in_map.empty()) layers |= static_cast<unsigned>(scan.in_map[i]) << kFirstEstimate;
   return static_cast<LayerMask>(layers & all_layers_);
-}
-
-void VoxelProtocol::accumulate(const ScanVoxel& found) {
-  const std::uint32_t number = index_.insert(found.key);
-  if (number == voxels_.size()) {
-    voxels_.emplace_back();
-    keys_.push_back(found.key);
-  }
-  Voxel& voxel = voxels_[number];
-  if (voxel.fork == kNoIndex && found.layers == all_layers_) {
-    voxel.shared.add(found.point);
-    return;
-  }
-  if (voxel.fork == kNoIndex) {
-    voxel.fork = static_cast<std::uint32_t>(layers_) * forked_.insert(found.key);
-    forks_.resize(forks_.size() + layers_, voxel.shared);
-  }
-  for (std::size_t layer = 0; layer < layers_; ++layer) {
-    if ((found.layers >> layer & 1U) != 0) forks_[voxel.fork + layer].add(found.point);
-  }
-}
-
-// The class of a cell with points of both is that of the nearest one. All such cells are forked:
-// a voxel with equal layers has no dynamic point, because the oracle layer has none.
-void VoxelProtocol::compare(const ScanVoxel& found) {
-  const std::size_t fork = layers_ * forked_.find(found.key);
-  for (std::size_t layer = 0; layer < layers_; ++layer) {
-    if ((found.layers >> layer & 1U) == 0) continue;
-    Cell& cell = forks_[fork + layer];
-    const double squared = (found.point.p_world - cell.centroid()).squaredNorm();
-    if (!detail::is_nearer(squared, nearest_[fork + layer])) continue;
-    nearest_[fork + layer] = squared;
-    cell.truths = detail::truth_bit(found.point.truth);
-  }
 }
 
 }  // namespace dynains::evaluation

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -51,8 +52,8 @@ class VoxelProtocol {
   /// an estimate.
   template <class Visit>
   void for_each(std::size_t row, Visit&& visit) const {
-    for (const Voxel& voxel : voxels_) {
-      if (const auto held = point(voxel, row)) visit(*held);
+    for (std::size_t number = 0; number < keys_.size(); ++number) {
+      if (const auto held = cells_[number * layers_ + row].point()) visit(*held);
     }
   }
 
@@ -80,40 +81,22 @@ class VoxelProtocol {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     std::uint32_t count = 0;
     detail::TruthMask truths = 0;
+    Truth nearest_truth = Truth::kStatic;  ///< of points of both classes, by resolve()
+    double nearest = std::numeric_limits<double>::infinity();  ///< squared distance, m^2
 
-    void add(const VoxelPoint& point) {
-      sum += point.p_world;
-      ++count;
-      truths |= detail::truth_bit(point.truth);
-    }
     Eigen::Vector3d centroid() const { return sum / static_cast<double>(count); }
-    Truth truth() const {
-      return truths == detail::truth_bit(Truth::kDynamic) ? Truth::kDynamic : Truth::kStatic;
+    std::optional<VoxelPoint> point() const {
+      if (count == 0) return std::nullopt;
+      const bool is_dynamic = truths == detail::truth_bit(Truth::kDynamic);
+      return VoxelPoint{centroid(), detail::is_mixed(truths) ? nearest_truth
+                                    : is_dynamic             ? Truth::kDynamic
+                                                             : Truth::kStatic};
     }
   };
-
-  /// Most voxels have the same points in every layer, stored once in `shared`. The first scan in
-  /// which layers differ gives each layer a separate cell, `forks_[fork + layer]`.
-  struct Voxel {
-    Cell shared;
-    std::uint32_t fork = kNoIndex;
-  };
-
-  const Cell& cell(const Voxel& voxel, std::size_t layer) const {
-    return voxel.fork == kNoIndex ? voxel.shared : forks_[voxel.fork + layer];
-  }
-
-  std::optional<VoxelPoint> point(const Voxel& voxel, std::size_t layer) const {
-    const Cell& held = cell(voxel, layer);
-    if (held.count == 0) return std::nullopt;
-    return VoxelPoint{held.centroid(), held.truth()};
-  }
 
   template <class IsNeeded, class Visit>
   void voxelise(const LabelledScan& scan, IsNeeded&& is_needed, Visit&& visit);
   LayerMask layers_of(const LabelledScan& scan, std::size_t i, Truth truth) const;
-  void accumulate(const ScanVoxel& found);
-  void compare(const ScanVoxel& found);
 
   EvaluationConfig config_;
   detail::RangeGate gate_;
@@ -124,11 +107,7 @@ class VoxelProtocol {
 
   VoxelHashTable<> index_;
   std::vector<VoxelKey> keys_;  // by number of voxel
-  std::vector<Voxel> voxels_;   // by number
-  VoxelHashTable<> forked_;     // a part of them
-  std::vector<Cell> forks_;     // by number in forked_ and by layer
-
-  std::vector<double> nearest_;  // squared distance of the point that decides, m^2, by fork
+  std::vector<Cell> cells_;     // by number of voxel, then by layer
 };
 
 }  // namespace dynains::evaluation
