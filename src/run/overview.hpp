@@ -24,7 +24,7 @@ struct Colour {
 /// A picture of few colours.
 class Picture {
  public:
-  /// White; throws ConfigError unless both sides are in [1, 16384] pixels.
+  /// White. `width`, `height`: pixels, at least 1.
   Picture(int width, int height);
 
   int width() const { return width_; }
