@@ -277,7 +277,8 @@ TEST_CASE("ids go to the cluster that has most points, for any point_runs") {
     const std::vector<std::uint32_t> old_ids = {11, 12, 13, 14, 15, 16};
     detail::InstanceIds instance_ids;
     std::vector<std::uint32_t> ids;
-    instance_ids.assign(old_runs, old_ids, point_runs, kClusters, ids);
+    detail::ClusterPredecessors predecessors;
+    instance_ids.propagate(predecessors.find(old_runs, point_runs, kClusters), old_ids, ids);
     REQUIRE(ids.size() == kClusters);
 
     const std::vector<std::uint32_t> old_cluster = by_point(old_runs);

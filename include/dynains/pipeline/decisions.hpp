@@ -25,46 +25,23 @@
 
 namespace dynains::detail {
 
-/// Propagates the instance ids of the previous scan to the clusters of the current window.
-class InstanceIds {
+/// Finds the clusters of the previous scan that go on in those of the current window.
+class ClusterPredecessors {
  public:
   using PointRuns = Span<const ClusterSet::PointRun>;
 
-  /// Restarts the numbering of ids.
-  void clear() { last_id_ = kNoInstance; }
-
-  /// Fills `ids` with the instance id of each cluster of this window. `old_runs` and `point_runs`:
-  /// point runs of the previous scan, with its old clusters (indices into `old_ids`) and with the
-  /// clusters of this window. A cluster inherits the id of more than half of its points in the
-  /// previous scan; without a majority, it inherits the id of some of them. If two clusters have
-  /// one predecessor, the cluster with the lower index inherits the id and the other gets a new
-  /// one.
-  void assign(PointRuns old_runs, Span<const std::uint32_t> old_ids, PointRuns point_runs,
-              std::size_t cluster_count, std::vector<std::uint32_t>& ids) {
+  /// By cluster of this window, its old cluster, or kNoCluster. `old_runs` and `point_runs`: point
+  /// runs of the previous scan, with its old clusters and with the clusters of this window. It is
+  /// the one with more than half of the points of the cluster in the previous scan; without a
+  /// majority, it has some of them. The span is valid until the next call.
+  Span<const std::uint32_t> find(PointRuns old_runs, PointRuns point_runs,
+                                 std::size_t cluster_count) {
     candidate_.assign(cluster_count, kNoCluster);
     lead_.assign(cluster_count, 0);
     for_each_common_run(point_runs, old_runs,
                         [this](std::uint32_t begin, std::uint32_t end, const auto& run,
                                const auto& old) { vote(run.cluster, old.cluster, end - begin); });
-    propagate(candidate_, old_ids, ids);
-  }
-
-  /// Fills `ids` by cluster. `predecessors`: by cluster, its old cluster (index into `old_ids`) or
-  /// kNoCluster, which gives a new id.
-  void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
-                 std::vector<std::uint32_t>& ids) {
-    is_inherited_.assign(old_ids.size(), 0);
-    ids.resize(predecessors.size());
-    for (std::size_t c = 0; c < predecessors.size(); ++c) {
-      const std::uint32_t old = predecessors[c];
-      if (old != kNoCluster && is_inherited_[old] == 0) {
-        is_inherited_[old] = 1;
-        ids[c] = old_ids[old];
-      } else {
-        if (++last_id_ == kNoInstance) ++last_id_;  // skipped after an overflow
-        ids[c] = last_id_;
-      }
-    }
+    return candidate_;
   }
 
  private:
@@ -82,9 +59,37 @@ class InstanceIds {
     }
   }
 
-  std::uint32_t last_id_ = kNoInstance;
   std::vector<std::uint32_t> candidate_;
   std::vector<std::uint32_t> lead_;
+};
+
+/// Numbers the instances of consecutive scans.
+class InstanceIds {
+ public:
+  /// Restarts the numbering.
+  void clear() { last_id_ = kNoInstance; }
+
+  /// Fills `ids` by cluster. `predecessors`: by cluster, its old cluster (index into `old_ids`),
+  /// whose id it inherits, or kNoCluster, which gives a new id. If two clusters have one
+  /// predecessor, the one with the higher index gets a new id.
+  void propagate(Span<const std::uint32_t> predecessors, Span<const std::uint32_t> old_ids,
+                 std::vector<std::uint32_t>& ids) {
+    is_inherited_.assign(old_ids.size(), 0);
+    ids.resize(predecessors.size());
+    for (std::size_t c = 0; c < predecessors.size(); ++c) {
+      const std::uint32_t old = predecessors[c];
+      if (old != kNoCluster && is_inherited_[old] == 0) {
+        is_inherited_[old] = 1;
+        ids[c] = old_ids[old];
+      } else {
+        if (++last_id_ == kNoInstance) ++last_id_;  // skipped after an overflow
+        ids[c] = last_id_;
+      }
+    }
+  }
+
+ private:
+  std::uint32_t last_id_ = kNoInstance;
   std::vector<std::uint8_t> is_inherited_;
 };
 
@@ -157,8 +162,9 @@ class ScanDecision {
   /// Takes the models of the sensors of a scan, and that of all together.
   virtual void adapt(const SensorModel& all, Span<const SensorModel> sensors) = 0;
 
-  /// Adds the newest scan and assigns an instance id to each of its clusters.
-  virtual void observe(ScanRing& scans, const ScanWindow& window) = 0;
+  /// Adds the newest scan. Returns by cluster of the window the cluster of the window before that
+  /// goes on in it, or kNoCluster; valid until the next call.
+  virtual Span<const std::uint32_t> observe(ScanRing& scans, const ScanWindow& window) = 0;
   /// Judges `scan`. Without `is_final` it is the newest scan, and evidence of later scans is
   /// missing.
   virtual void judge(const ScanSlot& scan, bool is_final) = 0;
@@ -173,14 +179,10 @@ class ScanDecision {
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
   virtual SurfaceCounts surfaces() const { return {}; }
-
-  /// Restores the state after construction. Buffers keep their capacity.
-  virtual void clear() = 0;
 };
 
 /// Decision by occupancy (Eq. 3-19): compares the scans of a window cluster by cluster and
-/// accumulates the votes of all windows that contain a scan. The points that two windows have in
-/// common propagate the instance ids.
+/// accumulates the votes of all windows that contain a scan.
 template <class Stages>
 class WindowDecision final : public ScanDecision {
  public:
@@ -203,13 +205,18 @@ class WindowDecision final : public ScanDecision {
   std::size_t latency() const override { return votes_ == 0 ? 0 : length_ - 1; }
   bool needs_sensor() const override { return false; }
   void adapt(const SensorModel&, Span<const SensorModel>) override {}
-  void clear() override { instance_ids_.clear(); }
 
-  void observe(ScanRing& scans, const ScanWindow& window) override {
+  Span<const std::uint32_t> observe(ScanRing& scans, const ScanWindow& window) override {
     clusters_.build(window.points(), window.scan_begin(), window.cluster_of(),
                     window.cluster_count(), compared_);
     judge_clusters();
     record(scans, window.first_scan());
+    ClusterPredecessors::PointRuns old_runs, point_runs;
+    if (clusters_.scan_count() > 1) {
+      old_runs = scans[scans.newest().scan - 1].windows.point_runs;
+      point_runs = clusters_.point_runs(clusters_.scan_count() - 2);
+    }
+    return predecessors_.find(old_runs, point_runs, clusters_.size());
   }
 
   // The windows have voted already.
@@ -311,23 +318,9 @@ class WindowDecision final : public ScanDecision {
   void record(ScanRing& scans, std::uint64_t first_scan) {
     ScanSlot& newest = scans.newest();
     newest.windows.begin(clusters_.point_runs(clusters_.scan_count() - 1));
-    assign_ids(scans);
     for (std::uint64_t scan = votes_ == 0 ? newest.scan : first_scan; scan <= newest.scan; ++scan) {
       scans[scan].windows.record(clusters_.point_runs(scan - first_scan), verdicts_, merged_);
     }
-  }
-
-  void assign_ids(ScanRing& scans) {
-    ScanSlot& newest = scans.newest();
-    InstanceIds::PointRuns old_runs, point_runs;
-    Span<const std::uint32_t> old_ids;
-    if (clusters_.scan_count() > 1) {
-      const ScanSlot& before = scans[newest.scan - 1];
-      old_runs = before.windows.point_runs;
-      old_ids = before.ids;
-      point_runs = clusters_.point_runs(clusters_.scan_count() - 2);
-    }
-    instance_ids_.assign(old_runs, old_ids, point_runs, clusters_.size(), newest.ids);
   }
 
   std::size_t length_;
@@ -345,7 +338,7 @@ class WindowDecision final : public ScanDecision {
   std::vector<WindowVotes::Run> merged_;        // working memory
   std::vector<EvidenceVerdict::Group> groups_;  // none, then by run of points
   std::vector<std::uint32_t> cluster_of_, group_of_;
-  InstanceIds instance_ids_;
+  ClusterPredecessors predecessors_;
 };
 
 /// Creates the decision by free space. free_space_decision.hpp defines it, and the library

@@ -18,8 +18,7 @@
 
 namespace dynains::detail {
 
-/// Decision by free space. Each scan is clustered alone. Instance ids follow the associations of
-/// instances between scans (FreeSpaceEvidence::predecessors()).
+/// Decision by free space. Each scan is clustered alone.
 class FreeSpaceDecision final : public ScanDecision {
  public:
   FreeSpaceDecision(const FreeSpaceConfig& config, Background* other) : evidence_(config) {
@@ -32,13 +31,12 @@ class FreeSpaceDecision final : public ScanDecision {
   void adapt(const SensorModel& all, Span<const SensorModel> sensors) override {
     evidence_.adapt(all, sensors);
   }
-  void clear() override { instance_ids_.clear(); }
 
-  void observe(ScanRing& scans, const ScanWindow& window) override {
+  Span<const std::uint32_t> observe(ScanRing& scans, const ScanWindow& window) override {
     const ScanSlot& newest = scans.newest();
     evidence_.observe(newest.scan, newest.compared.epoch, newest.T_world_compared, newest.split,
                       window.newest_cluster_of(), window.cluster_count());
-    propagate_ids(scans);
+    return evidence_.predecessors();
   }
 
   void judge(const ScanSlot& scan, bool is_final) override { evidence_.judge(scan.scan, is_final); }
@@ -54,18 +52,7 @@ class FreeSpaceDecision final : public ScanDecision {
   SurfaceCounts surfaces() const override { return evidence_.surfaces(); }
 
  private:
-  void propagate_ids(ScanRing& scans) {
-    ScanSlot& newest = scans.newest();
-    Span<const std::uint32_t> old_ids;
-    if (newest.scan > 0) {
-      const ScanSlot& before = scans[newest.scan - 1];
-      if (before.compared.epoch == newest.compared.epoch) old_ids = before.ids;
-    }
-    instance_ids_.propagate(evidence_.predecessors(), old_ids, newest.ids);
-  }
-
   FreeSpaceEvidence evidence_;
-  InstanceIds instance_ids_;
 };
 
 template <class Config>

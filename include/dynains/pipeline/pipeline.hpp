@@ -108,7 +108,12 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
       cluster();
     }
     timed(times.motion, [&] { align(newest); });
-    timed(times.evidence, [&] { decision_->observe(scans_, window_); });  // Eq. 4-18
+    timed(times.evidence, [&] {  // Eq. 4-18
+      const Span<const std::uint32_t> predecessors = decision_->observe(scans_, window_);
+      Span<const std::uint32_t> ids_before;
+      if (newest.scan > 0) ids_before = scans_[newest.scan - 1].ids;
+      instance_ids_.propagate(predecessors, ids_before, newest.ids);
+    });
     timed(times.judge, [&] {
       decision_->judge(newest, false);  // Eq. 19
       if (const auto movers = decision_->may_move()) make_reference(newest, *movers);
@@ -348,7 +353,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
 
   // Removes all scans. The map and the capacity of buffers stay.
   void forget_scans() {
-    decision_->clear();
+    instance_ids_.clear();
     frame_.forget();
     for (ObjectTracks* const objects : {newest_objects_.get(), final_objects_.get()}) {
       if (objects != nullptr) objects->clear();
@@ -372,6 +377,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   Clusterer clusterer_;
   std::unique_ptr<MotionStage> motion_;  // null: scans are compared by their pushed poses
   std::unique_ptr<ScanDecision> decision_;
+  InstanceIds instance_ids_;
   bool finishes_later_;  // the next push finishes a scan, beside its first stages
   VerdictWriter newest_writer_;
   VerdictWriter final_writer_;
