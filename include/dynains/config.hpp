@@ -26,26 +26,22 @@ struct Offers<Operation, T, std::void_t<Operation<T>>> : std::true_type {};
 
 /// `Config::paper()`, or the defaults if the config has no such member.
 template <class Config>
-using Paper = decltype(Config::paper());
+auto paper_config(int) -> decltype(Config::paper()) {
+  return Config::paper();
+}
 template <class Config>
-Config paper_config() {
-  if constexpr (Offers<Paper, Config>::value) {
-    return Config::paper();
-  } else {
-    return Config();
-  }
+Config paper_config(...) {
+  return Config();
 }
 
 /// `Config::published()`, or that of paper_config() if the config has no such member.
 template <class Config>
-using Published = decltype(Config::published());
+auto published_config(int) -> decltype(Config::published()) {
+  return Config::published();
+}
 template <class Config>
-Config published_config() {
-  if constexpr (Offers<Published, Config>::value) {
-    return Config::published();
-  } else {
-    return paper_config<Config>();
-  }
+Config published_config(...) {
+  return paper_config<Config>(0);
 }
 
 }  // namespace detail
@@ -211,23 +207,18 @@ struct PipelineConfig : RemoverConfig {
   /// values, follow its public implementation. Ranges differ, see docs/algorithm.md.
   static PipelineConfig paper() {
     PipelineConfig config;
-    static_cast<RemoverConfig&>(config) = RemoverConfig::paper();
-    config.ground = detail::paper_config<decltype(config.ground)>();
-    config.clusterer = detail::paper_config<decltype(config.clusterer)>();
-    config.descriptor = detail::paper_config<decltype(config.descriptor)>();
-    config.belief = detail::paper_config<decltype(config.belief)>();
-    config.map = detail::paper_config<decltype(config.map)>();
+    visit_sections(config, [](const char*, auto& section) {
+      section = detail::paper_config<std::remove_reference_t<decltype(section)>>(0);
+    });
     return config;
   }
 
   /// Method and parameters of the paper's public implementation, where it departs from the text.
   static PipelineConfig published() {
-    PipelineConfig config = paper();
-    static_cast<RemoverConfig&>(config) = RemoverConfig::published();
-    config.ground = detail::published_config<decltype(config.ground)>();
-    config.clusterer = detail::published_config<decltype(config.clusterer)>();
-    config.descriptor = detail::published_config<decltype(config.descriptor)>();
-    config.belief = detail::published_config<decltype(config.belief)>();
+    PipelineConfig config;
+    visit_sections(config, [](const char*, auto& section) {
+      section = detail::published_config<std::remove_reference_t<decltype(section)>>(0);
+    });
     return config;
   }
 

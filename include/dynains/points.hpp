@@ -129,6 +129,12 @@ struct PointBuffer {
     detail::grow(y, size);
     detail::grow(z, size);
   }
+  /// Replaces point `to` by point `i` of `from`.
+  void set(std::size_t to, const PointsView& from, std::size_t i) {
+    x[to] = from.x[i];
+    y[to] = from.y[i];
+    z[to] = from.z[i];
+  }
   void push_back(float px, float py, float pz) {
     x.push_back(px);
     y.push_back(py);
@@ -148,11 +154,16 @@ struct GroundSplit {
   std::size_t ground_count = 0;  ///< number of ground points
   std::size_t count = 0;         ///< number of all points; those behind them are not judged
 
-  /// Views of the ground points and of all other points, m, sensor frame; valid until the split
-  /// changes.
+  /// Views of all points, of those on the ground and of the others, m, sensor frame; valid until
+  /// the split changes.
+  PointsView all() const { return PointsView(points).subview(0, count); }
   PointsView ground() const { return PointsView(points).subview(0, ground_count); }
   PointsView non_ground() const {
     return PointsView(points).subview(ground_count, count - ground_count);
+  }
+  /// Sensor of point `i`.
+  std::uint8_t sensor_of(std::size_t i) const {
+    return sensor_of_input.empty() ? std::uint8_t{0} : sensor_of_input[input[i]];
   }
   /// Makes room for `size` points, with the padding. New points are not initialized.
   void resize(std::size_t size) {

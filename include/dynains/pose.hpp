@@ -84,9 +84,6 @@ inline Pose rotated(const Pose& T_a_c, const Eigen::Matrix3d& R_b_c) {
   return T_a_b;
 }
 
-/// R_b_a, the inverse of the rotation R_a_b.
-inline Eigen::Matrix3d transposed(const Eigen::Matrix3d& R) { return R.transpose(); }
-
 /// Covariance (row-major, 6 x 6) of an error e of a pose T_c_a, if `covariance` is that of an error
 /// of T_c_b. An error is a translation (m) and a rotation (rad) along the axes of the inner frame:
 /// exact pose = pose * Exp(e).
@@ -105,22 +102,16 @@ inline std::array<double, 36> transported_covariance(const std::array<double, 36
       adjoint[at(row, to + 3)] = arm[i];
     }
   }
-  std::array<double, 36> product = {}, result = {};
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = 0; j < 6; ++j) {
-      for (std::size_t k = 0; k < 6; ++k) {
-        product[at(i, j)] += adjoint[at(i, k)] * covariance[at(k, j)];
+  const auto times_transposed = [&](const auto& a, const auto& b) {
+    std::array<double, 36> product = {};
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = 0; j < 6; ++j) {
+        for (std::size_t k = 0; k < 6; ++k) product[at(i, j)] += a[at(i, k)] * b[at(j, k)];
       }
     }
-  }
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = 0; j < 6; ++j) {
-      for (std::size_t k = 0; k < 6; ++k) {
-        result[at(i, j)] += product[at(i, k)] * adjoint[at(j, k)];
-      }
-    }
-  }
-  return result;
+    return product;
+  };
+  return times_transposed(times_transposed(adjoint, covariance), adjoint);
 }
 
 /// Distance between the origins of two poses, m.
@@ -137,17 +128,13 @@ inline Pose scaled_motion(const Pose& T_a_b, double ratio) {
   const double length = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
   const double twice_cosine = T_a_b(0, 0) + T_a_b(1, 1) + T_a_b(2, 2) - 1.0;
   const double angle = ratio * std::atan2(length, twice_cosine);
-  const double scale = length > 0.0 ? 1.0 / length : 0.0;
-  const double x = scale * w[0], y = scale * w[1], z = scale * w[2];
-  const double s = std::sin(angle), c = std::cos(angle), d = 1.0 - c;
-  const double R[3][3] = {{c + d * x * x, d * x * y - s * z, d * x * z + s * y},
-                          {d * x * y + s * z, c + d * y * y, d * y * z - s * x},
-                          {d * x * z - s * y, d * y * z + s * x, c + d * z * z}};
   Pose result = Pose::Identity();
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3 && length > 0.0; ++j) result(i, j) = R[i][j];  // Rodrigues' formula
-    result(i, 3) = ratio * T_a_b(i, 3);
+  if (length > 0.0) {
+    const double scale = 1.0 / length;
+    const Eigen::Vector3d axis(scale * w[0], scale * w[1], scale * w[2]);
+    result.linear() = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
   }
+  for (int i = 0; i < 3; ++i) result(i, 3) = ratio * T_a_b(i, 3);
   return result;
 }
 

@@ -172,7 +172,7 @@ class CurvedVoxelClusterer {
       using Int = typename Packs::Int;
       Float lowest = above_all;
       Float highest = below_all;
-      detail::for_slices<Packs>(count, [&](const auto& at) {
+      detail::for_slices<Packs>(0, count, [&](const auto& at) {
         const Float range = at.load(points.range.data());
         const Float azimuth = at.load(points.azimuth.data());
         const Float z = at.load(points.z.data());
@@ -199,7 +199,7 @@ class CurvedVoxelClusterer {
   void mark_cells(std::size_t count) {
     if (highest_elevation_ < 0) return;
     first_cell_ = (static_cast<std::size_t>(lowest_elevation_) * columns()) << row_shift_;
-    const std::size_t blocks = row_count() * row_blocks();
+    const std::size_t blocks = row_count() * row_blocks() + detail::kPackWidth;
     if (occupied_.size() < blocks) {
       occupied_.resize(blocks);
       starts_.resize(blocks);
@@ -231,12 +231,17 @@ class CurvedVoxelClusterer {
     occupied_blocks_.clear();
     const std::size_t blocks = row_count() * row_blocks();
     std::uint32_t runs = 0;
-    for (std::size_t block = 0; block < blocks; ++block) {
-      if (occupied_[block] == 0) continue;
+    const auto add = [&](std::size_t block) {
+      if (occupied_[block] == 0) return;
       occupied_blocks_.push_back(static_cast<std::uint32_t>(block));
       starts_[block] = occupied_[block] & ~occupied_before(block);
       run_before_[block] = runs - 1;
       runs += detail::count_ones(starts_[block]);
+    };
+    for (std::size_t block = 0; block < blocks; block += detail::kPackWidth) {
+      std::uint64_t any = 0;  // mostly none
+      for (std::size_t i = 0; i < detail::kPackWidth; ++i) any |= occupied_[block + i];
+      for (std::size_t i = 0; any != 0 && i < detail::kPackWidth; ++i) add(block + i);
     }
     parent_.resize(runs);
     std::iota(parent_.begin(), parent_.end(), 0U);

@@ -167,12 +167,7 @@ class GroundSampler {
       const PointsView block = GroundFootprint::block_of(ground, i * kWordBits);
       out.run_begins[i] = sampler_.find_changes(block);
       firsts_.grow(runs + kWordBits);
-      for_each_bit(out.run_begins[i], [&](std::size_t k) {
-        firsts_.x[runs] = block.x[k];
-        firsts_.y[runs] = block.y[k];
-        firsts_.z[runs] = block.z[k];
-        ++runs;
-      });
+      for_each_bit(out.run_begins[i], [&](std::size_t k) { firsts_.set(runs++, block, k); });
     }
     grow(instance_of_, runs);
     sampler_.sample(PointsView(firsts_).subview(0, runs),

@@ -88,7 +88,7 @@ class InstanceSampler {
     std::uint64_t changes = 0;
     with_packs([&](auto packs) {
       using Packs = decltype(packs);
-      for_slices<Packs>(points.size(), [&](const auto& at) {
+      for_slices<Packs>(0, points.size(), [&](const auto& at) {
         floor(at.load(points.x.data()) * per_metre).store(&voxel[0][at.begin + 1]);
         floor(at.load(points.y.data()) * per_metre).store(&voxel[1][at.begin + 1]);
         floor(at.load(points.z.data()) * per_metre).store(&voxel[2][at.begin + 1]);
@@ -210,8 +210,8 @@ class InstanceSampler {
       const Int rank =
           mixed_hash(truncate(px * kPlaces), truncate(py * kPlaces), truncate(pz * kPlaces));
       (rank >> kIgnoredBits & Int(kMaxRank)).store(&rank_[at.begin]);
-      const Int xy = is_sampled & ((floor(px * per_metre) << kHalfBits) +
-                                   (floor(py * per_metre) & Int((1 << kHalfBits) - 1)));
+      const Int xy = is_sampled &
+                     ((floor(px * per_metre) << 16) + (floor(py * per_metre) & Int((1 << 16) - 1)));
       const Int z = select(is_sampled, floor(pz * per_metre), Int(Supervoxel().z));
       xy.store(&xy_[at.begin]);
       z.store(&z_[at.begin]);
@@ -265,7 +265,7 @@ class InstanceSampler {
   }
 
   static VoxelKey place_of(const Supervoxel& cell) {
-    return voxel_key(cell.xy >> kHalfBits, static_cast<std::int16_t>(cell.xy), cell.z);
+    return voxel_key(cell.xy >> 16, static_cast<std::int16_t>(cell.xy), cell.z);
   }
 
   // Counting sort of the supervoxels by instance; the samples follow their supervoxels.
@@ -314,10 +314,7 @@ class InstanceSampler {
     for (std::size_t s = 0; s < supervoxel_count; ++s) {
       const std::uint64_t* row = keys + ordered_[s] * most_;
       for (std::uint32_t to = out.sample_begin[s]; to < out.sample_begin[s + 1]; ++to, ++row) {
-        const auto i = static_cast<std::uint32_t>(*row);
-        out.points.x[to] = points.x[i];
-        out.points.y[to] = points.y[i];
-        out.points.z[to] = points.z[i];
+        out.points.set(to, points, static_cast<std::uint32_t>(*row));
       }
     }
   }

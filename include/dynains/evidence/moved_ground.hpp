@@ -176,12 +176,7 @@ class MovedGround {
       const std::uint64_t beside = ~under_[i] & all_of(block);
       around_points_.grow(count + kWordBits);
       const std::uint64_t first = beside & (samples.run_begins[i] | ~(beside << 1U));
-      for_each_bit(first, [&](std::size_t k) {
-        around_points_.x[count] = block.x[k];
-        around_points_.y[count] = block.y[k];
-        around_points_.z[count] = block.z[k];
-        ++count;
-      });
+      for_each_bit(first, [&](std::size_t k) { around_points_.set(count++, block, k); });
     }
     around_.assign(PointsView(around_points_).subview(0, count));
   }

@@ -234,7 +234,7 @@ class RangeImage {
       std::int32_t value[detail::kStepPoints];
       for (std::size_t begin = 0; begin < points.size(); begin += detail::kStepPoints) {
         const std::size_t size = std::min(detail::kStepPoints, points.size() - begin);
-        detail::for_slices<Packs>(size, [&](auto place) {
+        detail::for_slices<Packs>(0, size, [&](auto place) {
           const Float x = place.load(points.x.data() + begin);
           const Float y = place.load(points.y.data() + begin);
           const Float z = place.load(points.z.data() + begin);

@@ -168,9 +168,8 @@ class ReferenceScans {
     if (!open_) open_ = begin_reference(scan, epoch);
     ReferenceScan& reference = references_[*open_];
     if (grids_.size() > 1) {
-      sort_by_sensor(split, moving);
       for (std::size_t i = 0; i < grids_.size(); ++i) {
-        build_view(i, T_world_level, next_view(scan, reference));
+        build_view(i, T_world_level, split, moving, next_view(scan, reference));
       }
     } else {
       build_only_view(T_world_level, split, moving, next_view(scan, reference));
@@ -244,40 +243,6 @@ class ReferenceScans {
     return view;
   }
 
-  // Points of one sensor in own_.
-  struct OwnPoints {
-    std::size_t begin, ground_count, rest_count;
-  };
-
-  // Sorts the points of a scan by sensor into own_ and own_moving_, those on the ground first.
-  void sort_by_sensor(const GroundSplit& split, Span<const std::uint8_t> moving) {
-    const auto sensor_of = [&](std::size_t i) -> std::size_t {
-      return split.sensor_of_input.empty() ? 0 : split.sensor_of_input[split.input[i]];
-    };
-    own_of_.assign(grids_.size(), OwnPoints());
-    for (std::size_t i = 0; i < split.count; ++i) {
-      OwnPoints& own = own_of_[sensor_of(i)];
-      ++(i < split.ground_count ? own.ground_count : own.rest_count);
-    }
-    next_.clear();
-    std::size_t begin = 0;
-    for (OwnPoints& own : own_of_) {
-      own.begin = begin;
-      next_.push_back(begin);
-      begin += own.ground_count + own.rest_count + kPackWidth;
-    }
-    own_.grow(begin);
-    grow(own_moving_, begin);
-    for (std::size_t i = 0; i < split.count; ++i) {
-      const std::size_t to = next_[sensor_of(i)]++;
-      own_.x[to] = split.points.x[i];
-      own_.y[to] = split.points.y[i];
-      own_.z[to] = split.points.z[i];
-      if (i < split.ground_count) continue;
-      own_moving_[to] = moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count];
-    }
-  }
-
   // The image of the only sensor.
   void build_only_view(const Pose& T_world_level, const GroundSplit& split,
                        Span<const std::uint8_t> moving, ReferenceView& view) {
@@ -285,7 +250,7 @@ class ReferenceScans {
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
     if (!is_level_) {
-      const Eigen::Matrix3d R_beams_level = transposed(T_level_beams_.front().linear());
+      const Eigen::Matrix3d R_beams_level = T_level_beams_.front().linear().transpose();
       view.T_world_beams = rotated(T_world_level, R_beams_level);
       ground = rotate(ground, R_beams_level, rotated_ground_);
       rest = rotate(rest, R_beams_level, rotated_rest_);
@@ -294,16 +259,23 @@ class ReferenceScans {
   }
 
   // The image of one of several sensors, of its own points.
-  void build_view(std::size_t sensor, const Pose& T_world_level, ReferenceView& view) {
-    const OwnPoints& own = own_of_[sensor];
-    const std::size_t rest = own.begin + own.ground_count;
-    const PointsView points =
-        PointsView(own_).subview(own.begin, own.ground_count + own.rest_count);
-    transform_points(points, PackTransform(inverted(T_level_beams_[sensor])), own_, own.begin);
+  void build_view(std::size_t sensor, const Pose& T_world_level, const GroundSplit& split,
+                  Span<const std::uint8_t> moving, ReferenceView& view) {
+    own_.points.grow(split.count + kPackWidth);
+    own_.count = own_.ground_count = 0;
+    own_moving_.clear();
+    for (std::size_t i = 0; i < split.count; ++i) {
+      if (split.sensor_of(i) != sensor) continue;
+      own_.points.set(own_.count++, split.points, i);
+      if (i < split.ground_count) {
+        ++own_.ground_count;
+      } else {
+        own_moving_.push_back(moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count]);
+      }
+    }
+    transform_points(own_.all(), PackTransform(inverted(T_level_beams_[sensor])), own_.points, 0);
     view.T_world_beams = composed(T_world_level, T_level_beams_[sensor]);
-    view.image.build(grids_[sensor], PointsView(own_).subview(own.begin, own.ground_count),
-                     PointsView(own_).subview(rest, own.rest_count),
-                     Span<const std::uint8_t>(own_moving_).subspan(rest, own.rest_count),
+    view.image.build(grids_[sensor], own_.ground(), own_.non_ground(), own_moving_,
                      lateral_margin(), scratch_);
   }
 
@@ -316,11 +288,9 @@ class ReferenceScans {
   std::vector<RangeImageGrid> grids_;  // by sensor
   std::vector<Pose> T_level_beams_;    // by sensor
   Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();  // mean origin of the sensors, level frame
-  bool is_level_ = true;  // the images of the only sensor are in the level frame
-  PointBuffer own_;       // points of several sensors, by sensor
-  std::vector<std::uint8_t> own_moving_;
-  std::vector<OwnPoints> own_of_;  // by sensor
-  std::vector<std::size_t> next_;  // by sensor
+  bool is_level_ = true;                  // the images of the only sensor are in the level frame
+  GroundSplit own_;                       // of one of several sensors
+  std::vector<std::uint8_t> own_moving_;  // by its point above the ground
   PointBuffer rotated_ground_;
   PointBuffer rotated_rest_;
   RangeImage::Scratch scratch_;

@@ -66,7 +66,7 @@ class ConcentricZones {
       const float* const xs = points.x.data();
       const float* const ys = points.y.data();
       std::int32_t* const patches = patch_of;
-      for_slices<Packs>(points.size(), [&](auto at) {
+      for_slices<Packs>(0, points.size(), [&](auto at) {
         const Float x = at.load(xs);
         const Float y = at.load(ys);
         const Float range = sqrt(x * x + y * y);

@@ -145,7 +145,7 @@ class Ingest {
       float* const zs = points_.z.data() + count_;
       std::uint32_t* const input = input_.data() + count_;
       std::size_t valid_count = 0;
-      for_slices<Packs>(length, [&](auto at) {
+      for_slices<Packs>(0, length, [&](auto at) {
         const Float x = at.load(xs);
         const Float y = at.load(ys);
         const Float z = at.load(zs);

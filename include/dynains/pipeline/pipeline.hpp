@@ -287,8 +287,8 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
       if (build_map_) final_writer_.write_flags(scan, evidence);
     });
     if (build_map_) {
-      const PointsView points = PointsView(scan.split.points).subview(0, scan.split.count);
-      timed(times.map, [&] { map_.insert(points, final_writer_.is_kept(), scan.T_world_level); });
+      timed(times.map,
+            [&] { map_.insert(scan.split.all(), final_writer_.is_kept(), scan.T_world_level); });
     }
     return verdict;
   }
@@ -320,7 +320,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
     const Eigen::Vector3d& origin = frame_.origin();
     if (residual && (frame_.rotates_scans() || !origin.isZero(0.0))) {
       Pose T_cloud_level = Pose::Identity();
-      T_cloud_level.linear() = transposed(sensor().R_level_sensor());
+      T_cloud_level.linear() = sensor().R_level_sensor().transpose();
       T_cloud_level.translation() = origin;
       const Pose T_level_sensor = inverted(T_cloud_level);
       for (auto* T : {&residual->T_previous_newest, &residual->T_previous_aligned}) {

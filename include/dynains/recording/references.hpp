@@ -184,10 +184,7 @@ class RecordingReferences {
       for (std::size_t i = 0; i < points.size(); ++i) {
         const bool is_ground = verdicts[i] == PointLabel::kGround;
         if (verdicts[i] == PointLabel::kInvalid || is_ground != takes_ground) continue;
-        split_.points.x[count] = points.x[i];
-        split_.points.y[count] = points.y[i];
-        split_.points.z[count] = points.z[i];
-        ++count;
+        split_.points.set(count++, points, i);
         if (!is_ground) moving_.push_back(verdicts[i] == PointLabel::kDynamic ? 1 : 0);
       }
       if (takes_ground) split_.ground_count = count;

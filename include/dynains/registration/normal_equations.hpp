@@ -135,18 +135,10 @@ using PoseCovariance = MatrixOf<6>;
 inline Pose moved(const Pose& T, const PoseStep& step) {
   const double w[3] = {step[3] / 2.0, step[4] / 2.0, step[5] / 2.0};
   const double scale = 1.0 / std::sqrt(1.0 + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  const double a = scale, b = scale * w[0], c = scale * w[1], d = scale * w[2];
-  const double R[3][3] = {
-      {1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)},
-      {2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d - a * b)},
-      {2.0 * (b * d - a * c), 2.0 * (c * d + a * b), 1.0 - 2.0 * (b * b + c * c)}};
+  const Quaternion turn(scale, scale * w[0], scale * w[1], scale * w[2]);
   Pose result = T;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      result(i, j) = R[i][0] * T(0, j) + R[i][1] * T(1, j) + R[i][2] * T(2, j);
-    }
-    result(i, 3) = T(i, 3) + step[static_cast<std::size_t>(i)];
-  }
+  result.linear() = composed(turn.toRotationMatrix(), T.linear());
+  for (int i = 0; i < 3; ++i) result(i, 3) += step[static_cast<std::size_t>(i)];
   return result;
 }
 

@@ -193,7 +193,7 @@ class PoseCorrection final : public MotionStage {
       for (std::size_t j = 0; j < 6; ++j) residual_->covariance[6 * i + j] = covariance[i][j];
     }
     Pose R_sensor_origin = Pose::Identity();
-    R_sensor_origin.linear() = transposed(T_origin_sensor.linear());
+    R_sensor_origin.linear() = T_origin_sensor.linear().transpose();
     residual_->covariance = transported_covariance(residual_->covariance, R_sensor_origin);
   }
 

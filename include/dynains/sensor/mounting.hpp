@@ -44,11 +44,7 @@ struct Mounting {
     }
     // 1 / (1 + z), without cancellation near z = -1.
     const double k = z < 0.0 ? (1.0 - z) / across : 1.0 / (1.0 + z);
-    const double rows[3][3] = {
-        {1.0 - k * x * x, -k * x * y, -x}, {-k * x * y, 1.0 - k * y * y, -y}, {x, y, z}};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) R(i, j) = rows[i][j];
-    }
+    R << 1.0 - k * x * x, -k * x * y, -x, -k * x * y, 1.0 - k * y * y, -y, x, y, z;
     return R;
   }
 };
@@ -411,9 +407,7 @@ class LevelFrame {
     std::size_t count = 0;
     own.grow(scan.size() + kPackWidth);
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      own.x[count] = scan.x[k];
-      own.y[count] = scan.y[k];
-      own.z[count] = scan.z[k];
+      own.set(count, scan, k);
       count += (sensor_of.empty() ? 0U : sensor_of[k]) == i ? 1 : 0;
     }
     const PointsView points = PointsView(own).subview(0, count);

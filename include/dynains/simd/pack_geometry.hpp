@@ -54,7 +54,7 @@ struct PackTransform {
       : row{row_of(T, scale, 0), row_of(T, scale, 1), row_of(T, scale, 2)} {}
 
   static PackTransform rotation(const Eigen::Matrix3d& R) {
-    return PackTransform(rotated(Pose::Identity(), transposed(R)));
+    return PackTransform(rotated(Pose::Identity(), R.transpose()));
   }
 
   /// Coordinate number `axis` of the transformed points.

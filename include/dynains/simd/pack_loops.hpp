@@ -17,9 +17,6 @@ namespace dynains::detail {
 /// Bits of a word. Loops take so many numbers at a time, with one bit for each.
 inline constexpr std::size_t kWordBits = 64;
 
-/// Bits of half a number of 32 bits.
-inline constexpr int kHalfBits = 16;
-
 /// Eight bytes for each value of a byte.
 using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
 
@@ -85,9 +82,7 @@ void with_packs(Kernel&& kernel) {
 }
 
 #if defined(__clang__)
-// Without these attributes, Clang inlines only direct calls into with_avx2.
-template <class Packs, class Kernel>
-[[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t count, Kernel&& kernel);
+// Without this attribute, Clang inlines only direct calls into with_avx2.
 template <class Packs, class Kernel>
 [[gnu::always_inline, gnu::flatten]] void for_slices(std::size_t begin, std::size_t end,
                                                      Kernel&& kernel);
@@ -186,15 +181,11 @@ void for_slices(std::size_t begin, std::size_t end, Kernel&& kernel) {
   }
   if (begin < end) kernel(PackSlice<Packs, true>(begin, end));
 }
-template <class Packs, class Kernel>
-void for_slices(std::size_t count, Kernel&& kernel) {
-  for_slices<Packs>(0, count, kernel);
-}
 
 /// Calls `kernel(PackSlice)` for [0, count) in order, with the packs of with_packs().
 template <class Kernel>
 void for_packs(std::size_t count, Kernel&& kernel) {
-  with_packs([&](auto packs) { for_slices<decltype(packs)>(count, kernel); });
+  with_packs([&](auto packs) { for_slices<decltype(packs)>(0, count, kernel); });
 }
 
 }  // namespace dynains::detail

@@ -59,11 +59,10 @@ class ShortNumbers {
     const std::uint32_t* const from = numbers.data();
     std::uint16_t* const lower = lower_.data();
     for (std::size_t i = 0; i < count; ++i) lower[i] = static_cast<std::uint16_t>(from[i]);
-    for_each_run<Packs, kHalfBits>(
+    for_each_run<Packs, 16>(
         count,
         [&](std::size_t begin, std::size_t) {
-          runs_.push_back(
-              {static_cast<std::uint32_t>(begin), from[begin] >> kHalfBits << kHalfBits});
+          runs_.push_back({static_cast<std::uint32_t>(begin), from[begin] >> 16 << 16});
         },
         from);
   }
