@@ -210,7 +210,7 @@ class Pipeline final : public RemoverPipeline<Stages>, private NewestVerdictMake
   // use SensorModel::typical() until a scan has enough points.
   void find_sensor(ScanSlot& newest) {
     const bool is_turned = frame_.rotates_scans();
-    frame_.estimate(ingest_.points(), ingest_.valid_sensors(), newest.split.points);
+    frame_.estimate(ingest_.points(), ingest_.valid_sensors(), newest.split.points, other_.get());
     if (sensor().known() && newest.scan > 0) scans_.begin_epoch(newest, EpochReason::kSensor);
     const SensorModel typical = SensorModel::typical();
     const SensorModel& model = sensor().known() ? sensor() : typical;

@@ -17,6 +17,7 @@
 #include "dynains/sensor/sensor_model.hpp"
 #include "dynains/simd/pack_geometry.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "dynains/threads/background.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -355,13 +356,14 @@ class LevelFrame {
   /// Estimates the models of the sensors from a scan: m, relative to origin(), in the axes of the
   /// cloud, or in those of the level frame if rotates_scans(), which then stays. `sensor_of`: by
   /// point; empty for one sensor. Nothing changes if the scan has too few points. `headed`: memory
-  /// for the scan.
-  void estimate(PointsView scan, Span<const std::uint8_t> sensor_of, PointBuffer& headed) {
+  /// for the scan. `other`: a thread that helps; null for none.
+  void estimate(PointsView scan, Span<const std::uint8_t> sensor_of, PointBuffer& headed,
+                Background* other = nullptr) {
     Eigen::Matrix3d R_scan_cloud = Eigen::Matrix3d::Identity();
     if (rotates_scans()) {
       R_scan_cloud = sensor_.R_level_sensor();
     } else if (!sensor_.known()) {
-      sensor_ = estimate_all(scan, headed);
+      sensor_ = estimate_all(scan, headed, other);
       if (!sensor_.known()) return;
     }
     if (is_one_) {
@@ -380,13 +382,16 @@ class LevelFrame {
   }
 
  private:
-  SensorModel estimate_all(PointsView scan, PointBuffer& headed) const {
+  SensorModel estimate_all(PointsView scan, PointBuffer& headed, Background* other) const {
     Eigen::Matrix3d R_headed_sensor = Eigen::Matrix3d::Identity();
     if (is_enabled_) R_headed_sensor = R_headed(estimate_heading(scan));
     const PointsView points = rotate(scan, R_headed_sensor, headed);
-    SensorModel sensor = estimate_sensor_model(points);
+    SensorModel sensor;
+    Mounting mounting;
+    run_both(
+        other, [&] { sensor = estimate_sensor_model(points); },
+        [&] { mounting = estimate_mounting(points); });
     if (!sensor.known()) return sensor;
-    const Mounting mounting = estimate_mounting(points);
     if (mounting.known) sensor.height = mounting.height;
     if (is_enabled_) {
       sensor.R_headed_sensor = R_headed_sensor;
