@@ -193,9 +193,9 @@ void Overview::add(const JudgedScan& judged) {
   for (std::size_t i = 0; i < verdict.labels.size(); i += static_step_) {
     if (!is_static(verdict.labels[i])) continue;
     const Eigen::Vector3d p = T_world_sensor * scan.point(i).position;
-    Pixel* const pixel = pixel_at(p);
-    if (pixel != nullptr)
-      pixel->add_static(static_cast<float>(p.z()), shade(p.z() - sensor_height));
+    if (Pixel* const pixel = pixel_at(p)) {
+      pixel->grey = std::min(pixel->grey, shade(p.z() - sensor_height));
+    }
   }
   for_each_moving(verdict.labels, [&](std::size_t i) {
     if (Pixel* pixel = pixel_at(T_world_sensor * scan.point(i).position)) pixel->has_moving = true;

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <vector>
 
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -70,16 +69,10 @@ class Overview {
 
  private:
   struct Pixel {
-    float height = -std::numeric_limits<float>::infinity();  // m, of the highest static point
-    std::uint8_t grey = 0;                                   // of the highest static point
+    std::uint8_t grey = 255;  // of the darkest static point; 255: none
     bool has_moving = false;
 
-    void add_static(float height_of_point, std::uint8_t grey_of_point) {
-      if (!(height_of_point > height)) return;
-      height = height_of_point;
-      grey = grey_of_point;
-    }
-    bool has_static() const { return height > -std::numeric_limits<float>::infinity(); }
+    bool has_static() const { return grey < 255; }
   };
 
   /// The pixel of a point (m, world); null outside of the picture.
