@@ -75,12 +75,7 @@ inline Pose inverted(const Pose& T_a_b) {
 /// T_a_b from T_a_c and R_b_c. Frames b and c have a common origin.
 inline Pose rotated(const Pose& T_a_c, const Eigen::Matrix3d& R_b_c) {
   Pose T_a_b = T_a_c;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      T_a_b(i, j) =
-          T_a_c(i, 0) * R_b_c(j, 0) + T_a_c(i, 1) * R_b_c(j, 1) + T_a_c(i, 2) * R_b_c(j, 2);
-    }
-  }
+  T_a_b.linear() = composed(T_a_c.linear(), R_b_c.transpose());
   return T_a_b;
 }
 

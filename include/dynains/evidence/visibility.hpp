@@ -93,10 +93,11 @@ class Visibility {
  private:
   // Adds eight bits to eight bytes, as one number: no sum exceeds its byte.
   static void add_bits(std::uint8_t bits, std::uint8_t* bytes) {
-    std::uint64_t sum, more;
+    std::uint64_t sum;
     std::memcpy(&sum, bytes, sizeof(sum));
-    std::memcpy(&more, kBytesOfBits[bits].data(), sizeof(more));
-    sum += more;
+    // Each byte has one of the bits, then 1 if it is set.
+    const std::uint64_t spread = bits * 0x0101010101010101U & 0x8040201008040201U;
+    sum += (spread + 0x7F7F7F7F7F7F7F7FU) >> 7U & 0x0101010101010101U;
     std::memcpy(bytes, &sum, sizeof(sum));
   }
   static std::uint64_t word_from(const std::vector<std::uint8_t>& bits, std::size_t first) {

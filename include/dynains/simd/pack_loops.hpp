@@ -6,7 +6,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -16,19 +15,6 @@ namespace dynains::detail {
 
 /// Bits of a word. Loops take so many numbers at a time, with one bit for each.
 inline constexpr std::size_t kWordBits = 64;
-
-/// Eight bytes for each value of a byte.
-using BytesByByte = std::array<std::array<std::uint8_t, 8>, 256>;
-
-constexpr BytesByByte spread_bits() {
-  BytesByByte bits{};
-  for (std::size_t i = 0; i < bits.size(); ++i) {
-    for (std::size_t bit = 0; bit < 8; ++bit) bits[i][bit] = i >> bit & 1U;
-  }
-  return bits;
-}
-/// The bits of a byte, each as a byte that is 0 or 1.
-inline constexpr BytesByByte kBytesOfBits = spread_bits();
 
 /// Number of set bits. Without -mpopcnt, the builtin function would call a library function.
 constexpr std::uint32_t count_ones(std::uint64_t bits) {
