@@ -315,24 +315,42 @@ TEST_CASE("one scan alone is told") {
   CHECK_THAT(outcome.err, ContainsSubstring("one scan alone"));
 }
 
-TEST_CASE("check and run propose the mounting of a sensor that lies on its side") {
-  const Drive drive;
-  // Nose down by 60 deg, which the estimate of the mounting does not reach.
-  const double pitch = 60.0 * M_PI / 180.0;
+/// Turns the sensor of a drive nose down by this angle (deg), in addition.
+void turn_down(const Drive& drive, double angle) {
   Pose T_level_sensor = Pose::Identity();
-  T_level_sensor.linear() = Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  T_level_sensor.linear() =
+      Eigen::AngleAxisd(angle * M_PI / 180.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
   drive.move_points([&](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
     return Eigen::Vector3d(T_level_sensor.linear().transpose() * p);
   });
   drive.with_poses([&](std::size_t, const Pose& T) { return Pose(T * T_level_sensor); });
+}
+
+/// The pitch (deg) that `dynains check` proposes for the mounting.
+double proposed_pitch(const Drive& drive) {
   const std::string told = start({"check", drive.path()}).out;
   CAPTURE(told);
   const std::size_t at = told.find("--mounting-pitch ");
   REQUIRE(at != std::string::npos);
-  CHECK(std::stod(told.substr(at + 17)) == Approx(60.0).margin(3.0));
   CHECK_THAT(told, !ContainsSubstring("no option is needed"));
+  return std::stod(told.substr(at + 17));
+}
+
+TEST_CASE("check and run propose the mounting of a sensor that lies on its side") {
+  const Drive drive;
+  turn_down(drive, 60.0);  // which the estimate of the mounting does not reach
+  CHECK(proposed_pitch(drive) == Approx(60.0).margin(3.0));
   CHECK_THAT(drive.run().err, ContainsSubstring("tilted by 60 deg: pass --mounting-pitch "));
   CHECK(drive.run({"--mounting-pitch", "60"}).err.empty());
+}
+
+TEST_CASE("check proposes the mounting of a sensor that looks down from 10 m, as on a drone") {
+  auto config = drive_of(simulation::Scene::kCarPark, simulation::Sensor::kOs1_64, 12, 9);
+  config.sensor_height = 10.0;
+  config.mounting_pitch = 45.0;
+  const Drive drive(config);
+  turn_down(drive, 45.0);
+  CHECK(proposed_pitch(drive) == Approx(90.0).margin(3.0));
 }
 
 TEST_CASE("run refuses clouds in the frame of a body, and names where their beams begin") {

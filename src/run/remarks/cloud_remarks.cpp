@@ -38,9 +38,9 @@ bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::I
   return count >= kMin && off_grid * 20 <= count;
 }
 
-/// Upward normals (sensor frame) under which scan i has ground below the sensor, for a sensor that
-/// lies on one of its sides.
-std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan) {
+/// Upward normals (sensor frame) under which a scan has ground below the sensor, for a sensor that
+/// lies on one of its sides, 0.2 to 5 times `scale` m over the ground.
+std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan, double scale) {
   std::vector<Eigen::Vector3d> normals;
   const auto z = Eigen::Vector3d::UnitZ();
   for (const Eigen::Vector3d& up : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0),
@@ -51,7 +51,7 @@ std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan) {
     R.row(2) = up;
     PointBuffer turned;
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Eigen::Vector3d p = R * scan.point(i).position;
+      const Eigen::Vector3d p = R * scan.point(i).position / scale;
       if (!p.allFinite() || p.isZero(0.0)) continue;
       turned.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
                        static_cast<float>(p.z()));
@@ -64,12 +64,13 @@ std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan) {
 }
 
 /// The normal of all scans of a sample that lies nearest to the z axis of the world; empty if they
-/// have none in common.
-std::optional<Eigen::Vector3d> common_normal(const Recording& recording, const ScanRange& range) {
+/// have none in common that is upward in the world. `scale`: see sideways_normals().
+std::optional<Eigen::Vector3d> common_normal(const Recording& recording, const ScanRange& range,
+                                             double scale) {
   constexpr double kNear = 0.99;  // cosine
   std::vector<Eigen::Vector3d> common;
   for (const std::size_t i : range.sample()) {
-    const std::vector<Eigen::Vector3d> found = sideways_normals(recording.read_scan(i));
+    const std::vector<Eigen::Vector3d> found = sideways_normals(recording.read_scan(i), scale);
     if (i == range.first) common = found;
     const auto is_missing = [&](const Eigen::Vector3d& normal) {
       return std::none_of(found.begin(), found.end(),
@@ -77,12 +78,12 @@ std::optional<Eigen::Vector3d> common_normal(const Recording& recording, const S
     };
     common.erase(std::remove_if(common.begin(), common.end(), is_missing), common.end());
   }
-  if (common.empty()) return std::nullopt;
   const Eigen::Vector3d z_sensor = recording.T_world_sensor(range.first).linear().row(2);
-  return *std::max_element(common.begin(), common.end(),
-                           [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-                             return a.dot(z_sensor) < b.dot(z_sensor);
-                           });
+  const auto upmost = std::max_element(
+      common.begin(), common.end(),
+      [&](const auto& a, const auto& b) { return a.dot(z_sensor) < b.dot(z_sensor); });
+  if (upmost == common.end() || upmost->dot(z_sensor) < 0.5) return std::nullopt;
+  return *upmost;
 }
 
 /// A remark if the points of a scan lie on a grid of 5 cm or more.
@@ -164,14 +165,19 @@ std::optional<std::string> remark_on_tilt(const Recording& recording, const Scan
   for (const std::size_t i : range.sample()) {
     if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
   }
-  const auto up = common_normal(recording, range);
+  std::optional<Eigen::Vector3d> up;
+  for (const double scale : {1.0, 4.0}) {  // also from a drone
+    if (!up) up = common_normal(recording, range, scale);
+  }
   if (!up) return std::nullopt;  // as in a lift
   const auto degrees = [](double radians) {
     return std::to_string(std::lround(180.0 / M_PI * radians));
   };
+  const bool has_roll = std::hypot(up->y(), up->z()) > 0.05;  // else x is upright
+  const double roll = has_roll ? std::atan2(up->y(), up->z()) : 0.0;
   return "the sensor seems to be tilted by " + degrees(std::acos(std::clamp(up->z(), -1.0, 1.0))) +
          " deg: pass --mounting-pitch " + degrees(std::asin(std::clamp(-up->x(), -1.0, 1.0))) +
-         " --mounting-roll " + degrees(std::atan2(up->y(), up->z()));
+         " --mounting-roll " + degrees(roll);
 }
 
 }  // namespace
