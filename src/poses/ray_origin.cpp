@@ -147,12 +147,12 @@ struct RayOrigin {
 
 /// Gauss-Newton steps from an origin at this height (m). The scale of their weights is the median
 /// change of the elevation along a beam, which shrinks to the noise of the directions. Empty if
-/// there is no end, or if points do not lie on rings around it. Straight above the given origin if
-/// noise hides the rest.
+/// there is no end, or if points do not lie on rings around it. Straight above the given origin
+/// unless changes are far larger there: noise seems smaller from aside, farther from near points.
 std::optional<RayOrigin> fit_origin(const Points& points, double height) {
   constexpr int kMaxSteps = 15;
   constexpr double kMinScale = 1e-5;                // rad, as coordinates are rounded
-  constexpr double kMinOnRings = 0.3, kSame = 1.3;  // ratios
+  constexpr double kMinOnRings = 0.3, kSame = 3.0;  // ratios
   constexpr double kFarthest = 6.0;  // m, beyond any vehicle; from afar, other patterns seem flat
   Rays rays{{0.0, 0.0, height}};
   for (int k = 0; k < kMaxSteps; ++k) {

@@ -292,6 +292,12 @@ TEST_CASE("The height of an origin is measured also from beams with noise of the
   CHECK(std::abs(d.proposal.sensor_origin.z() - origin.z()) < 0.1);
 }
 
+TEST_CASE("Noise of directions beside a near wall does not shift the origin of beams") {
+  auto config = simulation::random_world(840048);  // 16 beams, 0.37 m over a car park
+  config.scans = 20;
+  CHECK(diagnose(Recording(Drive(config).path())).sound());
+}
+
 TEST_CASE("Clouds without rings, of one time or not, say nothing of the origin of their beams") {
   const auto sensor = GENERATE(simulation::Sensor::kMid360, simulation::Sensor::kLivox);
   const Drive drive(drive_of(simulation::Scene::kUrban, sensor, 12, 5));
