@@ -398,13 +398,11 @@ class ObjectTracks {
   // sensor. Only the hidden part is added: the squared cosine of the angle between length and view.
   MovingObject with_hidden_length(MovingObject object) const {
     constexpr double kCarWidth = 1.3, kCarLength = 4.5;  // m: the narrowest, and a usual one
-    const Eigen::Vector2d axis = axes_of(object.yaw).col(0), view = from_sensor(object);
-    const double away = axis.dot(view), cosine = axis.dot(view.normalized());
-    if (object.width < kCarWidth || object.length >= kCarLength || away == 0.0) return object;
+    if (object.width < kCarWidth || object.length >= kCarLength) return object;
+    const Eigen::Vector2d axis = axes_of(object.yaw).col(0);
+    const double cosine = axis.dot(from_sensor(object).normalized());
     const double hidden = (kCarLength - object.length) * cosine * cosine;
-    // Beside the sensor both ends are seen.
-    const double side = away / std::max(0.5 * object.length, std::abs(away));
-    object.centre.head<2>() += 0.5 * side * hidden * axis;
+    object.centre.head<2>() += 0.5 * std::copysign(hidden, cosine) * axis;
     object.length += hidden;
     return object;
   }
