@@ -10,8 +10,6 @@
 namespace dynains::grid {
 namespace {
 
-constexpr std::int64_t kGap = 3;  // cells of a wall without points; no robot passes it
-
 /// The part of a beam that is lower than `low`, as shares of its way. `from`, `to`: m over ground.
 std::array<double, 2> low_part(double from, double to, double low) {
   const double crossing = (low - from) / (to - from);
@@ -55,18 +53,17 @@ GridMaker::Cell* GridMaker::cell_at(const Eigen::Vector3d& position) {
 }
 
 void GridMaker::add(const Eigen::Vector3d& point, bool is_moving) {
-  Cell* const cell = cell_at(point);
+  const std::int64_t x = columns_.along(0, point.x()), y = columns_.along(1, point.y());
   const std::optional<Floors::Height> height = height_of(point);
-  if (cell == nullptr || !height || height->over_floor > config_.max_height) return;
+  if (!columns_.contains(x, y) || !height || height->over_floor > config_.max_height) return;
+  Cell& cell = cells_[columns_.index(x, y)];
   const bool is_ground = height->over_floor < config_.min_height;
-  cell->is_free = cell->is_free || (is_ground && !is_moving);
-  if (!is_moving && !is_ground) {
-    return add_obstacle(columns_.along(0, point.x()), columns_.along(1, point.y()));
-  }
+  cell.is_free = cell.is_free || (is_ground && !is_moving);
+  if (!is_moving && !is_ground) return add_obstacle(x, y);
   // The upper end of a step does not show that the step is none.
   if (!is_moving && height->over_lowest >= 2.0 * config_.min_height) return;
-  if (cell->latest_obstacle != static_cast<std::uint8_t>(scan_)) {
-    count(cell->clear, cell->latest_clear, *cell);
+  if (cell.latest_obstacle != static_cast<std::uint8_t>(scan_)) {
+    count(cell.clear, cell.latest_clear, cell);
   }
 }
 
@@ -159,30 +156,35 @@ OccupancyGrid GridMaker::grid() const {
   return grid;
 }
 
-/// Cells on the line between two obstacles near each other become occupied, so that walls have no
-/// holes between their points.
+/// Cells between two obstacles near each other become occupied, so that walls have no holes, unless
+/// a third one is nearer to both: lines by it connect them (relative neighbourhood graph).
 void GridMaker::close_gaps(OccupancyGrid& grid) const {
   const std::vector<CellState> before = grid.cells;
   const auto is_occupied = [&](std::int64_t x, std::int64_t y) {
     return columns_.contains(x, y) && before[columns_.index(x, y)] == CellState::kOccupied;
   };
-  const std::int64_t most = std::max(kGap, reach_ + reach_ / 2) + 1;
-  const auto connect = [&](std::int64_t x, std::int64_t y, std::int64_t dx, std::int64_t dy) {
-    const std::int64_t steps = std::max(std::abs(dx), std::abs(dy));
-    for (std::int64_t k = 1; k < steps; ++k) {
-      const auto along = [&](std::int64_t d) {
-        return static_cast<std::int64_t>(
-            std::llround(static_cast<double>(k * d) / static_cast<double>(steps)));
-      };
-      grid.cells[columns_.index(x + along(dx), y + along(dy))] = CellState::kOccupied;
+  // Cells: no robot passes a gap of three, and thinned points are farther apart.
+  const int most = static_cast<int>(std::max<std::int64_t>(3, reach_ + reach_ / 2)) + 1;
+  const auto has_middle = [&](std::int64_t x, std::int64_t y, int dx, int dy) {
+    const auto is_near = [&](int u, int v) { return u * u + v * v < dx * dx + dy * dy; };
+    for (int v = -most; v <= most; ++v) {
+      for (int u = -most; u <= most; ++u) {
+        if (is_near(u, v) && is_near(u - dx, v - dy) && is_occupied(x + u, y + v)) return true;
+      }
     }
+    return false;
   };
   for (std::int64_t y = 0; y < columns_.height; ++y) {
     for (std::int64_t x = 0; x < columns_.width; ++x) {
       if (!is_occupied(x, y)) continue;
-      for (std::int64_t dy = 0; dy <= most; ++dy) {
-        for (std::int64_t dx = dy == 0 ? 2 : -most; dx <= most; ++dx) {
-          if (is_occupied(x + dx, y + dy)) connect(x, y, dx, dy);
+      for (int dy = 0; dy <= most; ++dy) {
+        for (int dx = dy == 0 ? 2 : -most; dx <= most; ++dx) {
+          if (!is_occupied(x + dx, y + dy) || has_middle(x, y, dx, dy)) continue;
+          const double steps = std::max(std::abs(dx), dy);
+          for (int k = 1; k < steps; ++k) {
+            grid.cells[columns_.index(x + std::llround(k * dx / steps),
+                                      y + std::llround(k * dy / steps))] = CellState::kOccupied;
+          }
         }
       }
     }

@@ -83,6 +83,17 @@ TEST_CASE("a wall is occupied without holes, the ground free, and all else unkno
   CHECK(state_at(grid, 13.0, 4.0) == CellState::kUnknown);
 }
 
+TEST_CASE("the ground in the corner of two walls stays free, and gaps of walls do not") {
+  Place place;
+  for (int i = 0; i < 12; ++i) {
+    place.raise(4.02 + 0.05 * i, 4.02, 0.3, 1.5);
+    if (i != 8) place.raise(4.02, 4.02 + 0.05 * i, 0.3, 1.5);
+  }
+  const OccupancyGrid grid = place.grid();
+  CHECK(state_at(grid, 4.12, 4.12) == CellState::kFree);
+  CHECK(state_at(grid, 4.02, 4.42) == CellState::kOccupied);
+}
+
 TEST_CASE("ramps, kerbs, storeys and crowns are no obstacles") {
   Place place;
   SECTION("a ramp of 20 %") {
