@@ -127,8 +127,7 @@ std::vector<Floors::Floor> Floors::lowest_of_spans() const {
 }
 
 /// The floors of surfaces that are large, or the largest ones there are, and were seen from above.
-std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors,
-                                                  double step) const {
+std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floors, double step) {
   constexpr double kCell = 1.0;  // m: a gap without ground that does not end a surface
   VoxelHashTable<> numbers;
   std::vector<VoxelKey> keys;
@@ -150,9 +149,9 @@ std::vector<Floors::Floor> Floors::large_surfaces(const std::vector<Floor>& floo
                                      [&](std::uint32_t cell) { return is_seen_from_above[cell]; });
     for (const std::uint32_t cell : members) size[cell] = is_seen ? members.size() : 0;
   });
-  // The roof of a car is smaller than ten cells.
-  const std::size_t least = std::clamp<std::size_t>(
-      size.empty() ? 1 : *std::max_element(size.begin(), size.end()), 1, 10);
+  const std::size_t largest = size.empty() ? 0 : *std::max_element(size.begin(), size.end());
+  is_small_ = largest < 10;  // cells: the roof of a car is smaller
+  const std::size_t least = std::clamp<std::size_t>(largest, 1, 10);
   std::vector<Floor> large;
   for (std::size_t i = 0; i < floors.size(); ++i) {
     if (size[cell_of[i]] >= least) large.push_back(floors[i]);

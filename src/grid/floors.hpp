@@ -35,6 +35,8 @@ class Floors {
   /// `step` (m). Throws IoError if there is none, or the area is too large for a grid with
   /// `resolution` (m).
   void finish(double step, double resolution);
+  /// After finish(): whether no floor is larger than the roof of a car.
+  bool is_small() const { return is_small_; }
 
   /// Heights of a point, m.
   struct Height {
@@ -70,12 +72,13 @@ class Floors {
                           columns_.along(1, (static_cast<double>(floor.y) + 0.5) * kEdge));
   }
   std::vector<Floor> lowest_of_spans() const;
-  std::vector<Floor> large_surfaces(const std::vector<Floor>& floors, double step) const;
+  std::vector<Floor> large_surfaces(const std::vector<Floor>& floors, double step);
   bool has_floor(std::int64_t x, std::int64_t y) const {
     return columns_.contains(x, y) && is_seen_[columns_.index(x, y)];
   }
 
   std::string place_;
+  bool is_small_ = false;
   VoxelHashTable<> numbers_;
   std::vector<VoxelKey> keys_;  // of the bins
   std::vector<Bin> bins_;

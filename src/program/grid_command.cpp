@@ -49,7 +49,6 @@ struct GridOptions {
 PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
                            const Recording& recording) {
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
-  if (scans.size() == 1) print_warning(kGridOfOneScan);
   Progress progress(2 * scans.size(), "scans", options.quiet);
   const VerdictFiles files(out.path());
   VerdictArrays verdict;
@@ -89,6 +88,7 @@ void write(GridOptions& options) {
   const InterruptGuard interrupt;
   const PlacedGrid made =
       recording ? grid_of_results(options, *run, *recording) : grid_of_map(source, options.config);
+  for (const std::string& doubt : made.doubts) print_warning(doubt);
   grid::write_grid(image.path(), description.path(), made.grid, made.origin);
   image.put_in_place([&] { description.put_in_place(); });
   if (!options.quiet) print_grid(description.target(), made.summary());

@@ -206,7 +206,6 @@ nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& pl
                                   const PointStore& labels, const Warn& warn) {
   std::vector<std::size_t> scans(plan.range.size());
   std::iota(scans.begin(), scans.end(), plan.range.first);
-  if (scans.size() == 1) warn(kGridOfOneScan);
   const PlacedGrid made = grid_of_run(
       [&](std::size_t i, const RecordedScan&, std::vector<PointLabel>& of_scan) {
         labels.read(i - plan.range.first, of_scan);
@@ -214,6 +213,7 @@ nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& pl
       plan.sequence, scans, plan.settings.outputs.grid_config, false,
       [](std::size_t) { return InterruptGuard::signal() == 0; });
   if (InterruptGuard::signal() != 0) return nullptr;
+  for (const std::string& doubt : made.doubts) warn(doubt);
   grid::write_grid(outside.image, outside.grid, made.grid, made.origin);
   return made.summary();
 }

@@ -54,6 +54,19 @@ double spacing_of(const std::vector<Eigen::Vector3d>& points) {
   });
 }
 
+PlacedGrid placed(const grid::GridMaker& maker, const Eigen::Vector3d& place,
+                  const grid::Floors& floors, bool is_one_scan) {
+  PlacedGrid made{maker.grid(), place.head<2>()};
+  if (is_one_scan) {
+    made.doubts.emplace_back("the grid is of one scan: nothing shows what in it moves");
+  }
+  if (floors.is_small()) {
+    made.doubts.emplace_back(
+        "the grid has less than 10 m2 of ground in one piece: what is lowest counted as ground");
+  }
+  return made;
+}
+
 }  // namespace
 
 fs::path grid_file(const fs::path& name) {
@@ -116,7 +129,7 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
     for (std::size_t k = 0; k < sensors.size(); ++k) maker.add_beams(places[k], ends[k]);
     if (!progress(++done)) return {};
   }
-  return {maker.grid(), place.head<2>()};
+  return placed(maker, place, floors, scans.size() == 1);
 }
 
 PlacedGrid grid_of_map(const fs::path& map, const grid::Config& config) {
@@ -135,7 +148,7 @@ PlacedGrid grid_of_map(const fs::path& map, const grid::Config& config) {
     maker.begin_scan();
     maker.add(point, false);
   }
-  return {maker.grid(), place.head<2>()};
+  return placed(maker, place, floors, false);
 }
 
 }  // namespace dynains::run

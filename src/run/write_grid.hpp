@@ -5,16 +5,13 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "grid/grid_maker.hpp"
 
 namespace dynains::run {
-
-/// Warning about the scans of a grid.
-inline constexpr const char* kGridOfOneScan =
-    "the grid is of one scan: nothing shows what in it moves";
 
 /// The description of a grid, by whole_path(). Throws ConfigError unless the name ends in .yaml.
 std::filesystem::path grid_file(const std::filesystem::path& name);
@@ -25,6 +22,7 @@ std::filesystem::path grid_image(const std::filesystem::path& file);
 struct PlacedGrid {
   grid::OccupancyGrid grid;
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();
+  std::vector<std::string> doubts = {};  ///< for warnings
 
   /// Cells and their shares, for reports.
   nlohmann::ordered_json summary() const;

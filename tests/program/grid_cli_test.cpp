@@ -48,10 +48,15 @@ TEST_CASE("a grid of what has none is refused by one line") {
   check_refused(
       start({"grid", folder / "none.xyz", "-o", map, "--min-height", "0.9", "--max-height", "0.5"}),
       2, "min_height");
+  check_refused(start({"grid", folder / "nope", "-o", map}), 1, "nope: not found");
   check_refused(start({"grid", seq, "-o", map}), 1, "report.json: not found; expected a folder of");
   CHECK(!fs::exists(map));
   const Outcome one = succeed(start({"run", seq, "--out", out, "--grid", map, "--end", "0"}));
   CHECK_THAT(one.err, ContainsSubstring("warning: the grid is of one scan"));
+  CHECK_THAT(one.err, !ContainsSubstring("of ground in one piece"));
+  write_text(folder / "four.xyz", "0 0 0 1\n1 0 0 1\n0 1 0.5 1\n1 1 2 1\n");
+  const Outcome four = succeed(start({"grid", folder / "four.xyz", "-o", folder / "four.yaml"}));
+  CHECK_THAT(four.err, ContainsSubstring("warning: the grid has less than 10 m2 of ground"));
 }
 
 TEST_CASE("beams of a grid begin at the sensor of their point") {

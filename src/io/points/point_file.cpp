@@ -40,6 +40,7 @@ const PointFileFormat& format_to_read(const fs::path& path) {
   for (const PointFileFormat& format : kPointFileFormats) {
     if (format.extension == extension) return format;
   }
+  if (std::error_code error; !fs::exists(path, error)) fail(path, "not found");
   const std::optional<std::string> conversion = conversion_of(path);
   fail(path, conversion ? *conversion
                         : "expected a name that ends in .ply, .pcd, .las, .npy, .xyz or .csv");
