@@ -166,8 +166,7 @@ class ObjectTracks {
     parts_.assign(scan.ids.size(), Part());
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       const Track* const track = find(object_of(scan.ids[p]));
-      if (track == nullptr) continue;
-      parts_[p].named = static_cast<std::uint32_t>(track - tracks_.data());
+      if (track != nullptr) parts_[p].named = static_cast<std::uint32_t>(track - tracks_.data());
     }
   }
 
@@ -286,12 +285,16 @@ class ObjectTracks {
 
   std::uint32_t next_id() { return later_ != nullptr ? later_->next_id() : ++last_id_; }
 
+  // The place of an instance in named_, or the place behind it.
+  std::size_t place_of(std::uint32_t instance) const {
+    std::size_t i = 0;
+    while (i < named_.size() && named_[i].instance != instance) ++i;
+    return i;
+  }
   // The object of an instance, or 0.
   std::uint32_t object_of(std::uint32_t instance) const {
-    for (const Named& named : named_) {
-      if (named.instance == instance) return named.object;
-    }
-    return 0;
+    const std::size_t i = place_of(instance);
+    return i < named_.size() ? named_[i].object : 0;
   }
   const Track* find(std::uint32_t id) const {
     const auto found = std::find_if(tracks_.begin(), tracks_.end(),
@@ -344,7 +347,6 @@ class ObjectTracks {
 
   void update(const ScanSlot& scan, Track& track) {
     MovingObject& object = track.object;
-    const Track* const known = known_later(object.id);
     const Eigen::AlignedBox2f extent = choose_yaw(track);
     if (!is_size_of_object(extent.sizes().cast<double>())) {
       // It holds points of others: its instances begin tracks anew.
@@ -365,6 +367,7 @@ class ObjectTracks {
     turn(track);
     if (!track.is_directed) return;
     objects_.push_back(with_hidden_length(object));
+    const Track* const known = known_later(object.id);
     if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
   }
 
@@ -448,15 +451,9 @@ class ObjectTracks {
   void name_parts(const ScanSlot& scan) {
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       if (parts_[p].track == kNoIndex) continue;
-      const Named now = {scan.ids[p], tracks_[parts_[p].track].object.id, scan.scan};
-      const auto same = std::find_if(named_.begin(), named_.end(), [&](const Named& named) {
-        return named.instance == now.instance;
-      });
-      if (same != named_.end()) {
-        *same = now;
-      } else {
-        named_.push_back(now);
-      }
+      const std::size_t i = place_of(scan.ids[p]);
+      if (i == named_.size()) named_.emplace_back();
+      named_[i] = {scan.ids[p], tracks_[parts_[p].track].object.id, scan.scan};
     }
   }
 
