@@ -167,8 +167,9 @@ void GridMaker::close_gaps(OccupancyGrid& grid) const {
   const int most = static_cast<int>(std::max<std::int64_t>(3, reach_ + reach_ / 2)) + 1;
   const auto has_middle = [&](std::int64_t x, std::int64_t y, int dx, int dy) {
     const auto is_near = [&](int u, int v) { return u * u + v * v < dx * dx + dy * dy; };
-    for (int v = -most; v <= most; ++v) {
-      for (int u = -most; u <= most; ++u) {
+    // Lines to obstacles farther than `most` from either along an axis are not drawn.
+    for (int v = dy - most; v <= most; ++v) {
+      for (int u = std::max(-most, dx - most); u <= std::min(most, dx + most); ++u) {
         if (is_near(u, v) && is_near(u - dx, v - dy) && is_occupied(x + u, y + v)) return true;
       }
     }

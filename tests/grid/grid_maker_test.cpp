@@ -94,6 +94,17 @@ TEST_CASE("the ground in the corner of two walls stays free, and gaps of walls d
   CHECK(state_at(grid, 4.02, 4.42) == CellState::kOccupied);
 }
 
+TEST_CASE("a gap is closed unless lines by a third obstacle close it") {
+  Place place;
+  place.raise(4.02, 4.02, 0.3, 1.5);
+  place.raise(4.22, 4.22, 0.3, 1.5);
+  SECTION("four cells are joined across, by the line") {}
+  SECTION("an obstacle that is nearer to both, but has no line to one of them") {
+    place.raise(3.97, 4.22, 0.3, 1.5);
+  }
+  CHECK(state_at(place.grid(), 4.12, 4.12) == CellState::kOccupied);
+}
+
 TEST_CASE("ramps, kerbs, storeys and crowns are no obstacles") {
   Place place;
   SECTION("a ramp of 20 %") {
