@@ -64,19 +64,22 @@ void VoxelProtocol::add(const LabelledScan& scan) {
 
 // The class of a cell with points of both is that of the nearest one.
 void VoxelProtocol::resolve(const LabelledScan& scan) {
-  const auto cells_of = [&](VoxelKey key) { return &cells_[index_.find(key) * layers_]; };
+  const auto first_of = [&](VoxelKey key) { return index_.find(key) * layers_; };
   const auto is_mixed = [&](VoxelKey key) {
     if (index_.find(key) == kNoIndex) return false;
-    return std::any_of(cells_of(key), cells_of(key) + layers_,
+    const Cell* const cells = &cells_[first_of(key)];
+    return std::any_of(cells, cells + layers_,
                        [](const Cell& cell) { return detail::is_mixed(cell.truths); });
   };
   voxelise(scan, is_mixed, [&](const ScanVoxel& found) {
     for (std::size_t layer = 0; layer < layers_; ++layer) {
-      if ((found.layers >> layer & 1U) == 0) continue;
-      Cell& cell = cells_of(found.key)[layer];
+      const std::size_t number = first_of(found.key) + layer;
+      Cell& cell = cells_[number];
+      if ((found.layers >> layer & 1U) == 0 || !detail::is_mixed(cell.truths)) continue;
       const double squared = (found.point.p_world - cell.centroid()).squaredNorm();
-      if (!detail::is_nearer(squared, cell.nearest)) continue;
-      cell.nearest = squared;
+      const auto [nearest, is_first] = nearest_.try_emplace(number, squared);
+      if (!is_first && !detail::is_nearer(squared, nearest->second)) continue;
+      nearest->second = squared;
       cell.nearest_truth = found.point.truth;
     }
   });

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "dynains/evaluation/config.hpp"
@@ -82,7 +82,6 @@ class VoxelProtocol {
     std::uint32_t count = 0;
     detail::TruthMask truths = 0;
     Truth nearest_truth = Truth::kStatic;  ///< of points of both classes, by resolve()
-    double nearest = std::numeric_limits<double>::infinity();  ///< squared distance, m^2
 
     Eigen::Vector3d centroid() const { return sum / static_cast<double>(count); }
     std::optional<VoxelPoint> point() const {
@@ -108,6 +107,8 @@ class VoxelProtocol {
   VoxelHashTable<> index_;
   std::vector<VoxelKey> keys_;  // by number of voxel
   std::vector<Cell> cells_;     // by number of voxel, then by layer
+  // By place in cells_, of points of both classes: squared distance of nearest_truth, m^2.
+  std::unordered_map<std::size_t, double> nearest_;
 };
 
 }  // namespace dynains::evaluation
