@@ -131,10 +131,11 @@ TEST_CASE("only compact instances are presumed to move, from the third scan of a
   CHECK_FALSE(is_presumed({11.7F, 3.6F}));
 }
 
-TEST_CASE("the first scan of an epoch is evidence on the second one, without latency only") {
+TEST_CASE("the first scan of an epoch is evidence on the second one until a third one comes") {
   Watch watch(FreeSpaceConfig{});
   watch.see(PointBuffer()).see(car());
   CHECK(watch.causes(1, false).count(Cause::kFreeSpace) == 1);
+  CHECK(watch.causes(1, true).count(Cause::kFreeSpace) == 1);
   watch.see(PointBuffer(), PointBuffer());
   CHECK(watch.causes(1, true) == Causes{Cause::kNoEvidence});
 

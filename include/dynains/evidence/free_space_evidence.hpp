@@ -230,7 +230,7 @@ class FreeSpaceEvidence {
 
   // The first scan of an epoch is the only reference of the second one, and shows what moves fast.
   // It is adjacent: what moves slowly still hides the places that it left. So its hits serve only
-  // for the verdict without latency.
+  // until a third scan comes: for the verdict without latency, or if none comes.
   void forget_adjacent(detail::InstanceEvidence& evidence) const {
     updater_.begin(evidence.samples, evidence.beliefs);
   }
