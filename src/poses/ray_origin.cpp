@@ -108,6 +108,15 @@ double median_size(const std::vector<Change>& changes) {
   return median(std::move(sizes));
 }
 
+/// Median distance of the elevations from their median, rad.
+double spread_of(const std::vector<SeenPoint>& seen) {
+  std::vector<double> elevations;
+  for (const SeenPoint& point : seen) elevations.push_back(point.elevation);
+  const double middle = median(elevations);
+  for (double& elevation : elevations) elevation = std::abs(elevation - middle);
+  return median(std::move(elevations));
+}
+
 /// How many more of the points than of directions above them have an elevation (within `near`, rad)
 /// that occurs again behind the next step of azimuth, as a share. About 0 unless beams turn.
 double share_on_rings(const std::vector<SeenPoint>& seen, double near) {
@@ -153,6 +162,8 @@ std::optional<RayOrigin> fit_origin(const Points& points, double height) {
   constexpr int kMaxSteps = 15;
   constexpr double kMinScale = 1e-5;                // rad, as coordinates are rounded
   constexpr double kMinOnRings = 0.3, kSame = 3.0;  // ratios
+  // From within a plane, such as the ground, all of its points seem to be of one beam.
+  constexpr double kMinSpread = 0.5 * kRadians;
   constexpr double kFarthest = 6.0;  // m, beyond any vehicle; from afar, other patterns seem flat
   Rays rays{{0.0, 0.0, height}};
   for (int k = 0; k < kMaxSteps; ++k) {
@@ -175,6 +186,7 @@ std::optional<RayOrigin> fit_origin(const Points& points, double height) {
     const double rest = way.norm() / (0.002 + deviation.norm());
     if (rest > (k + 1 < kMaxSteps ? 0.5 : 3.0)) continue;
     if (share_on_rings(seen, 3.0 * scale) < kMinOnRings) break;
+    if (spread_of(seen) < kMinSpread) break;
     const Rays above{{0.0, 0.0, rays.origin.z()}, rays.axis};
     const double change =
         median_size(changes_along_beams(points, seen_points(points, above), above));
