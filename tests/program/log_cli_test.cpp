@@ -93,9 +93,9 @@ TEST_CASE("Memory for reading does not grow with the log") {
     REQUIRE_THAT(outcome.out, ContainsSubstring(std::to_string(clouds) + " scans with a pose"));
     return process.peak_memory();
   };
-  const std::size_t least = peak_memory(10);
+  const std::size_t least = peak_memory(50);  // more than the sample of a check
   CHECK(least > kMegabyte);
-  CHECK(peak_memory(200) < least + 4 * kMegabyte);  // of 96 MB
+  CHECK(peak_memory(200) < least + 2 * kMegabyte);  // of 72 MB more
 }
 
 TEST_CASE("run, check and eval read a log as the folder of its scans, a truncated one to its end") {
