@@ -104,6 +104,7 @@ std::vector<Change> changes_along_beams(const Points& points, const std::vector<
 
 double median_size(const std::vector<Change>& changes) {
   std::vector<double> sizes;
+  sizes.reserve(changes.size());
   for (const Change& change : changes) sizes.push_back(std::abs(change.size));
   return median(std::move(sizes));
 }
@@ -111,6 +112,7 @@ double median_size(const std::vector<Change>& changes) {
 /// Median distance of the elevations from their median, rad.
 double spread_of(const std::vector<SeenPoint>& seen) {
   std::vector<double> elevations;
+  elevations.reserve(seen.size());
   for (const SeenPoint& point : seen) elevations.push_back(point.elevation);
   const double middle = median(elevations);
   for (double& elevation : elevations) elevation = std::abs(elevation - middle);
