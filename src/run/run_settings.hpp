@@ -30,7 +30,7 @@ struct ResultNames {
 };
 inline constexpr ResultNames kResultNames;
 
-/// Of clean scans, for scans of this format.
+/// Extension of the files of clean scans. `format`: of the scans of the recording.
 inline const char* clean_extension(ScanFormat format) {
   return format == ScanFormat::kBin ? ".bin" : format == ScanFormat::kPly ? ".ply" : ".pcd";
 }

@@ -28,7 +28,7 @@ struct FilePoint {
   std::uint16_t ring = 0;
   double time = 0.0;
   std::uint16_t session = 0;
-  // Of LAS alone, beside position and intensity.
+  // The fields below are written to LAS files only.
   double scan_time = 0.0;      ///< s, in the field of the time of GPS
   bool is_ground = false;      ///< class 2 of ASPRS; others are of class 1
   float belief = 0.0F;         ///< extra bytes `belief`: probability of being dynamic, [0, 1]

@@ -252,8 +252,7 @@ std::string advice(const Recording& recording, const Diagnosis& d) {
     case PoseVerdict::kNoMotion:
       if (d.step * static_cast<double>(d.stride) > 1.0 || d.standing.share < 0.5) {
         return "Too few surfaces are beside the way to determine what the poses mean; nothing "
-               "speaks "
-               "against them.";
+               "speaks against them.";
       }
       return "The sensor hardly moves, so that scans agree whatever the poses mean; nothing speaks "
              "against them.";
