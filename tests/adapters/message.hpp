@@ -1,13 +1,7 @@
 // A PointCloud2 replacement, and messages with point coordinates that are worked out by hand.
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <cstring>
-#include <string>
-#include <vector>
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -2,8 +2,6 @@
 
 #include <pcl/PCLPointCloud2.h>
 
-#include <limits>
-
 #include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
 #include "dynains/compiled_remover.hpp"

@@ -1,7 +1,3 @@
-#include <array>
-#include <cmath>
-#include <limits>
-
 #include "dynains/adapters/matrix_pose.hpp"
 #include "dynains/adapters/sophus.hpp"
 #include "support/catch.hpp"

@@ -2,28 +2,13 @@
 // docs/scale.md. `city_trials DAYS SEED SEEDS SCANS SENSOR...`; SEED is the first one.
 #include <unistd.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cstdint>
-#include <cstdlib>
-#include <deque>
-#include <filesystem>
-#include <iomanip>
-#include <iostream>
-#include <map>
-#include <memory>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "simulation/simulator.hpp"
+#include "support/standard.hpp"
 
 using namespace dynains;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -5,22 +5,11 @@
 // left out.
 //   object_trials [FROM [WORLDS [SCANS]]]
 // Prints a row for each world and kind of verdict, then all of them.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
-#include <iomanip>
-#include <iostream>
-#include <map>
-#include <string>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "simulation/simulator.hpp"
 #include "support/simulated_runs.hpp"
+#include "support/standard.hpp"
 
 using namespace dynains;
 

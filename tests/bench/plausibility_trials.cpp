@@ -7,19 +7,6 @@
 // Prints a row for each world and kind with the largest shares of any window, then the counts.
 #include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <filesystem>
-#include <functional>
-#include <iomanip>
-#include <iostream>
-#include <map>
-#include <random>
-#include <string>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
@@ -29,6 +16,7 @@
 #include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"
 #include "support/simulated_runs.hpp"
+#include "support/standard.hpp"
 
 using namespace dynains;
 

@@ -2,27 +2,15 @@
 // Markdown. An answer is right if the proposed options give the true motion, or if the poses as
 // given do and no option is proposed, or if they are called inexact and are so by 3 cm.
 //   pose_trials [EVERY]   (every n-th recording)
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iostream>
-#include <map>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
+#include "support/standard.hpp"
 #include "support/written_drive.hpp"
 
 using namespace dynains;
-namespace fs = std::filesystem;
 
 namespace {
 

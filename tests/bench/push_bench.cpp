@@ -1,15 +1,10 @@
 // Cost of a push by stage, on one thread, in milliseconds. `bench_core [PUSHES [BEAMS]]`, for each
 // preset.
-#include <algorithm>
-#include <cstddef>
-#include <cstdio>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/median.hpp"
 #include "support/scene.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::bench {
 namespace {

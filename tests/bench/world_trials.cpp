@@ -3,17 +3,6 @@
 // none. All settings judge the same scans.
 //   world_trials [--from SEED] [--worlds N] [--scans N] [--world scene=room,...] [SETTING...]
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <exception>
-#include <iomanip>
-#include <iostream>
-#include <map>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
@@ -21,6 +10,7 @@
 #include "program/parameter_flags.hpp"
 #include "simulation/simulator.hpp"
 #include "support/simulated_runs.hpp"
+#include "support/standard.hpp"
 
 using namespace dynains;
 

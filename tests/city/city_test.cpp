@@ -1,14 +1,6 @@
 // A map of many sessions: order, repetition, removal, damage and failure.
 #include "dynains/city/city.hpp"
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "dynains/city/session_writer.hpp"
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
@@ -18,7 +10,6 @@
 #include "support/visibility.hpp"
 
 using namespace dynains;
-namespace fs = std::filesystem;
 
 namespace {
 

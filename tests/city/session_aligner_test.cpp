@@ -1,12 +1,6 @@
 // Alignment of a session with a map of many sessions: known displacements, and refusals.
 #include "dynains/city/session_aligner.hpp"
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <random>
-#include <string>
-#include <vector>
-
 #include "dynains/city/session_writer.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/pose.hpp"

@@ -1,16 +1,5 @@
 // Static points of a session: the first one of each voxel, against plain double precision.
 #include "dynains/city/session_writer.hpp"
-
-#include <Eigen/Geometry>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <map>
-#include <utility>
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -1,9 +1,6 @@
 // Counts the calls of the global operator new. This test is a separate executable.
 #include <atomic>
-#include <cstddef>
-#include <cstdlib>
 #include <new>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

@@ -1,6 +1,4 @@
 // Labels do not depend on the type of the cloud.
-#include <Eigen/Core>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

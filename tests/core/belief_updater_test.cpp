@@ -1,9 +1,5 @@
 #include "dynains/belief/belief_updater.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

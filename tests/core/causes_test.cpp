@@ -1,9 +1,4 @@
 // The cause of each verdict, on scenes with known causes.
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <limits>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

@@ -1,9 +1,5 @@
 #include "dynains/clusters/cluster_set.hpp"
 
-#include <map>
-#include <tuple>
-#include <vector>
-
 #include "polar_test_points.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,10 +1,8 @@
 // Permitted and forbidden use of a remover by several threads. Run it with ThreadSanitizer, see
 // docs/reliability.md.
-#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <thread>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"

@@ -1,9 +1,3 @@
-#include <cmath>
-#include <limits>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "dynains/parameters.hpp"
 #include "support/catch.hpp"

@@ -1,12 +1,6 @@
 #include "dynains/clusters/curved_voxel_clusterer.hpp"
 
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <map>
 #include <queue>
-#include <vector>
 
 #include "dynains/clusters/cluster_set.hpp"
 #include "polar_test_points.hpp"

@@ -1,12 +1,6 @@
 // The dynamic occupancy grid, compared with counts by hand and with a slow reference count.
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
 
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <tuple>
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

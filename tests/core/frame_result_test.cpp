@@ -1,5 +1,4 @@
 // Doubts of a push about the times of scans.
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

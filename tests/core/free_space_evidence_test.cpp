@@ -1,12 +1,6 @@
 // The evidence of a few scans as a whole, on panels in front of a wall.
 #include "dynains/evidence/free_space_evidence.hpp"
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <set>
-#include <vector>
-
 #include "support/catch.hpp"
 
 namespace dynains::test {

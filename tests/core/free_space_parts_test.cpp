@@ -1,12 +1,4 @@
 // The parts of the free-space evidence, each compared with a slow and simple implementation.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <map>
-#include <set>
-#include <vector>
 
 #include "dynains/evidence/ground_samples.hpp"
 #include "dynains/evidence/instance_judge.hpp"

@@ -1,11 +1,6 @@
 #include "dynains/ground/ground_segmenter.hpp"
 
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <map>
-#include <vector>
 
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,9 +1,4 @@
 // Verdicts under inexact poses, judged by the exact ones.
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstddef>
-#include <optional>
-#include <vector>
 
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

@@ -1,14 +1,6 @@
 // Beliefs of the free-space evidence, compared with values by hand and with a slow sum.
 #include "dynains/evidence/instance_beliefs.hpp"
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "dynains/evidence/instance_judge.hpp"
 #include "dynains/evidence/reference_scans.hpp"
 #include "support/catch.hpp"

@@ -1,16 +1,6 @@
 // Samples of instances, compared with a slow and simple implementation.
 #include "dynains/evidence/instance_samples.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <iterator>
-#include <map>
-#include <set>
-#include <tuple>
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -1,9 +1,5 @@
 // Results do not depend on the origin of the world, on the direction of the sensor's x axis, or on
 // the order of the points.
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstddef>
-#include <vector>
 
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

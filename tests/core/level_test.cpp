@@ -1,8 +1,5 @@
 // Sensors that are mounted at a tilt: scans are levelled inside, and answers are in the sensor
 // frame.
-#include <Eigen/Geometry>
-#include <cmath>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

@@ -1,11 +1,5 @@
 #include "dynains/sensor/mounting.hpp"
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "dynains/io/recording.hpp"
 #include "simulation/simulator.hpp"

@@ -2,12 +2,6 @@
 #include "dynains/evidence/moved_ground.hpp"
 
 #include <Eigen/Dense>
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <set>
-#include <utility>
-#include <vector>
 
 #include "dynains/evidence/ground_samples.hpp"
 #include "support/catch.hpp"

@@ -1,12 +1,4 @@
 // Moving objects as boxes with ids and velocities (RemoverConfig::objects).
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <set>
-#include <tuple>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/pipeline/object_tracks.hpp"

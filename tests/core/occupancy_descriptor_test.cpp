@@ -1,11 +1,5 @@
 #include "dynains/descriptors/occupancy_descriptor.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <optional>
-#include <vector>
-
 #include "polar_test_points.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,8 +1,6 @@
 // Returns of the own vehicle, in scans of a drive between pillars.
 #include "dynains/sensor/own_body.hpp"
 
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/scene.hpp"
 

@@ -1,8 +1,5 @@
 #include "dynains/simd/pack_geometry.hpp"
 
-#include <cmath>
-#include <limits>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

@@ -1,7 +1,4 @@
 // Both sides of each bound of plausibility, and its result on simulated drives.
-#include <Eigen/Geometry>
-#include <cstdint>
-#include <vector>
 
 #include "dynains/pipeline/plausibility_check.hpp"
 #include "support/catch.hpp"

@@ -1,6 +1,3 @@
-#include <Eigen/Geometry>
-#include <cmath>
-
 #include "dynains/clusters/cluster_set.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,10 +1,8 @@
 // Polar points given by hand in degrees, or drawn at random.
 #pragma once
 
-#include <cmath>
-#include <cstddef>
-
 #include "dynains/clusters/cluster_set.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

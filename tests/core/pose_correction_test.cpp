@@ -2,15 +2,6 @@
 // scans.
 #include "dynains/registration/pose_correction.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <vector>
-
 #include "dynains/median.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

@@ -1,7 +1,5 @@
 #include "dynains/pose.hpp"
 
-#include <Eigen/Geometry>
-
 #include "support/catch.hpp"
 #include "support/random.hpp"
 

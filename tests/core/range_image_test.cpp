@@ -1,13 +1,6 @@
 // Range images and the beams that are tested against them, compared with slow and simple ones.
 #include "dynains/evidence/range_image.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <utility>
-#include <vector>
-
 #include "dynains/evidence/visibility.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

@@ -1,5 +1,4 @@
 // A recorded clip, if the machine has it.
-#include <vector>
 
 #include "dynains/io/recording.hpp"
 #include "support/catch.hpp"

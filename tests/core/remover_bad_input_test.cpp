@@ -1,10 +1,4 @@
 // Any input gives an exception or a label, and the remover continues to work.
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <stdexcept>
-#include <utility>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

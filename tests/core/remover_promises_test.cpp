@@ -1,11 +1,5 @@
 // Guarantees of the facade, on scenes with known truth.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
-#include <set>
 #include <thread>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

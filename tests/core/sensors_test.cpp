@@ -1,11 +1,4 @@
 // Scans of several sensors: each point has the origin of its own.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <optional>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"

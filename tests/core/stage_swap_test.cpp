@@ -1,9 +1,4 @@
 // Every stage can be replaced by a stage of the user.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/points.hpp"

@@ -1,15 +1,5 @@
 #include "dynains/map/static_map_accumulator.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <type_traits>
-#include <utility>
-#include <vector>
-
 #include "dynains/pose.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"

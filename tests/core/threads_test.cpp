@@ -1,10 +1,5 @@
 // One and two threads of a remover give the same answers.
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <new>
-#include <vector>
 
 #include "support/catch.hpp"
 #include "support/own_stages.hpp"

@@ -1,10 +1,4 @@
 // Verdicts that are written by runs and groups of points, compared with a simple model by point.
-#include <algorithm>
-#include <array>
-#include <map>
-#include <numeric>
-#include <utility>
-#include <vector>
 
 #include "dynains/pipeline/decisions.hpp"
 #include "dynains/pipeline/scan_ring.hpp"

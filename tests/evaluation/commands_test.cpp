@@ -1,14 +1,6 @@
 // The commands for evaluation, from the command line to the files that they write.
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iostream>
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
@@ -27,7 +19,6 @@ using namespace evaluation::testing;
 using simulation::scan_name;
 using test::read_text;
 using test::TemporaryFolder;
-namespace fs = std::filesystem;
 
 namespace {
 

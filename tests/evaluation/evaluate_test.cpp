@@ -1,11 +1,6 @@
 #include "dynains/evaluation/evaluate.hpp"
 
 #include <nlohmann/json.hpp>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/report.hpp"

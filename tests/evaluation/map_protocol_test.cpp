@@ -1,8 +1,5 @@
 #include "evaluation/map_protocol.hpp"
 
-#include <limits>
-#include <vector>
-
 #include "reference.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"

@@ -1,6 +1,5 @@
 #include "evaluation/point_protocol.hpp"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "dynains/errors.hpp"

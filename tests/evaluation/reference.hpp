@@ -1,18 +1,11 @@
 // Simple implementations of the protocols: everything in memory, sorted maps, every pair compared.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <array>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <map>
-#include <vector>
-
 #include "dynains/evaluation/scores.hpp"
 #include "dynains/evaluation/truth.hpp"
 #include "evaluation/voxel_protocol.hpp"
 #include "scenes.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::evaluation::testing {
 

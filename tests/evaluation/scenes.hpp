@@ -1,13 +1,10 @@
 // Small labelled scans for tests of the evaluation.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cstdint>
-#include <vector>
-
 #include "dynains/evaluation/scan.hpp"
 #include "dynains/evaluation/truth.hpp"
 #include "support/random.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::evaluation::testing {
 

@@ -1,5 +1,4 @@
 // Identity and oracle on real recordings, if they exist.
-#include <string>
 
 #include "dynains/evaluation/evaluate.hpp"
 #include "run/labelled_sequence.hpp"

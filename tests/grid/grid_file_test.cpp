@@ -1,11 +1,5 @@
 #include "grid/grid_file.hpp"
 
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

@@ -1,9 +1,5 @@
 #include "grid/grid_maker.hpp"
 
-#include <Eigen/Geometry>
-#include <functional>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "support/catch.hpp"
 

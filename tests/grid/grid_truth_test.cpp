@@ -1,10 +1,3 @@
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <utility>
-#include <vector>
-
 #include "dynains/evaluation/truth.hpp"
 #include "grid/grid_maker.hpp"
 #include "support/catch.hpp"

@@ -3,13 +3,11 @@
 #include <sys/resource.h>
 
 #include <csignal>
-#include <memory>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
-namespace fs = std::filesystem;
 using namespace dynains;
 using namespace dynains::test;
 

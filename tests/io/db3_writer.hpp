@@ -5,12 +5,8 @@
 
 #include <sqlite3.h>
 
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include "log_writer.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

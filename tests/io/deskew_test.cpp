@@ -1,9 +1,4 @@
 // Removal of the distortion by the motion of the sensor during a scan.
-#include <functional>
-#include <limits>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
@@ -17,8 +12,6 @@ namespace dynains {
 using namespace test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr double kSpeed = 20.0;    // m/s along x
 constexpr double kTurnRate = 0.5;  // rad/s

@@ -1,5 +1,3 @@
-#include <string>
-
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"

@@ -3,13 +3,7 @@
 
 #include <unistd.h>
 
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <stdexcept>
-#include <string>
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -4,8 +4,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <optional>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
@@ -13,7 +11,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -1,16 +1,10 @@
 #include "dynains/io/kitti.hpp"
 
-#include <cmath>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
-namespace fs = std::filesystem;
 using namespace dynains;
 using namespace dynains::test;
 

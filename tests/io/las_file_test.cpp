@@ -1,6 +1,4 @@
 // Maps in LAS files, and coordinate reference systems.
-#include <limits>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"

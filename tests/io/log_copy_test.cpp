@@ -1,17 +1,6 @@
 // Copies of logs with other clouds, by their readers and byte by byte.
 #include "io/logs/log_copy.hpp"
 
-#include <cstdint>
-#include <cstring>
-#include <filesystem>
-#include <map>
-#include <optional>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "db3_writer.hpp"
 #include "files.hpp"
 #include "io/logs/log_file.hpp"
@@ -21,7 +10,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

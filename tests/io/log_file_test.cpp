@@ -1,9 +1,5 @@
 #include "io/logs/log_file.hpp"
 
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "db3_writer.hpp"
 #include "dynains/errors.hpp"
 #include "files.hpp"
@@ -20,8 +16,6 @@ namespace dynains {
 using namespace test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
                                            {"/chatter", "std_msgs/msg/String"}};

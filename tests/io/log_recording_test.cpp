@@ -1,8 +1,4 @@
 // Logs as recordings: topics, poses, labels, files.
-#include <algorithm>
-#include <limits>
-#include <string>
-#include <vector>
 
 #include "db3_writer.hpp"
 #include "dynains/errors.hpp"
@@ -17,8 +13,6 @@ namespace dynains {
 using namespace test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 const Eigen::Isometry3d kT_base_lidar = pose_at(0.5, M_PI / 2);
 

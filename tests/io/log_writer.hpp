@@ -1,17 +1,9 @@
 // Log files for tests, with a choice of optional parts.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "io/logs/log_file.hpp"
 #include "ros_writer.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

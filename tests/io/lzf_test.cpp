@@ -1,8 +1,5 @@
 #include "io/points/lzf.hpp"
 
-#include <string>
-#include <vector>
-
 #include "support/catch.hpp"
 
 using dynains::decode_lzf;

@@ -1,6 +1,4 @@
 // Sweeps of nuScenes as recordings.
-#include <string>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
@@ -12,8 +10,6 @@ namespace dynains {
 using namespace test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 RecordingOptions scene(const std::string& name) {
   RecordingOptions options;

@@ -1,12 +1,6 @@
 // Units and outliers of the times of points.
 #include "io/points/point_clock.hpp"
 
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "files.hpp"
 #include "ros_writer.hpp"
@@ -17,8 +11,6 @@ namespace dynains::point_clock_test {
 using namespace test;
 
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr std::size_t kPoints = 200;
 constexpr double kPeriod = 0.1;   // s

@@ -1,11 +1,6 @@
 // Copies of point files keep every byte of the points that stay.
 #include "io/points/point_file_copy.hpp"
 
-#include <cstdint>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"

@@ -1,13 +1,9 @@
 #include "dynains/io/point_file.hpp"
 
-#include <cmath>
-#include <cstring>
-
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
-namespace fs = std::filesystem;
 using namespace dynains;
 using namespace dynains::test;
 

@@ -1,10 +1,8 @@
 // Point files of LAS and NumPy for tests, byte by byte.
 #pragma once
 
-#include <cstdint>
-#include <string>
-
 #include "ros_writer.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

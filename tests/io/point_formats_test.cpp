@@ -1,7 +1,4 @@
 // Points in files of LAS, NumPy and text.
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
@@ -17,7 +14,6 @@ using namespace test;
 
 namespace {
 
-namespace fs = std::filesystem;
 using Position = Eigen::Vector3d;
 
 PointFile read(const std::string& name, const std::string& content) {

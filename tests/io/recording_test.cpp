@@ -1,12 +1,5 @@
 #include "dynains/io/recording.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "io/files.hpp"
@@ -14,7 +7,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -1,10 +1,5 @@
 #include "io/logs/ros_messages.hpp"
 
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "files.hpp"
 #include "io/logs/transform_tree.hpp"

@@ -1,13 +1,9 @@
 // Serialised messages of ROS for tests.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "io/logs/message_writer.hpp"
 #include "io/logs/ros_messages.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

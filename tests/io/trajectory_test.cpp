@@ -1,7 +1,5 @@
 #include "dynains/io/trajectory.hpp"
 
-#include <string>
-
 #include "dynains/errors.hpp"
 #include "dynains/io/pose_convention.hpp"
 #include "io/files.hpp"

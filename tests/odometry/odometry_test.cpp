@@ -1,15 +1,6 @@
 // The odometry in simulated places, and its answers to wrong input.
 #include "dynains/odometry/odometry.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <random>
-#include <utility>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"

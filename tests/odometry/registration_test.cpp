@@ -1,7 +1,4 @@
 // Registration of known motions, and motions that nothing determines.
-#include <Eigen/Geometry>
-#include <random>
-#include <vector>
 
 #include "dynains/surfaces/scan_registration.hpp"
 #include "odometry/scan_preparation.hpp"

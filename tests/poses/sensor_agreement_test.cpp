@@ -1,9 +1,6 @@
 // Sensors of a rig agree under their exact poses; a wrong pose of one is reported.
 #include "dynains/poses/sensor_agreement.hpp"
 
-#include <Eigen/Geometry>
-#include <filesystem>
-
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"

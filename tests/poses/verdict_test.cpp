@@ -1,13 +1,4 @@
 // Verdicts on right and wrong poses of written recordings.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <random>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/trajectory.hpp"

@@ -1,8 +1,6 @@
 #include "dynains/threads/background.hpp"
 
-#include <stdexcept>
 #include <thread>
-#include <vector>
 
 #include "support/catch.hpp"
 

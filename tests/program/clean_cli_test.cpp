@@ -1,12 +1,3 @@
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
@@ -16,7 +7,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -1,13 +1,6 @@
 // Findings of `dynains check` on simulated streets with all usual mistakes in the poses.
 #include "dynains/poses/diagnosis.hpp"
 
-#include <cmath>
-#include <functional>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "dynains/io/trajectory.hpp"
 #include "program/start.hpp"
 #include "run/remarks/recording_check.hpp"
@@ -17,7 +10,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

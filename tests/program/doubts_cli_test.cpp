@@ -1,15 +1,6 @@
 // Messages about faulty recordings, and no message about right ones.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <filesystem>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "program/start.hpp"
 #include "run/remarks/odd_scans.hpp"
@@ -20,7 +11,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -1,8 +1,3 @@
-#include <filesystem>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
@@ -10,7 +5,6 @@
 #include "support/catch.hpp"
 
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 TEST_CASE("a run, its results and its map give grids, whole or not at all") {
   const TemporaryFolder folder;

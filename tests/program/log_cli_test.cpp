@@ -1,10 +1,5 @@
 // The program with logs of ROS instead of folders of scans.
-#include <algorithm>
-#include <cstring>
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
@@ -17,7 +12,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

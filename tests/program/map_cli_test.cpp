@@ -1,13 +1,6 @@
 // `dynains run --update` and `dynains map`: a map of many sessions from the command line.
-#include <Eigen/Geometry>
-#include <chrono>
-#include <cmath>
 #include <csignal>
-#include <filesystem>
-#include <optional>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "dynains/city/city.hpp"
 #include "dynains/io/kitti.hpp"
@@ -20,7 +13,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -1,10 +1,4 @@
 // Recordings without poses: dynains odometry, dynains run --odometry and what they say.
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
@@ -15,8 +9,6 @@
 
 namespace dynains::test {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// A simulated hall without its poses. `lost_from` to `found_from`: these scans are of a street.
 class Unposed {

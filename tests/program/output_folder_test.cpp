@@ -9,7 +9,6 @@
 using namespace dynains;
 using namespace dynains::run;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 namespace {

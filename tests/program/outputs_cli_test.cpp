@@ -1,7 +1,4 @@
 // The rule of outputs, for each command that writes a file of a name that the user gives.
-#include <filesystem>
-#include <string>
-#include <vector>
 
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -10,7 +7,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -2,9 +2,6 @@
 
 #include <sys/stat.h>
 
-#include <algorithm>
-#include <array>
-
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

@@ -1,11 +1,7 @@
-#include "run/overview.hpp"
-
 #include <png.h>
 
-#include <filesystem>
-#include <vector>
-
 #include "io/files.hpp"
+#include "run/overview.hpp"
 #include "support/catch.hpp"
 
 namespace dynains::run {

@@ -1,11 +1,4 @@
-#include <Eigen/Geometry>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <string>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
@@ -20,7 +13,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

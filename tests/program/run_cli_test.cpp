@@ -1,9 +1,5 @@
-#include <algorithm>
 #include <csignal>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/io/kitti.hpp"
@@ -16,7 +12,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

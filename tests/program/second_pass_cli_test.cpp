@@ -1,10 +1,5 @@
 // `dynains run --passes 2` as a user starts it.
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "io/files.hpp"
@@ -14,7 +9,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -7,7 +7,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -7,10 +7,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <functional>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "io/files.hpp"
 #include "support/catch.hpp"

@@ -1,14 +1,8 @@
 // A small recording on disk: a floor, a wall, and a box that drives past.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstddef>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "dynains/io/kitti.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -1,10 +1,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cstdlib>
-#include <string>
-
 #include "dynains/version.hpp"
 #include "io/files.hpp"
 #include "program/start.hpp"

@@ -1,6 +1,4 @@
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
 
 #include "io/files.hpp"
 #include "program/start.hpp"
@@ -8,7 +6,6 @@
 #include "support/catch.hpp"
 
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

@@ -2,12 +2,7 @@
 #include <sys/resource.h>
 
 #include <csignal>
-#include <cstdint>
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
@@ -21,7 +16,6 @@
 
 using namespace dynains;
 using namespace dynains::test;
-namespace fs = std::filesystem;
 
 namespace {
 

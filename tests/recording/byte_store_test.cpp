@@ -1,8 +1,5 @@
 #include "dynains/recording/byte_store.hpp"
 
-#include <cstdint>
-#include <vector>
-
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"

@@ -1,11 +1,5 @@
 #include "dynains/recording/places.hpp"
 
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <vector>
-
 #include "support/catch.hpp"
 #include "support/visibility.hpp"
 

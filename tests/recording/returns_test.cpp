@@ -1,11 +1,6 @@
 // Returns to a place, and the error of poses there.
 #include "dynains/recording/returns.hpp"
 
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <vector>
-
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
 

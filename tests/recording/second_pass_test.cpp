@@ -1,12 +1,6 @@
 // The second pass of a run over first verdicts.
 #include "dynains/recording/second_pass.hpp"
 
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <vector>
-
 #include "support/box_street.hpp"
 #include "support/catch.hpp"
 

@@ -3,18 +3,9 @@
 // bytes of an undisturbed run.
 #include <fcntl.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <map>
-#include <random>
-#include <set>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "rehearsal.hpp"
 #include "shim/log.hpp"
+#include "support/standard.hpp"
 #include "tree.hpp"
 
 namespace dynains::test {

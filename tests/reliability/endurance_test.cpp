@@ -3,14 +3,6 @@
 // DYNAINS_ENDURANCE_SCANS=100000 test_reliability "[endurance]" is the long run.
 #include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <fstream>
-#include <string>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "dynains/median.hpp"
 #include "support/catch.hpp"

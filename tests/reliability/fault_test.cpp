@@ -4,17 +4,11 @@
 //
 // The first and the last call of each kind fail, and one of each DYNAINS_FAULTS_OF between them
 // (default 8; 1: every call).
-#include <algorithm>
 #include <cerrno>
-#include <cstring>
-#include <functional>
-#include <numeric>
-#include <set>
-#include <string>
-#include <vector>
 
 #include "rehearsal.hpp"
 #include "support/random.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 namespace {

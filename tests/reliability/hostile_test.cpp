@@ -1,5 +1,4 @@
 // Faulty poses and times: the results are defined, for both presets.
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"

@@ -7,21 +7,13 @@
 #include <linux/capability.h>
 #include <sys/prctl.h>
 
-#include <algorithm>
-#include <cctype>
-#include <chrono>
-#include <optional>
-#include <set>
-#include <string>
-#include <vector>
-
 #include "rehearsal.hpp"
 #include "support/random.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 namespace {
 
-namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
 bool is_below(const std::string& path, const std::string& folder) {

@@ -1,17 +1,8 @@
 // A command of the program that is disturbed repeatedly, and the conditions that hold afterwards.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
-#include <filesystem>
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <string>
-#include <vector>
 
 #include "dynains/io/kitti.hpp"
 #include "io/files.hpp"

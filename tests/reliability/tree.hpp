@@ -1,16 +1,8 @@
 // A folder with all its contents, as a value.
 #pragma once
 
-#include <cstddef>
-#include <filesystem>
-#include <functional>
-#include <iterator>
-#include <map>
-#include <memory>
-#include <string>
-#include <utility>
-
 #include "io/files.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 
@@ -59,7 +51,6 @@ struct Item {
 using Tree = std::map<std::string, Item>;
 
 inline Tree read_tree(const std::filesystem::path& folder) {
-  namespace fs = std::filesystem;
   Tree tree;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
     Item item{Kind::kFile, {}};
@@ -77,7 +68,6 @@ inline Tree read_tree(const std::filesystem::path& folder) {
 
 /// Replaces the contents of the folder by the tree.
 inline void write_tree(const std::filesystem::path& folder, const Tree& tree) {
-  namespace fs = std::filesystem;
   fs::remove_all(folder);
   fs::create_directories(folder);
   for (const auto& [name, item] : tree) {

@@ -1,7 +1,5 @@
 #include "ros_common/cloud_queue.hpp"
 
-#include <vector>
-
 #include "support/catch.hpp"
 
 namespace dynains_ros {

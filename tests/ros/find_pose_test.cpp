@@ -1,7 +1,5 @@
 #include "ros_common/find_pose.hpp"
 
-#include <string>
-
 #include "support/catch.hpp"
 
 using namespace dynains_ros;

@@ -1,9 +1,5 @@
 #include "ros_common/frame_joiner.hpp"
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "support/catch.hpp"
 
 namespace dynains_ros {

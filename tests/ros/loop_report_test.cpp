@@ -1,7 +1,5 @@
 #include "ros_common/loop_report.hpp"
 
-#include <algorithm>
-
 #include "support/catch.hpp"
 
 namespace dynains_ros {

@@ -1,6 +1,3 @@
-#include <map>
-#include <string>
-
 #include "ros_common/remover_parameters.hpp"
 #include "support/catch.hpp"
 

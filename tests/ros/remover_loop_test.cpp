@@ -1,10 +1,6 @@
 #include "ros_common/remover_loop.hpp"
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <memory>
-#include <vector>
 
 #include "adapters/message.hpp"
 #include "ros_common/worker.hpp"

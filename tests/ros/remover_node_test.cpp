@@ -2,19 +2,11 @@
 #include "dynains_ros/remover_node.hpp"
 
 #include <atomic>
-#include <chrono>
-#include <cmath>
 #include <diagnostic_msgs/msg/diagnostic_array.hpp>
-#include <functional>
-#include <map>
-#include <memory>
 #include <mutex>
 #include <sensor_msgs/msg/point_cloud2.hpp>
-#include <string>
 #include <tf2_msgs/msg/tf_message.hpp>
 #include <thread>
-#include <utility>
-#include <vector>
 
 #include "adapters/message.hpp"
 #include "dynains/compiled_remover.hpp"

@@ -1,11 +1,4 @@
 // One place on several days.
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <set>
-#include <utility>
-#include <vector>
 
 #include "dynains/errors.hpp"
 #include "simulation/simulator.hpp"

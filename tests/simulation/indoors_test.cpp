@@ -1,6 +1,4 @@
 // Rooms, corridors and tunnels.
-#include <algorithm>
-#include <cmath>
 
 #include "simulation/simulator.hpp"
 #include "support/catch.hpp"

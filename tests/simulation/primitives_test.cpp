@@ -1,5 +1,3 @@
-#include <cmath>
-
 #include "simulation/ground_plan.hpp"
 #include "simulation/primitive.hpp"
 #include "simulation/terrain.hpp"

@@ -1,8 +1,3 @@
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <set>
-
 #include "simulation/config.hpp"
 #include "simulation/simulator.hpp"
 #include "support/catch.hpp"

@@ -1,8 +1,5 @@
 #include "simulation/renderer.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 #include "simulation/primitive.hpp"
 #include "simulation/random.hpp"
 #include "support/catch.hpp"

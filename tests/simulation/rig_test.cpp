@@ -1,9 +1,4 @@
 // Several sensors in one cloud, in the frame of the body.
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <set>
-#include <sstream>
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"

@@ -1,10 +1,5 @@
 #include "simulation/simulator.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <set>
-
 #include "io/fingerprint.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

@@ -1,7 +1,5 @@
 #include "simulation/write_sequence.hpp"
 
-#include <filesystem>
-
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"

@@ -1,9 +1,7 @@
 // A beam in a room that is a box.
 #pragma once
 
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

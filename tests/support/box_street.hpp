@@ -1,13 +1,9 @@
 // A street of boxes on flat ground, and the scans of a session that drives along it.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <cstdint>
-#include <vector>
-
 #include "dynains/points.hpp"
 #include "support/scene.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -1,12 +1,7 @@
 // Random numbers that are equal for all standard libraries.
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
-#include <random>
-#include <utility>
-#include <vector>
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

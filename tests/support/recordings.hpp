@@ -1,11 +1,7 @@
 // Real recordings, which are not in the repository.
 #pragma once
 
-#include <filesystem>
-#include <iostream>
-#include <optional>
-#include <stdexcept>
-#include <string>
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

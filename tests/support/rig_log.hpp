@@ -1,15 +1,10 @@
 // A recording of a rig as its robot records it: one topic for each sensor, with its own clock.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "io/log_writer.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

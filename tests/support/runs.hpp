@@ -1,12 +1,9 @@
 // Runs a remover over scans and keeps the verdicts.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "support/scene.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

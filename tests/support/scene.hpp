@@ -1,15 +1,8 @@
 // A small world of boxes on a plane, scanned by rays: scenes with known truth.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <vector>
-
 #include "support/random.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

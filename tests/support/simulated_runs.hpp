@@ -1,15 +1,10 @@
 // Simulated sequences through the remover, and their score.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cstddef>
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "dynains/compiled_remover.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "simulation/simulator.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -1,13 +1,9 @@
 // Visibility bits of a reference, given sample by sample.
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
-
 #include "dynains/evidence/visibility.hpp"
 #include "dynains/points.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 

@@ -1,18 +1,13 @@
 // A simulated drive on disk, whose poses and points can be replaced.
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cstddef>
-#include <filesystem>
-#include <functional>
-#include <vector>
-
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::test {
 
