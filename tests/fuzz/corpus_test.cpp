@@ -1,6 +1,4 @@
 // Runs the fuzzing targets on their seeds and on mutations of these, without a fuzzer.
-#include <algorithm>
-#include <string>
 
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -43,8 +41,7 @@ TEST_CASE("Seeds and their mutations give a value or an exception of this projec
   for (const Target& target : targets()) {
     INFO(target.name);
     test::Random random(7);
-    const std::vector<std::string> seeds = target.seeds();
-    for (const std::string& seed : seeds) {
+    for (const std::string& seed : target.seeds) {
       REQUIRE_NOTHROW(run(target, seed));
       for (int i = 0; i < 300; ++i) {
         const std::string input = mutated(seed, random);

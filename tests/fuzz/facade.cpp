@@ -1,17 +1,8 @@
 // DynaInsRemover with a configuration, scans, poses, times and calls that are read from bytes.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <deque>
-#include <limits>
-#include <map>
-#include <optional>
-#include <random>
-#include <utility>
-#include <vector>
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
@@ -351,8 +342,6 @@ DynaInsRemover* pooled_remover(unsigned number) {
   return entry->second ? &*entry->second : nullptr;
 }
 
-}  // namespace
-
 void run_facade(Bytes bytes) {
   Stream stream(bytes);
   const unsigned kind = stream.byte();
@@ -372,7 +361,9 @@ void run_facade(Bytes bytes) {
   require(play(stream, fresh) == digest, "reset brings back the state after construction");
 }
 
-std::vector<std::string> facade_seeds() {
+}  // namespace
+
+Target facade_target() {
   std::vector<std::string> seeds;
   for (const char kind : {'\0', '\1', '\x40', '\xFB'}) {
     std::string seed(1, kind);
@@ -394,7 +385,7 @@ std::vector<std::string> facade_seeds() {
   std::string changed = "\xFE";
   for (int i = 0; i < 200; ++i) changed += {'\x47', static_cast<char>(i), '\x70'};
   seeds.push_back(changed);
-  return seeds;
+  return {"facade", run_facade, seeds};
 }
 
 }  // namespace dynains::fuzz

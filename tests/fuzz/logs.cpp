@@ -1,6 +1,4 @@
 // Logs of ROS: any bytes give scans with poses and a copy, or an IoError that names the log.
-#include <filesystem>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
@@ -8,35 +6,17 @@
 #include "io/files.hpp"
 #include "io/log_writer.hpp"
 #include "io/logs/log_copy.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
 namespace {
 
-namespace fs = std::filesystem;
 using test::LogChannel;
 using test::WrittenMessage;
 
 // The first byte of an input chooses the format.
 const char* const kLogNames[] = {"log.mcap", "log.bag", "log.db3"};
-
-void read_whole(const fs::path& log, std::size_t bytes) {
-  const Recording recording(log);
-  require(recording.size() > 0, "a recording has scans");
-  RecordedScan scan;
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    require(recording.T_world_sensor(i).matrix().allFinite(), "poses are finite");
-    require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
-    recording.read_scan(i, scan);
-    require(scan.size() == recording.point_count(i), "as many points as announced");
-    require(scan.size() <= bytes || bytes > (1U << 16U), "points come from bytes");
-    require(scan.ring.empty() || scan.ring.size() == scan.size(), "a ring for each point");
-    require(scan.time.empty() || scan.time.size() == scan.size(), "a time for each point");
-    if (recording.has_labels()) {
-      require(recording.read_labels(i).size() == scan.size(), "a label for each point");
-    }
-  }
-}
 
 /// Two clouds with all fields, and their poses as transforms or odometry.
 std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) {
@@ -65,8 +45,6 @@ std::vector<LogChannel> channels(bool by_transforms) {
                         : LogChannel{"/odom", "nav_msgs/Odometry"}};
 }
 
-}  // namespace
-
 void run_log(Bytes bytes) {
   if (bytes.empty()) return;
   static const test::TemporaryFolder folder;
@@ -74,7 +52,7 @@ void run_log(Bytes bytes) {
   test::write_text(log, {reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1});
   const fs::path copy = folder / "copy.mcap";
   expect_value_or<IoError>(log, [&](const fs::path& path) {
-    read_whole(path, bytes.size());
+    check_recording(path, Recording(path), bytes.size());
     const auto file = open_log(path);
     copy_log(*file, copy, [](const LogMessage&, const SerialisedMessage&) { return std::nullopt; });
     require(open_log(copy)->messages().size() == file->messages().size(),
@@ -82,7 +60,9 @@ void run_log(Bytes bytes) {
   });
 }
 
-std::vector<std::string> log_seeds() {
+}  // namespace
+
+Target log_target() {
   std::vector<std::string> seeds;
   for (const std::string compression : {"", "lz4", "zstd"}) {
     test::McapParts parts;
@@ -100,7 +80,7 @@ std::vector<std::string> log_seeds() {
   test::write_db3(folder / "log.db3", channels(true), drive(MessageEncoding::kCdr, true));
   seeds.push_back('\2' + test::read_text(folder / "log.db3"));
 #endif
-  return seeds;
+  return {"log", run_log, seeds};
 }
 
 }  // namespace dynains::fuzz

@@ -1,37 +1,19 @@
 // Tables of nuScenes: any bytes give sweeps with poses, or an IoError that names a file.
-#include <filesystem>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "io/nuscenes_writer.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
 namespace {
 
-namespace fs = std::filesystem;
-
 // The first byte of an input chooses the table; the other ones are whole.
 const char* const kTables[] = {"sample_data", "ego_pose", "calibrated_sensor", "scene", "sample"};
 const std::string* const kContents[] = {&test::kSampleData, &test::kEgoPoses, &test::kSensors,
                                         &test::kScenes, &test::kSamples};
-
-void check(const fs::path& folder) {
-  RecordingOptions options;
-  options.scene = "scene-0061";
-  expect_value_or<IoError>(folder, [&](const fs::path& path) {
-    const Recording recording(path, options);
-    require(recording.size() > 0, "a recording has scans");
-    for (std::size_t i = 0; i < recording.size(); ++i) {
-      require(recording.T_world_sensor(i).matrix().allFinite(), "poses are finite");
-      require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
-    }
-  });
-}
-
-}  // namespace
 
 void run_nuscenes(Bytes bytes) {
   if (bytes.empty()) return;
@@ -41,16 +23,21 @@ void run_nuscenes(Bytes bytes) {
   const std::size_t table = bytes[0] % std::size(kTables);
   const fs::path file = folder / "v1.0-mini" / (std::string(kTables[table]) + ".json");
   test::write_text(file, {reinterpret_cast<const char*>(bytes.data()) + 1, bytes.size() - 1});
-  check(folder.path());
+  RecordingOptions options;
+  options.scene = "scene-0061";
+  expect_value_or<IoError>(folder.path(),
+                           [&](const fs::path& path) { check_poses(Recording(path, options)); });
   test::write_text(file, *kContents[table]);
 }
 
-std::vector<std::string> nuscenes_seeds() {
+}  // namespace
+
+Target nuscenes_target() {
   std::vector<std::string> seeds;
   for (std::size_t i = 0; i < std::size(kTables); ++i) {
     seeds.push_back(static_cast<char>(i) + *kContents[i]);
   }
-  return seeds;
+  return {"nuscenes", run_nuscenes, seeds};
 }
 
 }  // namespace dynains::fuzz

@@ -1,8 +1,4 @@
 // Every reader of files: any bytes give a valid value or an IoError.
-#include <cmath>
-#include <filesystem>
-#include <sstream>
-#include <string>
 
 #include "city/session_file.hpp"
 #include "dynains/compiled_remover.hpp"
@@ -14,12 +10,11 @@
 #include "io/point_format_writer.hpp"
 #include "io/poses/kitti_files.hpp"
 #include "run/settings/parameter_values.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Writes a file of this name, in a folder that lives as long as the process.
 fs::path file_of(const char* name, Bytes bytes) {
@@ -33,7 +28,8 @@ std::size_t column_size(std::size_t column, std::size_t points) {
   return column == 0 ? points : column;
 }
 
-void read_point_file(const char* name, Bytes bytes) {
+template <const char* name>
+void read_point_file(Bytes bytes) {
   expect_value_or<IoError>(file_of(name, bytes), [&](const fs::path& path) {
     const PointFile file = read_points(path);
     const std::size_t count = file.positions.size();
@@ -67,17 +63,10 @@ std::string ply(const std::string& format, const std::string& points) {
          points;
 }
 
-}  // namespace
+constexpr char kPly[] = "cloud.ply", kPcd[] = "cloud.pcd", kLas[] = "cloud.las",
+               kNpy[] = "cloud.npy", kXyz[] = "cloud.xyz";
 
-void run_scan(Bytes bytes) {
-  expect_value_or<IoError>(file_of("000000.bin", bytes), [&](const fs::path& path) {
-    std::vector<float> xyzi;
-    read_scan(path, xyzi);
-    require(xyzi.size() * sizeof(float) == bytes.size(), "every byte is read");
-  });
-}
-
-void run_labels(Bytes bytes) {
+void read_labels_file(Bytes bytes) {
   const std::size_t count = bytes.size() / sizeof(std::uint32_t);
   expect_value_or<IoError>(file_of("000000.label", bytes), [&](const fs::path& path) {
     require(read_labels(path, count).size() == count, "a label for each point");
@@ -85,13 +74,21 @@ void run_labels(Bytes bytes) {
   });
 }
 
-void run_calib(Bytes bytes) {
+void read_scan_file(Bytes bytes) {
+  expect_value_or<IoError>(file_of("000000.bin", bytes), [&](const fs::path& path) {
+    std::vector<float> xyzi;
+    read_scan(path, xyzi);
+    require(xyzi.size() * sizeof(float) == bytes.size(), "every byte is read");
+  });
+}
+
+void read_calib(Bytes bytes) {
   expect_value_or<IoError>(file_of("calib.txt", bytes), [](const fs::path& path) {
     require(read_kitti_calib(path).matrix().allFinite(), "calibration is finite");
   });
 }
 
-void run_times(Bytes bytes) {
+void read_times(Bytes bytes) {
   expect_value_or<IoError>(file_of("times.txt", bytes), [](const fs::path& path) {
     const std::vector<double> times = read_kitti_times(path);
     for (std::size_t i = 0; i < times.size(); ++i) {
@@ -100,14 +97,7 @@ void run_times(Bytes bytes) {
   });
 }
 
-void run_ply(Bytes bytes) { read_point_file("cloud.ply", bytes); }
-void run_pcd(Bytes bytes) { read_point_file("cloud.pcd", bytes); }
-
-void run_las(Bytes bytes) { read_point_file("cloud.las", bytes); }
-void run_npy(Bytes bytes) { read_point_file("cloud.npy", bytes); }
-void run_xyz(Bytes bytes) { read_point_file("cloud.xyz", bytes); }
-
-void run_config(Bytes bytes) {
+void read_config(Bytes bytes) {
   const fs::path path = file_of("run.cfg", bytes);
   expect_value_or<ConfigError>(path, [](const fs::path& file) {
     const run::ParameterValues values = run::read_config_file(file);
@@ -123,7 +113,7 @@ void run_config(Bytes bytes) {
   });
 }
 
-void run_session(Bytes bytes) {
+void read_session_file(Bytes bytes) {
   expect_value_or<IoError>(file_of("day.session", bytes), [&](const fs::path& path) {
     const SessionInfo session = read_session(path);
     for (const auto& [tile, block] : session.tiles) {
@@ -132,12 +122,7 @@ void run_session(Bytes bytes) {
   });
 }
 
-std::vector<std::string> scan_seeds() {
-  return {"", floats({1.0F, 2.0F, 3.0F, 0.5F}), floats({1.0F, 2.0F, 3.0F}),
-          floats({1e30F, -40.0F, 0.0F, 0.0F, NAN, INFINITY, 0.0F, 1.0F}) + "cut"};
-}
-
-std::vector<std::string> session_seeds() {
+std::string session_file() {
   std::ostringstream stream;
   SessionFileWriter writer(stream);
   SessionInfo session;
@@ -145,58 +130,60 @@ std::vector<std::string> session_seeds() {
   session.scans = 1;
   session.tiles[{0, -1}] = writer.add({"twenty-four bytes, so..", 24});
   writer.finish(session);
-  const std::string whole = stream.str();
-  return {whole, whole.substr(0, whole.size() - 9), "DYNSESS5", ""};
+  return stream.str();
 }
 
-std::vector<std::string> label_seeds() { return {"", std::string("\xFB\0\1\0", 4), "abc"}; }
+}  // namespace
 
-std::vector<std::string> calib_seeds() {
-  return {"P0: 1 2 3\nTr: " + pose_row(0.25), "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 -0.08"};
-}
-
-std::vector<std::string> time_seeds() {
-  return {"0.0\n1.036e-01\n2.0\n", "-1\n+5\r\n\n", "1\n1\n", "inf"};
-}
-
-std::vector<std::string> ply_seeds() {
-  const std::string point = floats({1.0F, -2.0F, 3.0F}) + "\x7F";
-  const std::string list = std::string("\1\0\0\0\0", 5);
-  return {ply("ascii", "1 5\n1 2 3 4\n-1e3 nan 0.5 255\n"),
-          ply("binary_little_endian", list + point + point),
-          ply("binary_big_endian", list + point + point)};
-}
-
-std::vector<std::string> pcd_seeds() {
-  const std::string point = floats({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
+std::vector<Target> reader_targets() {
+  const std::string ply_point = floats({1.0F, -2.0F, 3.0F}) + "\x7F";
+  const std::string ply_list = std::string("\1\0\0\0\0", 5);
+  const std::string pcd_point = floats({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
   // Twice 20 bytes column by column, in LZF: a literal run of 32 bytes and one of 8.
   const std::string columns(40, '\0');
   const std::string lzf = '\x1F' + columns.substr(0, 32) + '\x07' + columns.substr(0, 8);
   const std::string sizes = std::string("\x2A\0\0\0\x28\0\0\0", 8);
-  return {pcd("ascii", "1 2 3 0.5 251\nnan -inf 0 1 9\n"), pcd("binary", point + point),
-          pcd("binary_compressed", sizes + lzf)};
-}
-
-std::vector<std::string> las_seeds() {
   const std::string extra = test::extra_bytes("ring", 3) + test::extra_bytes("label", 5);
-  return {test::las_file({2, 1, "", 28, 2}, std::string(56, '\1')),
-          test::las_file({4, 6, extra, 36, 1}, std::string(36, '\0'))};
-}
-
-std::vector<std::string> npy_seeds() {
-  const std::string xyzi = floats({1.0F, 2.0F, 3.0F, 0.5F});
-  return {test::npy_file("'<f4'", "(1, 4)", xyzi), test::npy_file("'>f4'", "(1, 4)", xyzi, "True"),
-          test::npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('label', '|u1', (4,))]",
-                         "(1,)", xyzi)};
-}
-
-std::vector<std::string> xyz_seeds() {
-  return {"x,y,z,label\n1,2,3,9\n", "1 2 3\n-1e3 nan 0.5\n", "# x y z t\n\n1;2;3;4"};
-}
-
-std::vector<std::string> config_seeds() {
-  return {"# comment\nwindow = 4\ntau-s=0.6 # more\nuse_belief = off\n", "max-range = 1e3\n",
-          "window = 4\nwindow = 5\n", "tau-s =\n", "no-such = 1\n"};
+  const std::string xyzi = floats({1.0F, 2.0F, 3.0F, 0.5F}), session = session_file();
+  return {
+      {"scan",
+       read_scan_file,
+       {"", xyzi, floats({1.0F, 2.0F, 3.0F}),
+        floats({1e30F, -40.0F, 0.0F, 0.0F, NAN, INFINITY, 0.0F, 1.0F}) + "cut"}},
+      {"labels", read_labels_file, {"", std::string("\xFB\0\1\0", 4), "abc"}},
+      {"calib",
+       read_calib,
+       {"P0: 1 2 3\nTr: " + pose_row(0.25), "Tr: 0 -1 0 0 0 0 -1 0 1 0 0 -0.08"}},
+      {"times", read_times, {"0.0\n1.036e-01\n2.0\n", "-1\n+5\r\n\n", "1\n1\n", "inf"}},
+      {"ply",
+       read_point_file<kPly>,
+       {ply("ascii", "1 5\n1 2 3 4\n-1e3 nan 0.5 255\n"),
+        ply("binary_little_endian", ply_list + ply_point + ply_point),
+        ply("binary_big_endian", ply_list + ply_point + ply_point)}},
+      {"pcd",
+       read_point_file<kPcd>,
+       {pcd("ascii", "1 2 3 0.5 251\nnan -inf 0 1 9\n"), pcd("binary", pcd_point + pcd_point),
+        pcd("binary_compressed", sizes + lzf)}},
+      {"las",
+       read_point_file<kLas>,
+       {test::las_file({2, 1, "", 28, 2}, std::string(56, '\1')),
+        test::las_file({4, 6, extra, 36, 1}, std::string(36, '\0'))}},
+      {"npy",
+       read_point_file<kNpy>,
+       {test::npy_file("'<f4'", "(1, 4)", xyzi), test::npy_file("'>f4'", "(1, 4)", xyzi, "True"),
+        test::npy_file("[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('label', '|u1', (4,))]", "(1,)",
+                       xyzi)}},
+      {"xyz",
+       read_point_file<kXyz>,
+       {"x,y,z,label\n1,2,3,9\n", "1 2 3\n-1e3 nan 0.5\n", "# x y z t\n\n1;2;3;4"}},
+      {"config",
+       read_config,
+       {"# comment\nwindow = 4\ntau-s=0.6 # more\nuse_belief = off\n", "max-range = 1e3\n",
+        "window = 4\nwindow = 5\n", "tau-s =\n", "no-such = 1\n"}},
+      {"session",
+       read_session_file,
+       {session, session.substr(0, session.size() - 9), "DYNSESS5", ""}},
+  };
 }
 
 }  // namespace dynains::fuzz

@@ -1,25 +1,15 @@
 // Trajectories and folders of scans: any contents and any file names give valid poses and points,
 // or an IoError that names the place.
-#include <cmath>
-#include <filesystem>
-#include <string>
 
 #include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 namespace dynains::fuzz {
 namespace {
-
-namespace fs = std::filesystem;
-
-void require_rigid(const Eigen::Isometry3d& pose) {
-  require(pose.matrix().allFinite(), "poses are finite");
-  const Eigen::Matrix3d R = pose.linear();
-  require((R.transpose() * R).isIdentity(1e-6), "poses are rigid");
-}
 
 // One text encodes a folder: a file begins with "@@" and the letter of its name, and ends where the
 // next one begins.
@@ -71,25 +61,6 @@ void write_folder(const fs::path& folder, const std::string& text) {
   }
 }
 
-void read_whole(const fs::path& folder, const RecordingOptions& options) {
-  const Recording recording(folder, options);
-  require(recording.size() > 0, "a recording has scans");
-  for (std::size_t i = 0; i < recording.size(); ++i) {
-    require_rigid(recording.T_world_sensor(i));
-    require(std::isfinite(recording.time(i)), "times are finite");
-    require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
-    expect_value_or<IoError>(folder, [&](const fs::path&) {
-      recording.point_count(i);
-      const RecordedScan scan = recording.read_scan(i);
-      require(scan.xyzi.size() % 4 == 0, "points have four numbers");
-      require(scan.ring.empty() || scan.ring.size() == scan.size(), "a ring for each point");
-      require(scan.time.empty() || scan.time.size() == scan.size(), "a time for each point");
-    });
-    if (!recording.has_labels()) continue;
-    expect_value_or<IoError>(folder, [&](const fs::path&) { recording.read_labels(i); });
-  }
-}
-
 std::string bin(float x) {
   const float values[] = {x, 1.0F, -1.0F, 0.5F, x + 3.0F, 2.0F, 0.0F, 0.25F};
   return {reinterpret_cast<const char*>(values), sizeof(values)};
@@ -105,8 +76,6 @@ std::string ply() {
   return "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
          "property float z\nend_header\n1 2 3\n";
 }
-
-}  // namespace
 
 void run_trajectory(Bytes bytes) {
   static const test::TemporaryFolder folder;
@@ -146,36 +115,38 @@ void run_recording(Bytes bytes) {
   options.convention.shift = (choice & 16U) != 0 ? 1 : 0;
   if ((choice & 32U) != 0) options.poses = folder / kNames[3];
   if ((choice & 64U) != 0) options.times = folder / kNames[5];
-  expect_value_or<IoError>(folder, [&](const fs::path&) { read_whole(folder, options); });
+  expect_value_or<IoError>(
+      folder, [&](const fs::path&) { check_recording(folder, Recording(folder, options)); });
 }
 
-std::vector<std::string> trajectory_seeds() {
-  return {"1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n",
-          "0.0 0 0 0 0 0 0 1\n0.1 1 2 3 0 0 0.7071 0.7071\n",
-          "# timestamp,p_x,p_y,p_z,q_x,q_y,q_z,q_w\n1700000000000000000,1,2,3,0,0,0,1\n"
-          "1700000000100000000,1,2,3,0,0,0,1\n",
-          "w x y z qw qx qy qz\n1;2;3;4;1;0;0;0\n",
-          "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1\n",
-          "0.5 1 0 0 0 0 1 0 0 0 0 1 0\n1.5 0 -1 0 1 1 0 0 0 0 0 1 0\n"};
-}
+}  // namespace
 
-std::vector<std::string> recording_seeds() {
+std::vector<Target> recording_targets() {
   const std::string identity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const std::string label(8, '\0');
   return {
-      // KITTI with labels.
-      std::string(1, '\0') + file('g', bin(5.0F)) + file('h', bin(6.0F)) +
-          file('a', identity + identity) + file('b', "0\n0.1\n") + file('c', "Tr: " + identity) +
-          file('j', label) + file('k', label),
-      // Point clouds with VIEWPOINT, and point clouds with a trajectory and times.
-      std::string(1, '\3') + file('l', pcd("1 2 3 1 0 0 0")) + file('m', pcd("2 2 3 1 0 0 0")),
-      std::string(1, '\x21') + file('o', ply()) + file('p', ply()) +
-          file('d', "t,x,y,z,qx,qy,qz,qw\n1.5,0,0,0,0,0,0,1\n2.5,1,0,0,0,0,0,1\n"),
-      // Times in names.
-      std::string(1, '\1') + file('q', bin(1.0F)) + file('s', bin(2.0F)) +
-          file('e',
-               "1700000000 0 0 0 0 0 0 1\n1700000000.5 1 0 0 0 0 0 1\n"
-               "1700000001 1 0 0 0 0 0 1\n"),
+      {"trajectory",
+       run_trajectory,
+       {identity + "1 0 0 1 0 1 0 0 0 0 1 0\n", "0.0 0 0 0 0 0 0 1\n0.1 1 2 3 0 0 0.7071 0.7071\n",
+        "# timestamp,p_x,p_y,p_z,q_x,q_y,q_z,q_w\n1700000000000000000,1,2,3,0,0,0,1\n"
+        "1700000000100000000,1,2,3,0,0,0,1\n",
+        "w x y z qw qx qy qz\n1;2;3;4;1;0;0;0\n", "1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1\n",
+        "0.5 1 0 0 0 0 1 0 0 0 0 1 0\n1.5 0 -1 0 1 1 0 0 0 0 0 1 0\n"}},
+      {"recording",
+       run_recording,
+       {// KITTI with labels.
+        std::string(1, '\0') + file('g', bin(5.0F)) + file('h', bin(6.0F)) +
+            file('a', identity + identity) + file('b', "0\n0.1\n") + file('c', "Tr: " + identity) +
+            file('j', label) + file('k', label),
+        // Point clouds with VIEWPOINT, and point clouds with a trajectory and times.
+        std::string(1, '\3') + file('l', pcd("1 2 3 1 0 0 0")) + file('m', pcd("2 2 3 1 0 0 0")),
+        std::string(1, '\x21') + file('o', ply()) + file('p', ply()) +
+            file('d', "t,x,y,z,qx,qy,qz,qw\n1.5,0,0,0,0,0,0,1\n2.5,1,0,0,0,0,0,1\n"),
+        // Times in names.
+        std::string(1, '\1') + file('q', bin(1.0F)) + file('s', bin(2.0F)) +
+            file('e',
+                 "1700000000 0 0 0 0 0 0 1\n1700000000.5 1 0 0 0 0 0 1\n"
+                 "1700000001 1 0 0 0 0 0 1\n")}},
   };
 }
 

@@ -1,28 +1,16 @@
 #include "targets.hpp"
 
-#include <stdexcept>
+#include "dynains/errors.hpp"
 
 namespace dynains::fuzz {
 
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all = {
-      {"scan", run_scan, scan_seeds},
-      {"labels", run_labels, label_seeds},
-      {"calib", run_calib, calib_seeds},
-      {"times", run_times, time_seeds},
-      {"ply", run_ply, ply_seeds},
-      {"pcd", run_pcd, pcd_seeds},
-      {"las", run_las, las_seeds},
-      {"npy", run_npy, npy_seeds},
-      {"xyz", run_xyz, xyz_seeds},
-      {"config", run_config, config_seeds},
-      {"session", run_session, session_seeds},
-      {"trajectory", run_trajectory, trajectory_seeds},
-      {"recording", run_recording, recording_seeds},
-      {"log", run_log, log_seeds},
-      {"nuscenes", run_nuscenes, nuscenes_seeds},
-      {"facade", run_facade, facade_seeds},
-  };
+  static const std::vector<Target> all = [] {
+    std::vector<Target> result = reader_targets();
+    for (const Target& target : recording_targets()) result.push_back(target);
+    result.insert(result.end(), {log_target(), nuscenes_target(), facade_target()});
+    return result;
+  }();
   return all;
 }
 
@@ -35,6 +23,41 @@ const Target& target(const std::string& name) {
 
 void require(bool condition, const char* what) {
   if (!condition) throw std::logic_error(what);
+}
+
+void require_rigid(const Eigen::Isometry3d& pose) {
+  require(pose.matrix().allFinite(), "poses are finite");
+  const Eigen::Matrix3d R = pose.linear();
+  require((R.transpose() * R).isIdentity(1e-6), "poses are rigid");
+}
+
+void check_poses(const Recording& recording) {
+  require(recording.size() > 0, "a recording has scans");
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    require_rigid(recording.T_world_sensor(i));
+    require(std::isfinite(recording.time(i)), "times are finite");
+    require(i == 0 || recording.time(i) > recording.time(i - 1), "times increase");
+  }
+}
+
+void check_recording(const fs::path& place, const Recording& recording, std::size_t bytes) {
+  check_poses(recording);
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    expect_value_or<IoError>(place, [&](const fs::path&) {
+      const std::size_t announced = recording.point_count(i);
+      const RecordedScan scan = recording.read_scan(i);
+      require(bytes == 0 || scan.size() == announced, "as many points as announced");
+      require(bytes == 0 || bytes > (1U << 16U) || scan.size() <= bytes, "points come from bytes");
+      require(scan.xyzi.size() % 4 == 0, "points have four numbers");
+      require(scan.ring.empty() || scan.ring.size() == scan.size(), "a ring for each point");
+      require(scan.time.empty() || scan.time.size() == scan.size(), "a time for each point");
+    });
+    if (!recording.has_labels()) continue;
+    expect_value_or<IoError>(place, [&](const fs::path&) {
+      const std::size_t labels = recording.read_labels(i).size();
+      require(bytes == 0 || labels == recording.point_count(i), "a label for each point");
+    });
+  }
 }
 
 }  // namespace dynains::fuzz

@@ -1,13 +1,9 @@
 // Fuzzing targets: functions of bytes. They return normally, or throw to report a bug.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <utility>
-#include <vector>
-
+#include "dynains/io/recording.hpp"
 #include "dynains/points.hpp"
+#include "support/standard.hpp"
 
 namespace dynains::fuzz {
 
@@ -16,7 +12,7 @@ using Bytes = Span<const std::uint8_t>;
 struct Target {
   const char* name;
   void (*run)(Bytes);
-  std::vector<std::string> (*seeds)();  ///< initial inputs that a fuzzer mutates
+  std::vector<std::string> seeds;  ///< initial inputs that a fuzzer mutates
 };
 
 const std::vector<Target>& targets();
@@ -36,39 +32,18 @@ void expect_value_or(const std::filesystem::path& place, Read&& read) {
   }
 }
 
-// One function for each target, and one for its seeds.
-void run_scan(Bytes bytes);
-void run_labels(Bytes bytes);
-void run_calib(Bytes bytes);
-void run_times(Bytes bytes);
-void run_ply(Bytes bytes);
-void run_pcd(Bytes bytes);
-void run_las(Bytes bytes);
-void run_npy(Bytes bytes);
-void run_xyz(Bytes bytes);
-void run_config(Bytes bytes);
-void run_session(Bytes bytes);
-void run_trajectory(Bytes bytes);
-void run_recording(Bytes bytes);
-void run_log(Bytes bytes);
-void run_nuscenes(Bytes bytes);
-void run_facade(Bytes bytes);
+void require_rigid(const Eigen::Isometry3d& pose);
+/// Checks poses and times.
+void check_poses(const Recording& recording);
+/// Checks everything that a recording gives out; `bytes` is the size of the input if it is known to
+/// hold all points. A scan may be refused with its place.
+void check_recording(const fs::path& place, const Recording& recording, std::size_t bytes = 0);
 
-std::vector<std::string> scan_seeds();
-std::vector<std::string> label_seeds();
-std::vector<std::string> calib_seeds();
-std::vector<std::string> time_seeds();
-std::vector<std::string> ply_seeds();
-std::vector<std::string> pcd_seeds();
-std::vector<std::string> las_seeds();
-std::vector<std::string> npy_seeds();
-std::vector<std::string> xyz_seeds();
-std::vector<std::string> config_seeds();
-std::vector<std::string> session_seeds();
-std::vector<std::string> trajectory_seeds();
-std::vector<std::string> recording_seeds();
-std::vector<std::string> log_seeds();
-std::vector<std::string> nuscenes_seeds();
-std::vector<std::string> facade_seeds();
+// Targets by what they run.
+std::vector<Target> reader_targets();
+std::vector<Target> recording_targets();
+Target log_target();
+Target nuscenes_target();
+Target facade_target();
 
 }  // namespace dynains::fuzz

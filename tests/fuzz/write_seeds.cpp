@@ -1,9 +1,7 @@
 // write_seeds FOLDER: one folder for each target, one file for each seed.
-#include <exception>
-#include <iostream>
-#include <string>
 
 #include "io/files.hpp"
+#include "support/standard.hpp"
 #include "targets.hpp"
 
 int main(int argc, char** argv) {
@@ -11,7 +9,7 @@ int main(int argc, char** argv) {
     if (argc != 2) throw std::runtime_error("usage: write_seeds FOLDER");
     for (const dynains::fuzz::Target& target : dynains::fuzz::targets()) {
       std::size_t number = 0;
-      for (const std::string& seed : target.seeds()) {
+      for (const std::string& seed : target.seeds) {
         const std::string name = "seed" + std::to_string(number++);
         dynains::test::write_text(std::filesystem::path(argv[1]) / target.name / name, seed);
       }
