@@ -47,14 +47,20 @@ void VoxelProtocol::add(const LabelledScan& scan) {
   if (!grid_) grid_.emplace(config_.voxel, scan.T_world_sensor.translation());
   const auto is_needed = [](VoxelKey) { return true; };
   voxelise(scan, is_needed, [&](const ScanVoxel& found) {
-    const std::size_t number = index_.insert(found.key);
-    if (number == keys_.size()) {
-      keys_.push_back(found.key);
-      cells_.resize(cells_.size() + layers_);
+    const std::uint32_t number = index_.insert(found.key);
+    const auto end = static_cast<std::uint32_t>(cells_.size());
+    if (number == voxels_.size()) {
+      voxels_.push_back({found.key, end});
+      cells_.emplace_back();
     }
-    for (std::size_t layer = 0; layer < layers_; ++layer) {
+    Voxel& voxel = voxels_[number];
+    if (!voxel.has_layers && found.layers != all_layers_) {
+      cells_.resize(end + layers_, Cell(cells_[voxel.first]));
+      voxel = {found.key, end, true};
+    }
+    for (std::size_t layer = 0; layer < (voxel.has_layers ? layers_ : 1); ++layer) {
       if ((found.layers >> layer & 1U) == 0) continue;
-      Cell& cell = cells_[number * layers_ + layer];
+      Cell& cell = cells_[voxel.place(layer)];
       cell.sum += found.point.p_world;
       ++cell.count;
       cell.truths |= detail::truth_bit(found.point.truth);
@@ -64,20 +70,20 @@ void VoxelProtocol::add(const LabelledScan& scan) {
 
 // The class of a cell with points of both is that of the nearest one.
 void VoxelProtocol::resolve(const LabelledScan& scan) {
-  const auto first_of = [&](VoxelKey key) { return index_.find(key) * layers_; };
   const auto is_mixed = [&](VoxelKey key) {
-    if (index_.find(key) == kNoIndex) return false;
-    const Cell* const cells = &cells_[first_of(key)];
+    const std::uint32_t number = index_.find(key);
+    if (number == kNoIndex || !voxels_[number].has_layers) return false;
+    const Cell* const cells = &cells_[voxels_[number].first];
     return std::any_of(cells, cells + layers_,
                        [](const Cell& cell) { return detail::is_mixed(cell.truths); });
   };
   voxelise(scan, is_mixed, [&](const ScanVoxel& found) {
     for (std::size_t layer = 0; layer < layers_; ++layer) {
-      const std::size_t number = first_of(found.key) + layer;
-      Cell& cell = cells_[number];
+      const std::size_t place = voxels_[index_.find(found.key)].place(layer);
+      Cell& cell = cells_[place];
       if ((found.layers >> layer & 1U) == 0 || !detail::is_mixed(cell.truths)) continue;
       const double squared = (found.point.p_world - cell.centroid()).squaredNorm();
-      const auto [nearest, is_first] = nearest_.try_emplace(number, squared);
+      const auto [nearest, is_first] = nearest_.try_emplace(place, squared);
       if (!is_first && !detail::is_nearer(squared, nearest->second)) continue;
       nearest->second = squared;
       cell.nearest_truth = found.point.truth;
@@ -88,11 +94,11 @@ void VoxelProtocol::resolve(const LabelledScan& scan) {
 Score VoxelProtocol::score(std::size_t row) const {
   Score score;
   const auto point_at = [&](std::uint32_t number) {
-    return cells_[number * layers_ + row].point();
+    return cells_[voxels_[number].place(row)].point();
   };
-  for (std::size_t number = 0; number < keys_.size(); ++number) {
-    const VoxelPoint raw = *cells_[number * layers_ + kIdentity].point();
-    const bool is_kept = detail::is_preserved(raw, keys_[number], *grid_, index_, point_at);
+  for (const Voxel& voxel : voxels_) {
+    const VoxelPoint raw = *cells_[voxel.place(kIdentity)].point();
+    const bool is_kept = detail::is_preserved(raw, voxel.key, *grid_, index_, point_at);
     score.add(raw.truth, 1, is_kept ? 1 : 0);
   }
   return score;

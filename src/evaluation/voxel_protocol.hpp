@@ -52,8 +52,8 @@ class VoxelProtocol {
   /// an estimate.
   template <class Visit>
   void for_each(std::size_t row, Visit&& visit) const {
-    for (std::size_t number = 0; number < keys_.size(); ++number) {
-      if (const auto held = cells_[number * layers_ + row].point()) visit(*held);
+    for (const Voxel& voxel : voxels_) {
+      if (const auto held = cells_[voxel.place(row)].point()) visit(*held);
     }
   }
 
@@ -74,6 +74,16 @@ class VoxelProtocol {
     VoxelKey key;
     VoxelPoint point;
     LayerMask layers;
+  };
+
+  /// Where cells_ has those of a voxel: one of all layers or, from the first scan in which layers
+  /// differ, one of each.
+  struct Voxel {
+    VoxelKey key;
+    std::uint32_t first;
+    bool has_layers = false;
+
+    std::size_t place(std::size_t layer) const { return first + (has_layers ? layer : 0); }
   };
 
   /// The points of one layer in one voxel: at most one per scan.
@@ -105,8 +115,8 @@ class VoxelProtocol {
   std::vector<LayeredPoint> points_;  // of one scan
 
   VoxelHashTable<> index_;
-  std::vector<VoxelKey> keys_;  // by number of voxel
-  std::vector<Cell> cells_;     // by number of voxel, then by layer
+  std::vector<Voxel> voxels_;  // by number
+  std::vector<Cell> cells_;
   // By place in cells_, of points of both classes: squared distance of nearest_truth, m^2.
   std::unordered_map<std::size_t, double> nearest_;
 };
