@@ -12,6 +12,20 @@
 #include "text.hpp"
 
 namespace dynains {
+namespace {
+
+/// For a read that gave fewer bytes than the file has, before anything else sets errno.
+[[noreturn]] void fail_to_read(const std::ifstream& file, const std::filesystem::path& path,
+                               std::uint64_t position, std::uint64_t size) {
+  const int reason = errno;
+  const std::string what =
+      "reading stopped at byte " + std::to_string(position) + " of " + std::to_string(size);
+  // Without a failed call the file has become shorter.
+  if (file.bad()) fail_by_system(path, what, reason);
+  fail(path, what + ": the file ends there");
+}
+
+}  // namespace
 
 ByteReader::ByteReader(const std::filesystem::path& path)
     : path_(path), file_(open_input(path)), size_(size_of_file(path)) {}
@@ -111,5 +125,14 @@ void ByteReader::check_room(std::uint64_t count, const char* what, std::uint64_t
 void ByteReader::fail_here(const std::string& what) const { fail_at_byte(path_, position_, what); }
 
 void ByteReader::fail_on_line(const std::string& what) const { fail_at_line(path_, line_, what); }
+
+std::string read_text_file(const std::filesystem::path& path) {
+  constexpr std::uint64_t kMost = std::uint64_t{64} << 20U;  // bytes
+  ByteReader file(path);
+  if (file.size() > kMost) {
+    fail(path, "has " + std::to_string(file.size()) + " bytes, more than " + std::to_string(kMost));
+  }
+  return file.read_block(file.size(), "a text");
+}
 
 }  // namespace dynains

@@ -72,6 +72,9 @@ class ByteReader {
   std::uint64_t line_ = 0;
 };
 
+/// The bytes of a regular file, at most 64 MiB. Throws IoError.
+std::string read_text_file(const std::filesystem::path& path);
+
 /// Sequential reader of a block that lies at byte `origin` of a file. Throws IoError with the byte.
 class Bytes {
  public:

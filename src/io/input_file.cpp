@@ -58,28 +58,4 @@ std::ifstream open_input(const fs::path& path) {
   return file;
 }
 
-void fail_to_read(const std::ifstream& file, const fs::path& path, std::uint64_t position,
-                  std::uint64_t size) {
-  const int reason = errno;
-  const std::string what =
-      "reading stopped at byte " + std::to_string(position) + " of " + std::to_string(size);
-  // Without a failed call the file has become shorter.
-  if (file.bad()) fail_by_system(path, what, reason);
-  fail(path, what + ": the file ends there");
-}
-
-std::string read_text_file(const std::filesystem::path& path) {
-  std::ifstream file = open_input(path);
-  const std::uint64_t size = size_of_file(path);
-  if (size > kMaxTextBytes) {
-    fail(path,
-         "has " + std::to_string(size) + " bytes, more than " + std::to_string(kMaxTextBytes));
-  }
-  std::string text(static_cast<std::size_t>(size), '\0');
-  file.read(text.data(), static_cast<std::streamsize>(size));
-  const auto count = static_cast<std::uint64_t>(file.gcount());
-  if (count < size) fail_to_read(file, path, count, size);
-  return text;
-}
-
 }  // namespace dynains

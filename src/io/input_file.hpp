@@ -25,14 +25,4 @@ std::vector<std::filesystem::path> paths_in(const std::filesystem::path& folder)
 /// reading may never end.
 std::ifstream open_input(const std::filesystem::path& path);
 
-/// Bytes that a text file may have.
-inline constexpr std::uint64_t kMaxTextBytes = std::uint64_t{64} << 20U;
-/// The bytes of a regular file. Throws IoError, also for a larger file.
-std::string read_text_file(const std::filesystem::path& path);
-
-/// For a read that gave fewer bytes than the file has. Call it before anything else sets errno.
-/// Throws IoError.
-[[noreturn]] void fail_to_read(const std::ifstream& file, const std::filesystem::path& path,
-                               std::uint64_t position, std::uint64_t size);
-
 }  // namespace dynains

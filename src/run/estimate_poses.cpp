@@ -9,6 +9,7 @@
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/odometry/odometry.hpp"
 #include "interrupt.hpp"
+#include "io/byte_reader.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
 #include "io/text.hpp"

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -15,7 +13,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/version.hpp"
-#include "io/failure.hpp"
+#include "io/byte_reader.hpp"
 #include "io/fingerprint.hpp"
 #include "io/input_file.hpp"
 #include "io/scan_files.hpp"
@@ -211,17 +209,14 @@ Folder::Rename check_output(const Folder& folder, const std::string& name, Exist
 }
 
 Json content_of(const fs::path& file) {
-  std::ifstream stream = open_input(file);
+  ByteReader reader(file);
   Fingerprint fingerprint;
-  std::array<char, std::size_t{1} << 16U> block;
-  std::uint64_t bytes = 0;
-  errno = 0;
-  while (stream.read(block.data(), block.size()), stream.gcount() > 0) {
-    fingerprint.add_words(block.data(), static_cast<std::size_t>(stream.gcount()));
-    bytes += static_cast<std::uint64_t>(stream.gcount());
+  while (reader.remaining() > 0) {
+    constexpr std::uint64_t kBlock = 1U << 16U;  // bytes
+    const std::string block = reader.read_block(std::min(kBlock, reader.remaining()), "its size");
+    fingerprint.add_words(block.data(), block.size());
   }
-  if (stream.bad()) fail_by_system(file, "cannot be read", errno);
-  return {{"bytes", bytes}, {"fingerprint", fingerprint.text()}};
+  return {{"bytes", reader.size()}, {"fingerprint", fingerprint.text()}};
 }
 
 fs::path whole_path(const fs::path& path) {

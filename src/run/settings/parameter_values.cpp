@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "dynains/parameters.hpp"
-#include "io/input_file.hpp"
+#include "io/byte_reader.hpp"
 
 namespace dynains::run {
 namespace {
