@@ -101,7 +101,7 @@ class WorldMaker {
       if (chance(0.6)) start.arguments.emplace_back("--force");
     } else {
       const std::vector<Arguments> others = {
-          {"check", input(world)}, {"config"}, {"config", "--markdown"}, {"--help"}, {}, {"rum"}};
+          {"check", input(world)}, {"config"}, {"--help"}, {}, {"rum"}};
       start.arguments = others[random_.index(others.size())];
     }
     if (chance(0.05)) start.arguments.push_back(pick({"", "-1", "--", "nan", "--x"}));
