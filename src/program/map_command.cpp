@@ -34,49 +34,44 @@ fs::path target_of(const std::string& name) {
   throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
 }
 
-std::unique_ptr<MapFile> open_map(const City& city, const fs::path& file) {
-  double most = 0.0;
-  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
-  for (const SessionInfo& session : city.sessions()) {
-    most = std::max(
-        {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
-    lowest = session.lowest;
-  }
-  PointColumns columns;
-  columns.label = columns.time = columns.session = true;
-  columns.double_xyz = most > kFloatCoordinateLimit;
-  return std::make_unique<MapFile>(file, columns, Pose::Identity(), las_options_near(lowest));
-}
-
-/// Writes points of a city with their session, its begin as time, and their label, as far as the
-/// format has them.
+/// A file for points of a city.
 class CityPointFile {
  public:
   /// Throws ConfigError, IoError.
   CityPointFile(const City& city, const std::string& name, bool force)
-      : city_(city),
-        output_(target_of(name), existing_by(force), InputFiles(city.folder())),
-        file_(open_map(city, output_.path())) {}
+      : city_(city), output_(target_of(name), existing_by(force), InputFiles(city.folder())) {}
 
-  void add(const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
-    FilePoint of_map{position_of(city_.grid(), tile, point)};
-    of_map.time = of_map.scan_time = city_.sessions()[session].begin;
-    of_map.label = of_map.instance = point.label;
-    of_map.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-    of_map.is_ground = point.is_ground != 0;
-    file_->add(of_map);
+  /// Calls `fill(add)`, and `add(tile, session, point)` writes a point with its session, the begin
+  /// of that as time, and its label, as far as the format has them. Returns their number.
+  template <class Fill>
+  std::size_t write(Fill&& fill) {
+    double most = 0.0;
+    Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
+    for (const SessionInfo& session : city_.sessions()) {
+      most = std::max(
+          {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
+      lowest = session.lowest;
+    }
+    PointColumns columns;
+    columns.label = columns.time = columns.session = true;
+    columns.double_xyz = most > kFloatCoordinateLimit;
+    return write_points(output_, columns, las_options_near(lowest), [&](const AddPoint& add) {
+      fill([&](const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
+        FilePoint of_map{position_of(city_.grid(), tile, point)};
+        of_map.time = of_map.scan_time = city_.sessions()[session].begin;
+        of_map.label = of_map.instance = point.label;
+        of_map.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+        of_map.is_ground = point.is_ground != 0;
+        add(of_map);
+      });
+    });
   }
 
-  std::size_t size() const { return file_->size(); }
-  void commit() {
-    file_->commit();
-    output_.put_in_place();
-  }
+  void put_in_place() { output_.put_in_place(); }
 
  private:
   const City& city_;
   OutputFile output_;
-  std::unique_ptr<MapFile> file_;
 };
 
 void list(const MapOptions& options) {
@@ -98,14 +93,16 @@ void list(const MapOptions& options) {
 /// Writes the map after session number `last`.
 void write_map(const City& city, std::uint32_t last, const MapOptions& options) {
   CityPointFile file(city, options.file, options.force);
-  for (const TileIndex& tile : city.tiles()) {
-    const TileHistory history = city.history(tile, last);
-    history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
-      file.add(tile, static_cast<std::uint32_t>(session), history.points(session)[i]);
-    });
-  }
-  file.commit();
-  std::cout << options.file << ": " << file.size() << " points" << std::endl;
+  const std::size_t count = file.write([&](const auto& add) {
+    for (const TileIndex& tile : city.tiles()) {
+      const TileHistory history = city.history(tile, last);
+      history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
+        add(tile, static_cast<std::uint32_t>(session), history.points(session)[i]);
+      });
+    }
+  });
+  file.put_in_place();
+  std::cout << options.file << ": " << count << " points" << std::endl;
 }
 
 void export_map(const MapOptions& options) {
@@ -130,15 +127,20 @@ void diff(const MapOptions& options) {
   }
   CityPointFile added(city, options.added, options.force);
   CityPointFile removed(city, options.removed, options.force);
-  for (const TileIndex& tile : city.tiles()) {
-    const CityChanges changes = city.changes(tile, a, b);
-    for (const CityPoint& p : changes.added) added.add(tile, p.session, p.point);
-    for (const CityPoint& p : changes.removed) removed.add(tile, p.session, p.point);
-  }
-  added.commit();
-  removed.commit();
-  std::cout << options.added << ": " << added.size() << " points\n"
-            << options.removed << ": " << removed.size() << " points" << std::endl;
+  std::size_t removed_count = 0;
+  const std::size_t added_count = added.write([&](const auto& add) {
+    removed_count = removed.write([&](const auto& add_removed) {
+      for (const TileIndex& tile : city.tiles()) {
+        const CityChanges changes = city.changes(tile, a, b);
+        for (const CityPoint& p : changes.added) add(tile, p.session, p.point);
+        for (const CityPoint& p : changes.removed) add_removed(tile, p.session, p.point);
+      }
+    });
+  });
+  added.put_in_place();
+  removed.put_in_place();
+  std::cout << options.added << ": " << added_count << " points\n"
+            << options.removed << ": " << removed_count << " points" << std::endl;
 }
 
 void drop(const MapOptions& options) {

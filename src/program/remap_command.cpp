@@ -1,7 +1,6 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,8 +38,8 @@ struct RemapOptions {
     const SettingFlags flags{command};
     flags(plain_text("map", map, "FILE",
                      "static map, .ply or .pcd [static_map_remapped.ply in OUT]"));
-    flags(TextParameter{"map_voxel", map_voxel, &read_number<double>, "M",
-                        "resolution of the static map; 0 keeps all points [of the run]"});
+    flags(plain_text("map_voxel", map_voxel, "M",
+                     "resolution of the static map; 0 keeps all points [of the run]"));
     flags(plain_text("update", update, "CITY",
                      "also replaces the session of the run in this map of many sessions: its "
                      "points and references move to the corrected poses"));
@@ -52,9 +51,9 @@ struct RemapOptions {
   RecordingFlags sequence;
   Argument run;
   std::string map;
-  std::string update;               // folder of a map of many sessions; empty: none
-  std::string session;              // its name there; empty: that of the run
-  std::optional<double> map_voxel;  // m
+  std::string update;     // folder of a map of many sessions; empty: none
+  std::string session;    // its name there; empty: that of the run
+  std::string map_voxel;  // m; empty: that of the run
   bool force = false;
   bool quiet = false;
 };
@@ -149,12 +148,15 @@ class NewMap {
  public:
   NewMap(const RemapOptions& options, ResultFolder& out, const Recording& recording,
          const ScanRange& range, const InputFiles& inputs)
-      : out_(out) {
+      : out_(out), columns_(map_columns(recording, range, false)) {
     const fs::path folder = whole_path(out.path());
-    path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
-    if (is_las(path_)) {
+    const auto is_written = [](const fs::path& name) {
+      return is_point_file(name) && !is_las(name);
+    };
+    if (!options.map.empty() && !(is_written(options.map) && is_written(whole_path(options.map)))) {
       throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
     }
+    path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
     is_inside_ = path_.parent_path() == folder;
     if (is_inside_ && path_.filename() != kRemappedMap) {
       throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
@@ -165,7 +167,6 @@ class NewMap {
     } else {
       file_.emplace(path_, existing_by(options.force), inputs);
     }
-    writer_ = open_map(file_->path(), recording, range, false, "");
   }
 
   const fs::path& path() const { return path_; }
@@ -173,8 +174,9 @@ class NewMap {
   /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
   template <class Publish>
   void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
-    map.for_each([&](const Eigen::Vector3d& point) { writer_->add({point}); });
-    writer_->commit();
+    write_points(*file_, columns_, {}, [&](const AddPoint& add) {
+      map.for_each([&](const Eigen::Vector3d& point) { add({point}); });
+    });
     if (!is_inside_) return file_->put_in_place(publish_more);
     Json report = out_.marker();
     report.erase(kField);
@@ -194,7 +196,7 @@ class NewMap {
   fs::path path_;
   bool is_inside_ = false;  // the folder of the run
   std::optional<OutputFile> file_;
-  std::unique_ptr<MapFile> writer_;
+  PointColumns columns_;
 };
 
 /// The flags that state how the points of the run are stored.
@@ -211,7 +213,11 @@ Json point_flags(const ResultFolder& out) {
 void remap(RemapOptions& options) {
   ResultFolder out = open_finished_run(options.run.value);
   const bool has_points_in_world = out.field<bool>("/request/points_in_world");
-  const double map_voxel = out.field<double>("/configuration/map_voxel");
+  StaticMapAccumulator::Config config;
+  config.map_voxel = out.field<double>("/configuration/map_voxel");
+  ParameterValues values;
+  if (!options.map_voxel.empty()) values.set("map-voxel", options.map_voxel, "--map-voxel");
+  values.apply(config);
   options.sequence.settings.complete(point_flags(out));
   RecordingOptions with_new_poses = options.sequence.settings.checked();
   with_new_poses.frame = has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;
@@ -233,8 +239,6 @@ void remap(RemapOptions& options) {
     session.emplace(City::open_or_make(request.city, request.grid), request.info,
                     SessionWriter::Mode::kReplace);
   }
-  StaticMapAccumulator::Config config;
-  config.map_voxel = options.map_voxel.value_or(map_voxel);
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path(), config,
                 options.quiet, session ? &*session : nullptr);

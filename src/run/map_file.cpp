@@ -48,9 +48,7 @@ LasOptions las_options_near(const Eigen::Vector3d& position) {
   return options;
 }
 
-std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
-                                  const ScanRange& range, bool has_attributes,
-                                  const std::string& crs) {
+PointColumns map_columns(const Recording& recording, const ScanRange& range, bool has_attributes) {
   PointColumns columns;
   columns.double_xyz = is_far(recording, range);
   if (has_attributes) {
@@ -58,13 +56,28 @@ std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recor
     columns.time = recording.columns().time;
     columns.label = recording.has_labels();
   }
+  return columns;
+}
+
+std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
+                                          const Recording& recording, const ScanRange& range,
+                                          bool has_attributes, const std::string& crs) {
   LasOptions las;
   if (is_las(file)) {
     las = las_options_near(recording.T_world_sensor(range.first).translation());
     las.wkt = crs;
     las.intensity_scale = las_intensity_scale(recording.read_scan(range.first));
   }
-  return std::make_unique<MapFile>(file, columns, Pose::Identity(), las);
+  return std::make_unique<PointFileWriter>(file, map_columns(recording, range, has_attributes),
+                                           Pose::Identity(), las);
+}
+
+std::size_t write_points(const OutputFile& output, const PointColumns& columns,
+                         const LasOptions& las, const std::function<void(const AddPoint&)>& fill) {
+  PointFileWriter writer(output.path(), columns, Pose::Identity(), las);
+  fill([&](const FilePoint& point) { writer.add(point); });
+  writer.commit();
+  return writer.size();
 }
 
 PointColumns moving_columns(const Recording& recording, const ScanRange& range) {

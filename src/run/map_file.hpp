@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "dynains/io/point_file.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
 #include "verdict_files.hpp"
 
@@ -54,13 +56,19 @@ double edge_by_spacing(std::size_t points, double least, double most, Count&& co
 /// so that its coordinates stay short.
 LasOptions las_options_near(const Eigen::Vector3d& position);
 
-/// The file of a static map.
-using MapFile = PointFileWriter;
+/// Columns of the map of these scans.
+PointColumns map_columns(const Recording& recording, const ScanRange& range, bool has_attributes);
 
 /// Opens a file for the map of these scans. `crs`: see LasOptions::wkt. Throws IoError.
-std::unique_ptr<MapFile> open_map(const std::filesystem::path& file, const Recording& recording,
-                                  const ScanRange& range, bool has_attributes,
-                                  const std::string& crs);
+std::unique_ptr<PointFileWriter> open_map(const std::filesystem::path& file,
+                                          const Recording& recording, const ScanRange& range,
+                                          bool has_attributes, const std::string& crs);
+
+using AddPoint = std::function<void(const FilePoint&)>;
+/// Writes the points that `fill(add)` adds to the file of an output, which is not put in place.
+/// Returns their number. Throws IoError.
+std::size_t write_points(const OutputFile& output, const PointColumns& columns,
+                         const LasOptions& las, const std::function<void(const AddPoint&)>& fill);
 
 /// Columns of the file of moving points of these scans.
 PointColumns moving_columns(const Recording& recording, const ScanRange& range);

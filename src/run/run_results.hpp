@@ -133,7 +133,7 @@ class RunResults {
   PackedVerdict online_;  // belongs to writing_online_
   PointFileWriter dynamic_points_;
   Overview overview_;
-  std::unique_ptr<MapFile> map_;
+  std::unique_ptr<PointFileWriter> map_;
   std::optional<MapAttributeTable> map_attributes_;
   std::optional<StaticMapAccumulator> revised_map_;
   std::vector<std::uint8_t> keep_;  // of the points for that map
