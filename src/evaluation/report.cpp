@@ -131,11 +131,6 @@ Json errors_to_json(const Evaluation& evaluation) {
 
 }  // namespace
 
-TextTable::TextTable(std::vector<std::string> header, std::size_t left_columns)
-    : left_columns_(left_columns) {
-  rows_.push_back(std::move(header));
-}
-
 void TextTable::add(std::vector<std::string> row) {
   if (row.size() > rows_.front().size()) {
     throw std::invalid_argument("a table row has more cells than the header");
@@ -151,7 +146,7 @@ std::string TextTable::to_string() const {
   std::ostringstream text;
   for (const auto& row : rows_) {
     for (std::size_t c = 0; c < row.size(); ++c) {
-      text << (c == 0 ? "" : "  ") << (c < left_columns_ ? std::left : std::right)
+      text << (c == 0 ? "" : "  ") << (c == 0 ? std::left : std::right)
            << std::setw(static_cast<int>(widths[c])) << row[c];
     }
     text << '\n';

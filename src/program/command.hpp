@@ -25,7 +25,6 @@ void add_check_command(CLI::App& app);
 void add_odometry_command(CLI::App& app);
 void add_config_command(CLI::App& app);
 void add_eval_command(CLI::App& app);
-void add_experiment_command(CLI::App& app);
 void add_view_command(CLI::App& app);
 void add_grid_command(CLI::App& app);
 

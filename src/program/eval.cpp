@@ -18,9 +18,11 @@
 namespace dynains::program {
 namespace {
 
+using evaluation::EvaluationConfig;
+
 struct EvalOptions {
-  explicit EvalOptions(CLI::App& command)
-      : sequence(command, "labelled sequence"), evaluation(command, "ignore") {
+  explicit EvalOptions(CLI::App& command) : sequence(command, "labelled sequence") {
+    add_protocol(command);
     command.add_option("runs", runs, "output folders of `dynains run`");
     command
         .add_option("--map", maps,
@@ -39,17 +41,54 @@ struct EvalOptions {
     command.add_flag("--force", force, "replace the files of --json and --csv");
   }
 
+  EvaluationConfig config() const {
+    EvaluationConfig config = protocol;
+    if (max_range_option->count() > 0) config.max_range = config.point_max_range = max_range;
+    config.truth =
+        evaluation::TruthClasses(classes, value_of_name<evaluation::Unlabeled>(unlabeled).value());
+    config.validate();
+    return config;
+  }
+
   RecordingFlags sequence;
   std::vector<std::string> runs;
   std::vector<std::string> maps;
   ScanWindow window;
-  EvaluationOptions evaluation;
+  EvaluationConfig protocol;  // without what follows
+  double max_range = 0;
+  CLI::Option* max_range_option;
+  std::string classes = evaluation::TruthClasses().dynamic_classes();
+  std::string unlabeled = "ignore";
   bool online = false;
   bool errors = false;
   bool unfinished = false;
   bool force = false;
   std::string json;
   std::string csv;
+
+ private:
+  void add_protocol(CLI::App& command) {
+    EvaluationConfig::visit(protocol, [&](const auto& parameter) {
+      const std::string name = flag_name(parameter.name);
+      if (name == "max-range" || name == "point-max-range") return;
+      command.add_option("--" + name, parameter.value, std::string(parameter.help) + " [m]")
+          ->capture_default_str();
+    });
+    max_range_option = command.add_option(
+        "--max-range", max_range,
+        "points at a larger planar range are not judged, 0 = no limit [m] (PR and RR: 0; SA, DA "
+        "and error analysis: 50)");
+    command
+        .add_option("--classes", classes,
+                    "dynamic class ids of the ground truth, for example 252-257,259")
+        ->capture_default_str();
+    command
+        .add_option("--unlabeled", unlabeled,
+                    "points of class 0 and 1: ignore them, or count them as static as the "
+                    "published tables do")
+        ->check(CLI::IsMember({"ignore", "static"}))
+        ->capture_default_str();
+  }
 };
 
 InputFiles inputs_of(const EvalOptions& options, const Recording& recording) {
@@ -67,7 +106,7 @@ void check_are_finished(const EvalOptions& options) {
 }
 
 void eval(const EvalOptions& options) {
-  const evaluation::EvaluationConfig config = options.evaluation.config();
+  const EvaluationConfig config = options.config();
   if (options.runs.size() > evaluation::kMaxEstimates) {
     throw ConfigError("at most " + std::to_string(evaluation::kMaxEstimates) +
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));

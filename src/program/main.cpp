@@ -16,7 +16,6 @@ int main(int argc, char** argv) {
   add_odometry_command(app);
   add_config_command(app);
   add_eval_command(app);
-  add_experiment_command(app);
   add_view_command(app);
   add_grid_command(app);
   app.callback([&app] {

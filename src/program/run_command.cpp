@@ -17,8 +17,8 @@ namespace dynains::program {
 namespace {
 
 struct RunFlags {
-  explicit RunFlags(CLI::App& command)
-      : recording(command, "recording"), remover(command, "default") {
+  explicit RunFlags(CLI::App& command) : recording(command, "recording") {
+    add_parameters(command);
     command
         .add_option_function<std::string>(
             "-o,--out", [this](const std::string& out) { settings.outputs.folder = out; },
@@ -35,12 +35,39 @@ struct RunFlags {
   }
 
   RecordingFlags recording;
-  RemoverOptions remover;
-  RunSettings settings;  // recording and configuration are filled in after parsing
+  ParameterValues parameters;  // that flags name
+  RunSettings settings;        // recording and configuration are filled in after parsing
   bool odometry = false;
   bool is_compensated = false;
   bool quiet = false;
+
+ private:
+  void add_parameters(CLI::App& command) {
+    command
+        .add_option("--preset", settings.preset,
+                    "parameters to start from; offline: for recordings, verdicts wait for 100 "
+                    "later scans")
+        ->check(CLI::IsMember(preset_names()))
+        ->capture_default_str();
+    command.add_option("--config", settings.config_file, "config file, see dynains config");
+    const DynaInsRemover::Config defaults;
+    DynaInsRemover::Config::visit_sections(defaults, [&](const char* group, const auto& section) {
+      add_parameter_flags(command, section, group, parameters);
+    });
+  }
 };
+
+/// By preset, config file and flags, in this order of precedence from low to high.
+void take_parameters(const ParameterValues& flags, RunSettings& settings) {
+  const ParameterValues of_file =
+      settings.config_file.empty() ? ParameterValues() : read_config_file(settings.config_file);
+  settings.config = DynaInsRemover::Config::preset(settings.preset);
+  of_file.apply(settings.config);
+  flags.apply(settings.config);
+  settings.config.validate();
+  settings.find_own_body =
+      !has_ranges_of_paper(settings.preset) && !flags.has("min-range") && !of_file.has("min-range");
+}
 
 void print_results(const RunOutcome& run) {
   const RunOutputs& outputs = run.outputs;
@@ -111,11 +138,7 @@ Recording open(RunFlags& flags, PoseEstimate& estimate) {
 
 void run_as_asked(RunFlags& flags) {
   RunSettings& settings = flags.settings;
-  settings.config = flags.remover.config();
-  settings.preset = flags.remover.preset_name();
-  settings.config_file = flags.remover.config_file();
-  settings.find_own_body =
-      !has_ranges_of_paper(settings.preset) && !flags.remover.sets("min-range");
+  take_parameters(flags.parameters, settings);
   settings.recording = flags.recording.folder;
   settings.recording_as_given = flags.recording.settings.as_given(settings.recording);
   settings.recording_flags = flags.recording.settings.flags;

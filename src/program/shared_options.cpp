@@ -42,8 +42,8 @@ Recording RecordingFlags::open_of_run(const ResultFolder& out, const std::string
   return open();
 }
 
-Recording RecordingFlags::open(const std::filesystem::path& other) const {
-  Recording recording(other, settings.checked());
+Recording RecordingFlags::open() const {
+  Recording recording(folder, settings.checked());
   for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }
@@ -62,70 +62,6 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
   Recording recording(folder, options);
   for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
-}
-
-RemoverOptions::RemoverOptions(CLI::App& command, std::string default_preset)
-    : preset_(std::move(default_preset)) {
-  command
-      .add_option(
-          "--preset", preset_,
-          "parameters to start from; offline: for recordings, verdicts wait for 100 later scans")
-      ->check(CLI::IsMember(preset_names()))
-      ->capture_default_str();
-  command.add_option("--config", config_file_, "config file, see dynains config");
-  const auto defaults = DynaInsRemover::Config::preset(preset_);
-  DynaInsRemover::Config::visit_sections(defaults, [&](const char* group, const auto& section) {
-    add_parameter_flags(command, section, group, flags_);
-  });
-}
-
-DynaInsRemover::Config RemoverOptions::config() const {
-  DynaInsRemover::Config config = DynaInsRemover::Config::preset(preset_);
-  if (!config_file_.empty()) read_config_file(config_file_).apply(config);
-  flags_.apply(config);
-  config.validate();
-  return config;
-}
-
-bool RemoverOptions::sets(const std::string& flag_name) const {
-  return flags_.has(flag_name) ||
-         (!config_file_.empty() && read_config_file(config_file_).has(flag_name));
-}
-
-EvaluationOptions::EvaluationOptions(CLI::App& command, std::string unlabeled,
-                                     const std::string& prefix)
-    : unlabeled_(std::move(unlabeled)) {
-  using evaluation::EvaluationConfig;
-  EvaluationConfig::visit(config_, [&](const auto& parameter) {
-    std::string name = parameter.name;
-    if (name == "max_range" || name == "point_max_range") return;
-    std::replace(name.begin(), name.end(), '_', '-');
-    command.add_option("--" + prefix + name, parameter.value, std::string(parameter.help) + " [m]")
-        ->capture_default_str();
-  });
-  max_range_option_ = command.add_option(
-      "--" + prefix + "max-range", max_range_,
-      "points at a larger planar range are not judged, 0 = no limit [m] (PR and RR: 0; SA, DA and "
-      "error analysis: 50)");
-  command
-      .add_option("--" + prefix + "classes", classes_,
-                  "dynamic class ids of the ground truth, for example 252-257,259")
-      ->capture_default_str();
-  command
-      .add_option("--" + prefix + "unlabeled", unlabeled_,
-                  "points of class 0 and 1: ignore them, or count them as static as the published "
-                  "tables do")
-      ->check(CLI::IsMember({"ignore", "static"}))
-      ->capture_default_str();
-}
-
-evaluation::EvaluationConfig EvaluationOptions::config() const {
-  evaluation::EvaluationConfig config = config_;
-  if (max_range_option_->count() > 0) config.max_range = config.point_max_range = max_range_;
-  config.truth =
-      evaluation::TruthClasses(classes_, value_of_name<evaluation::Unlabeled>(unlabeled_).value());
-  config.validate();
-  return config;
 }
 
 }  // namespace dynains::program

@@ -26,10 +26,7 @@ class LabelledSequence {
   LabelledSequence(const LabelledSequence&) = delete;
   LabelledSequence& operator=(const LabelledSequence&) = delete;
 
-  const Recording& sequence() const { return sequence_; }
   std::size_t size() const { return scans_.size(); }
-  /// Index within sequence() of chosen scan i.
-  std::size_t index(std::size_t i) const { return scans_[i]; }
   /// Scans of the window without ground truth.
   std::size_t missing_truths() const { return missing_truths_; }
 
@@ -51,7 +48,7 @@ class LabelledSequence {
   Recording sequence_;
   std::vector<VerdictFiles> runs_;
   std::vector<Eigen::Vector3d> origins_;  // of several sensors, see LabelledScan
-  std::vector<std::size_t> scans_;        // indices within sequence_
+  std::vector<std::size_t> scans_;        // their indices
   std::size_t missing_truths_ = 0;
   Scan scan_;
   Scan next_;  // belongs to the reading thread until reading_.wait()

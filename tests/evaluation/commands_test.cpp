@@ -7,7 +7,6 @@
 #include "dynains/io/point_file.hpp"
 #include "io/files.hpp"
 #include "program/command.hpp"
-#include "program/variants.hpp"
 #include "run/labelled_sequence.hpp"
 #include "scenes.hpp"
 #include "simulation/write_sequence.hpp"
@@ -98,7 +97,6 @@ void write_run(const std::filesystem::path& out, const std::vector<OwnedScan>& s
 std::string call(std::vector<std::string> arguments) {
   CLI::App app("test", "dynains");
   add_eval_command(app);
-  add_experiment_command(app);
   std::ostringstream output;
   std::streambuf* const before = std::cout.rdbuf(output.rdbuf());
   std::reverse(arguments.begin(), arguments.end());
@@ -205,8 +203,6 @@ TEST_CASE("eval judges the scans that have ground truth, and tells how many have
   CHECK(has(text, "2 scans, "));
   CHECK(has(told.str(), "1 of 3 scans have no ground truth"));
   CHECK(nlohmann::json::parse(read_text(street.json))["rows"][1]["points"]["ha"] == 100.0);
-  CHECK(has(message_of({"experiment", "sweep", street.sequence.string(), "--values", "0.6"}),
-            "1 scans have no ground truth; an experiment needs that of all"));
   fs::remove(street.sequence / "labels" / "000000.label");
   fs::remove(street.sequence / "labels" / "000002.label");
   CHECK(has(message_of(street.eval()), "no label of any chosen scan"));
@@ -267,13 +263,6 @@ TEST_CASE("A file that cannot be written is detected before the evaluation") {
   const std::string broken = (folder.path() / "no run").string();
   for (const char* flag : {"--json", "--csv"}) {
     CHECK(has(message_of({"eval", sequence.string(), broken, flag, file}),
-              missing + ": cannot be opened"));
-  }
-  fs::remove(sequence / "labels" / "000001.label");
-  CHECK(has(message_of({"experiment", "sweep", sequence.string(), "--quiet", "--csv", file}),
-            missing + ": cannot be opened"));
-  for (const char* flag : {"--csv", "--json"}) {
-    CHECK(has(message_of({"experiment", "table1", sequence.string(), "--quiet", flag, file}),
               missing + ": cannot be opened"));
   }
 }
@@ -347,124 +336,6 @@ TEST_CASE("eval names the problem of its input, and then writes nothing") {
   fs::rename(sequence / "labels_aside", sequence / "labels");
   CHECK(message_of(good) == kNoMessage);
   CHECK(fs::exists(json));
-}
-
-TEST_CASE("Variants label every point once, each with its own configuration") {
-  const TemporaryFolder folder;
-  const auto scans = write_street(folder.path() / "street", 8);
-  std::vector<Variant> variants = {{"full", DynaInsRemover::Config::paper()},
-                                   {"IOC only", DynaInsRemover::Config::paper()}};
-  variants[1].config.use_belief = false;
-  LabelledSequence sequence(Recording(folder.path() / "street"), {});
-  std::size_t calls = 0;
-  const VariantVerdicts both =
-      run_variants(sequence, variants, Answer::kFinal, [&](std::size_t) { ++calls; });
-  CHECK(calls == scans.size());
-  REQUIRE(both.size() == scans.size());
-  for (std::size_t v = 0; v < variants.size(); ++v) {
-    const VariantVerdicts alone = run_variants(sequence, {variants[v]}, Answer::kFinal, nullptr);
-    for (std::size_t i = 0; i < scans.size(); ++i) {
-      REQUIRE(both[i].size() == scans[i].truth.size());
-      for (std::size_t p = 0; p < both[i].size(); ++p) {
-        REQUIRE((both[i][p] >> v & 1U) == alone[i][p]);
-      }
-    }
-  }
-  // The newest verdicts equal those of a remover.
-  const VariantVerdicts newest = run_variants(sequence, {variants[0]}, Answer::kNewest, nullptr);
-  DynaInsRemover remover(variants[0].config);
-  bool differs = false;
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const evaluation::LabelledScan scan = scans[i].view();
-    const FrameResult frame = remover.push(RawPoints<float>{scan.xyz, scan.size(), scan.stride},
-                                           scan.T_world_sensor, 0.1 * static_cast<double>(i));
-    REQUIRE(newest[i].size() == scan.size());
-    for (std::size_t p = 0; p < scan.size(); ++p) {
-      REQUIRE((newest[i][p] != 0) == is_static(frame.newest().labels[p]));
-    }
-    differs = differs || newest[i] != both[i];
-  }
-  CHECK(differs);
-
-  const evaluation::Evaluation result =
-      evaluate_variants(sequence, variants, Answer::kFinal, {}, nullptr);
-  REQUIRE(result.rows.size() == 4);
-  // Moving a box by 1 m per scan before an empty background is an easy case.
-  CHECK(result.rows[2].points.kept() > 95);
-  CHECK(result.rows[2].points.removed() > 60);
-}
-
-TEST_CASE("The experiments run on any labelled sequence") {
-  const TemporaryFolder folder;
-  const std::string street = (folder.path() / "street").string();
-  write_street(street, 6);
-
-  SECTION("table1 on one sequence") {
-    const std::string json_path = (folder.path() / "table.json").string();
-    const std::string csv_path = (folder.path() / "table.csv").string();
-    const std::string text =
-        call({"experiment", "table1", street, "--quiet", "--json", json_path, "--csv", csv_path});
-    CHECK(has(text, "dynains, paper preset, IOC only"));
-    CHECK(has(text, "oracle"));
-    CHECK(!has(text, "published"));
-    CHECK(nlohmann::json::parse(read_text(json_path))[0]["sequence"] == "street");
-    CHECK(has(read_text(csv_path), "street,oracle,100.000000,100.000000,1.000000,measured"));
-  }
-  SECTION("table1 on SemanticKITTI's layout") {
-    // The published interval of sequence 02 starts at scan 860.
-    const fs::path root = folder.path() / "kitti" / "sequences" / "02";
-    write_street(root, 3);
-    for (const char* kind : {"velodyne", "labels"}) {
-      const std::string end = std::string(kind) == "velodyne" ? ".bin" : ".label";
-      for (std::size_t number = 0; number < 3; ++number) {
-        fs::rename(root / kind / (scan_name(number) + end),
-                   root / kind / (scan_name(860 + number) + end));
-      }
-    }
-    const std::string text =
-        call({"experiment", "table1", (folder.path() / "kitti").string(), "--quiet"});
-    CHECK(has(text, "paper, full (published)"));
-    CHECK(has(text, "0.989"));
-    CHECK(has(text, "dynains, default preset"));
-    CHECK(has(message_of({"experiment", "table1", folder.path().string()}),
-              "has no scans; expected a KITTI folder"));
-    // One file of poses cannot belong to two sequences.
-    fs::create_directories(folder.path() / "kitti" / "sequences" / "07" / "velodyne");
-    CHECK(has(message_of({"experiment", "table1", (folder.path() / "kitti").string(), "--poses",
-                          (root / "poses.txt").string()}),
-              "--poses and --times need one sequence, not 2"));
-  }
-  SECTION("sweep") {
-    const std::string csv_path = (folder.path() / "sweep.csv").string();
-    call({"experiment", "sweep", street, "--quiet", "--values", "0,0.1,0.2,0.4,0.6,0.8,1", "--csv",
-          csv_path});
-    const std::string csv = read_text(csv_path);
-    CHECK(std::count(csv.begin(), csv.end(), '\n') == 8);
-    CHECK(csv.rfind("tau-s,pr,rr,f1,sa,da,ha\n0,", 0) == 0);
-    // No similarity is below 0, and nearly all changed clusters are below 1.
-    const auto scores = [&](const std::string& value) {
-      const std::size_t begin = csv.find('\n' + value + ',') + 1 + value.size();
-      return csv.substr(begin, csv.find('\n', begin) - begin);
-    };
-    CHECK(has(scores("0"), ",100.000000,0.000000,0.000000,"));
-    CHECK(scores("0.6") != scores("0"));
-    const std::string online = (folder.path() / "online.csv").string();
-    call(
-        {"experiment", "sweep", street, "--quiet", "--values", "0.6", "--csv", online, "--online"});
-    CHECK(!has(read_text(online), scores("0.6")));
-    CHECK(has(message_of({"experiment", "sweep", street, "--values", "2"}), "tau-s = 2"));
-    CHECK(has(message_of({"experiment", "sweep", street, "--parameter", "tau-x"}), "tau-x"));
-  }
-  SECTION("runtime") {
-    const std::string csv_path = (folder.path() / "runtime.csv").string();
-    const std::string text =
-        call({"experiment", "runtime", street, "--repeat", "2", "--csv", csv_path});
-    CHECK(has(read_text(csv_path), "component,mean_ms,median_ms,p95_ms,p99_ms,max_ms\n"));
-    CHECK(has(read_text(csv_path), "\ntotal,"));
-    CHECK(has(text, "12 frames (2 times 6)"));
-    CHECK(has(text, "evidence"));
-    CHECK(has(text, "total"));
-  }
 }
 
 }  // namespace dynains::program

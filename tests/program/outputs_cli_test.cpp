@@ -17,7 +17,6 @@ struct Given {
     succeed(start({"run", seq, "--out", out, "-q"}));
     fs::copy_file(out + "/static_map.ply", map);
     write_text(pose, "0 0 0 0 0 0 1\n");
-    write_text(config, "tau-s = 0.5\n");
   }
   std::string at(const std::string& name) const { return folder / name; }
 
@@ -36,20 +35,13 @@ struct Given {
       of_run.push_back(out + file);
     }
     of_run.push_back(map);
-    std::vector<std::string> with_pose = of_recording, with_config = of_recording;
+    std::vector<std::string> with_pose = of_recording;
     with_pose.push_back(pose);
-    with_config.push_back(config);
     const Arguments eval = {"eval", seq, out, "--map", map};
-    const Arguments sweep = {"experiment", "sweep", seq,        "--quiet",
-                             "--values",   "0.6",   "--config", config};
     const Arguments remap = {"remap", seq, out, "--extrinsic", pose, "-q"};
     const Arguments clean = {"clean", map, out, seq, "--extrinsic", pose, "-q"};
     return {{eval + Arguments{"--json"}, ".txt", of_run},
             {eval + Arguments{"--csv"}, ".txt", of_run},
-            {sweep + Arguments{"--csv"}, ".txt", with_config},
-            {{"experiment", "table1", seq, "--quiet", "--csv"}, ".txt", of_recording},
-            {{"experiment", "table1", seq, "--quiet", "--json"}, ".txt", of_recording},
-            {{"experiment", "runtime", seq, "--repeat", "1", "--csv"}, ".txt", of_recording},
             {{"check", seq, "--extrinsic", pose, "--sensor-origin", pose, "--closures"},
              ".txt",
              with_pose},
@@ -59,8 +51,7 @@ struct Given {
   }
 
   TemporaryFolder folder;
-  std::string seq = at("seq"), out = at("out"), map = at("map.ply"), pose = at("pose.ply"),
-              config = at("run.cfg");
+  std::string seq = at("seq"), out = at("out"), map = at("map.ply"), pose = at("pose.ply");
 };
 
 }  // namespace
@@ -93,9 +84,9 @@ TEST_CASE("A file among scans would be a scan, and is refused as an output") {
   fs::create_directory(flat);
   fs::copy(given.seq + "/velodyne", flat);
   fs::copy_file(given.seq + "/poses.txt", flat + "/poses.txt");
-  const auto experiment = [&](const std::string& csv) {
-    return start({"experiment", "runtime", flat, "--repeat", "1", "--csv", flat + csv});
+  const auto check = [&](const std::string& name) {
+    return start({"check", flat, "--closures", flat + name});
   };
-  check_refused(experiment("/times.csv"), 1, "/times.csv: would be a part of " + flat);
-  succeed(experiment("/times.tsv"));
+  check_refused(check("/closures.csv"), 1, "/closures.csv: would be a part of " + flat);
+  succeed(check("/closures.g2o"));
 }

@@ -59,7 +59,6 @@ TEST_CASE("File names are printed without bytes that control the terminal") {
       {"check", seq},
       {"eval", seq, out, out, "--map", map, "--map", map, "--csv", table},
       {"eval", seq, missing},
-      {"experiment", "table1", seq},
       {evil},
       {"run", seq, "--out", missing, "--tau-s", evil},
   };

@@ -132,7 +132,7 @@ async function testTime(page) {
   await set(page, '#split', 50);
 }
 
-// Errors are drawn by the colours of the figures of `dynains experiment`.
+// Errors have colours of their own.
 async function testErrors(page) {
   await set(page, '#colour', 6);
   const [errors] = await regions(page, 1, 1);

@@ -3,16 +3,17 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/evaluation/evaluate.hpp"
 
 namespace dynains::evaluation {
 
-/// Table with aligned columns: the first `left_columns` are left-aligned, the others right-aligned.
+/// Table with aligned columns: the first is left-aligned, the others right-aligned.
 class TextTable {
  public:
-  explicit TextTable(std::vector<std::string> header, std::size_t left_columns = 1);
+  explicit TextTable(std::vector<std::string> header) : rows_{std::move(header)} {}
 
   /// Adds a row. Throws std::invalid_argument if it has more cells than the header.
   void add(std::vector<std::string> row);
@@ -21,7 +22,6 @@ class TextTable {
   std::string to_string() const;
 
  private:
-  std::size_t left_columns_;
   std::vector<std::vector<std::string>> rows_;
 };
 
