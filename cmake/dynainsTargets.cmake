@@ -55,7 +55,7 @@ endfunction()
 
 # dynains_quick_target(<name>): a target of this project that compiles quickly, with less
 # optimization: tests and examples. Tests of fully optimized code use the shared facade and programs
-# (core_contraction, reliability, program).
+# (reliability, program).
 function(dynains_quick_target name)
   dynains_own_target(${name})
   target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)

@@ -1,6 +1,5 @@
-// Prints a fingerprint of all answers of the remover on a small scene, for each preset.
-#include <cstdio>
-
+// Prints a fingerprint of all answers of the remover on a small scene, for each preset. Writes the
+// final labels to the file that is given, one byte each.
 #include "io/fingerprint.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
@@ -10,27 +9,30 @@ namespace {
 using namespace dynains;
 using namespace dynains::test;
 
-/// A floor and boxes. Every second box moves. Coordinates are exact in float, so that neither
-/// rounding nor libm has an influence.
+/// A rough floor and boxes. Every second box moves. Coordinates and poses are exact in binary, so
+/// that only the remover computes with rounding.
 std::vector<Scan> scene() {
   std::vector<Scan> scans;
   Random random(5);
+  const auto noise = [&random] { return 0x1p-6F * static_cast<float>(random.index(8)); };
   for (int i = 0; i < 12; ++i) {
     Scan scan{sensor_at(0.5 * i, 0.25 * i), 0.125 * i, {}, {}};
+    scan.T_world_sensor.linear() << 0.6, -0.8, 0.0, 0.8, 0.6, 0.0, 0.0, 0.0, 1.0;
     for (int x = -80; x < 80; ++x) {
       for (int y = -80; y < 80; ++y) {
-        scan.points.emplace_back(0.375F * static_cast<float>(x), 0.375F * static_cast<float>(y),
-                                 -1.75F + 0.0625F * static_cast<float>(random.index(3)));
+        // Separate statements: the order in which function arguments are evaluated is unspecified.
+        const float ahead = 0.375F * static_cast<float>(x) + noise();
+        const float left = 0.375F * static_cast<float>(y) + noise();
+        scan.points.emplace_back(ahead, left, -1.75F + noise());
       }
     }
     for (int object = 0; object < 6; ++object) {
       const float left = 6.0F + 5.0F * static_cast<float>(object);
       const float ahead = object % 2 == 0 ? 12.0F - 1.5F * static_cast<float>(i) : -6.0F;
       for (int point = 0; point < 400; ++point) {
-        // Separate statements: the order in which function arguments are evaluated is unspecified.
-        const auto along = 0.125F * static_cast<float>(random.index(16));
-        const auto across = 0.125F * static_cast<float>(random.index(8));
-        const auto up = 0.125F * static_cast<float>(random.index(16));
+        const auto along = 0.125F * static_cast<float>(random.index(16)) + noise();
+        const auto across = 0.125F * static_cast<float>(random.index(8)) + noise();
+        const auto up = 0.125F * static_cast<float>(random.index(16)) + noise();
         scan.points.emplace_back(ahead + along, left + across, -1.25F + up);
       }
     }
@@ -41,7 +43,8 @@ std::vector<Scan> scene() {
 
 }  // namespace
 
-int main() {
+int main(int count, char** arguments) {
+  std::ofstream labels(count > 1 ? arguments[1] : "/dev/null", std::ios::binary);
   for (const auto& config : {DynaInsRemover::Config::paper(), DynaInsRemover::Config()}) {
     DynaInsRemover remover(config);
     const std::vector<Scan> scans = scene();
@@ -57,6 +60,9 @@ int main() {
         add_bytes(verdict.beliefs);
       }
     }
+    for (const Verdict& verdict : result.final) {
+      for (const PointLabel label : verdict.labels) labels.put(static_cast<char>(label));
+    }
     remover.map().for_each([&](const Eigen::Vector3d& point) {
       for (int axis = 0; axis < 3; ++axis) fingerprint.add(point[axis]);
     });
@@ -65,5 +71,5 @@ int main() {
                 static_cast<unsigned long long>(fingerprint.value()), moving.labelled,
                 remover.map().size());
   }
-  return 0;
+  return labels ? 0 : 1;
 }
