@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kRadians = M_PI / 180.0;
 constexpr double kNear = 1.2 * kRadians;  // of azimuth, more than the step of any sensor
+constexpr double kFar = 0.3;              // m, between origins; less does not count
 
 using Points = std::vector<Eigen::Vector3d>;
 using RayEquations = detail::NormalEquations<5>;
@@ -157,9 +158,10 @@ struct RayOrigin {
 };
 
 /// Gauss-Newton steps from an origin at this height (m). The scale of their weights is the median
-/// change of the elevation along a beam, which shrinks to the noise of the directions. Empty if
-/// there is no end, or if points do not lie on rings around it. Straight above the given origin
-/// unless changes are far larger there: noise seems smaller from aside, farther from near points.
+/// change of the elevation along a beam, which shrinks to the noise of the directions. They end
+/// where the given origin fits. Empty if there is no end, or if points do not lie on rings around
+/// it. Straight above the given origin unless changes are far larger there: noise seems smaller
+/// from aside, farther from near points.
 std::optional<RayOrigin> fit_origin(const Points& points, double height) {
   constexpr int kMaxSteps = 15;
   constexpr double kMinScale = 1e-5;                // rad, as coordinates are rounded
@@ -186,9 +188,11 @@ std::optional<RayOrigin> fit_origin(const Points& points, double height) {
     if (rays.origin.norm() > kFarthest) break;
     // The pairs change from step to step, and the result with them by its deviation.
     const double rest = way.norm() / (0.002 + deviation.norm());
-    if (rest > (k + 1 < kMaxSteps ? 0.5 : 3.0)) continue;
+    const bool fits_given = rays.origin.norm() + way.norm() + 3.0 * deviation.norm() < kFar;
+    if (!fits_given && rest > (k + 1 < kMaxSteps ? 0.5 : 3.0)) continue;
     if (share_on_rings(seen, 3.0 * scale) < kMinOnRings) break;
     if (spread_of(seen) < kMinSpread) break;
+    if (rays.origin.head<2>().norm() < kFar) return RayOrigin{rays.origin, deviation};
     const Rays above{{0.0, 0.0, rays.origin.z()}, rays.axis};
     const double change =
         median_size(changes_along_beams(points, seen_points(points, above), above));
@@ -214,7 +218,6 @@ std::optional<RayOrigin> origin_of(const RecordedScan& scan) {
 
 std::optional<Eigen::Vector3d> other_ray_origin(const Recording& recording) {
   constexpr std::size_t kScans = 3;
-  constexpr double kFar = 0.3;  // m
   if (recording.size() < 2 || !recording.sensors().empty()) return std::nullopt;
   const auto found = in_two_threads(kScans, [&](std::size_t k) {
     return origin_of(recording.read_scan((2 * k + 1) * recording.size() / (2 * kScans)));
