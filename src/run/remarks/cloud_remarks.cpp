@@ -40,7 +40,7 @@ bool are_multiples(const RecordedScan& scan, const Pose& T_file_sensor, Eigen::I
 
 /// Upward normals (sensor frame) under which a scan has ground below the sensor, for a sensor that
 /// lies on one of its sides, 0.2 to 5 times `scale` m over the ground.
-std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan, double scale) {
+std::vector<Eigen::Vector3d> sideways_normals(const PointBuffer& scan, double scale) {
   std::vector<Eigen::Vector3d> normals;
   const auto z = Eigen::Vector3d::UnitZ();
   for (const Eigen::Vector3d& up : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(-1, 0, 0),
@@ -51,8 +51,8 @@ std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan, double s
     R.row(2) = up;
     PointBuffer turned;
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Eigen::Vector3d p = R * scan.point(i).position / scale;
-      if (!p.allFinite() || p.isZero(0.0)) continue;
+      const Eigen::Vector3d p =
+          R * Eigen::Vector3f(scan.x[i], scan.y[i], scan.z[i]).cast<double>() / scale;
       turned.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
                        static_cast<float>(p.z()));
     }
@@ -63,22 +63,21 @@ std::vector<Eigen::Vector3d> sideways_normals(const RecordedScan& scan, double s
   return normals;
 }
 
-/// The normal of all scans of a sample that lies nearest to the z axis of the world; empty if they
-/// have none in common that is upward in the world. `scale`: see sideways_normals().
-std::optional<Eigen::Vector3d> common_normal(const Recording& recording, const ScanRange& range,
-                                             double scale) {
+/// The normal of all `scans` that lies nearest to `z_sensor`, the z axis of the world in the first
+/// one; empty if they have none in common that is upward in the world. `scale`: see
+/// sideways_normals().
+std::optional<Eigen::Vector3d> common_normal(const std::vector<PointBuffer>& scans,
+                                             const Eigen::Vector3d& z_sensor, double scale) {
   constexpr double kNear = 0.99;  // cosine
-  std::vector<Eigen::Vector3d> common;
-  for (const std::size_t i : range.sample()) {
-    const std::vector<Eigen::Vector3d> found = sideways_normals(recording.read_scan(i), scale);
-    if (i == range.first) common = found;
+  std::vector<Eigen::Vector3d> common = sideways_normals(scans.front(), scale);
+  for (std::size_t k = 1; k < scans.size() && !common.empty(); ++k) {
+    const std::vector<Eigen::Vector3d> found = sideways_normals(scans[k], scale);
     const auto is_missing = [&](const Eigen::Vector3d& normal) {
       return std::none_of(found.begin(), found.end(),
                           [&](const Eigen::Vector3d& n) { return n.dot(normal) > kNear; });
     };
     common.erase(std::remove_if(common.begin(), common.end(), is_missing), common.end());
   }
-  const Eigen::Vector3d z_sensor = recording.T_world_sensor(range.first).linear().row(2);
   const auto upmost = std::max_element(
       common.begin(), common.end(),
       [&](const auto& a, const auto& b) { return a.dot(z_sensor) < b.dot(z_sensor); });
@@ -162,14 +161,15 @@ std::optional<std::string> remark_on_turns(const Recording& recording, const Sca
 std::optional<std::string> remark_on_tilt(const Recording& recording, const ScanRange& range) {
   // The remover finds the ground below the mean of several sensors, not below the origin.
   if (!recording.sensors().empty()) return std::nullopt;
+  std::vector<PointBuffer> scans;
   for (const std::size_t i : range.sample()) {
-    if (estimate_mounting(finite_points(recording.read_scan(i))).known) return std::nullopt;
+    scans.push_back(finite_points(recording.read_scan(i)));
+    if (estimate_mounting(scans.back()).known) return std::nullopt;
   }
-  std::optional<Eigen::Vector3d> up;
-  for (const double scale : {1.0, 4.0}) {  // also from a drone
-    if (!up) up = common_normal(recording, range, scale);
-  }
-  if (!up) return std::nullopt;  // as in a lift
+  const Eigen::Vector3d z_sensor = recording.T_world_sensor(range.first).linear().row(2);
+  std::optional<Eigen::Vector3d> up = common_normal(scans, z_sensor, 1.0);
+  if (!up) up = common_normal(scans, z_sensor, 4.0);  // as from a drone
+  if (!up) return std::nullopt;                       // as in a lift
   const auto degrees = [](double radians) {
     return std::to_string(std::lround(180.0 / M_PI * radians));
   };
