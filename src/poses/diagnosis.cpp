@@ -362,46 +362,49 @@ bool is_exact(const MotionError& error) {
   return error.at_points < std::max(kExact, 2.0 * error.noise);
 }
 
-/// Whether errors over some scans exceed those that exact poses leave: by the noise of the
-/// registration, and by the motion within de-skewed scans, which is taken as even between two
-/// poses. If a sensor sways, the middle of a scan is off by an eighth of the change of motion, and
-/// that of the next scan by as much to the other side.
-/// `least`: of its errors.
-bool is_inexact(const Recording& recording, const MotionError& error, const MotionError& least) {
+/// How much registrations may err by the motion within scans (the translation in m, the rotation in
+/// rad): medians over scans. De-skewing takes the motion as even between two poses. If a sensor
+/// sways, the middle of a scan is off by an eighth of the change of motion, and that of the next
+/// scan by as much to the other side.
+std::pair<double, double> error_within_scans(const Recording& recording) {
   constexpr double kUneven = 0.25;
-  if (is_exact(error)) return false;
-  double translation = std::max(least.translation, 3.0 * error.translation_noise);
-  double rotation = std::max(least.rotation, 3.0 * error.rotation_noise);
-  if (recording.is_deskewed()) {
-    std::vector<double> translations, rotations;
-    for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
-      const Pose change =
-          motion_between(recording, i - 1, i).inverse() * motion_between(recording, i, i + 1);
-      translations.push_back(change.translation().norm());
-      rotations.push_back(angle_of(change.linear()));
-    }
-    translation = std::max(translation, kUneven * median(std::move(translations)));
-    rotation = std::max(rotation, kUneven * median(std::move(rotations)));
+  std::vector<double> translations, rotations;
+  for (std::size_t i = 1; i + 1 < recording.size(); ++i) {
+    const Pose change =
+        motion_between(recording, i - 1, i).inverse() * motion_between(recording, i, i + 1);
+    translations.push_back(kUneven * change.translation().norm());
+    rotations.push_back(kUneven * angle_of(change.linear()));
   }
-  return error.translation > translation || error.rotation > rotation;
+  return {median(std::move(translations)), median(std::move(rotations))};
 }
 
 /// Sets the errors of the poses in `d`, over the least number of scans over which they are inexact,
 /// or else from one scan to the next. Returns whether they are inexact: small errors add up, while
 /// those of single scans do not grow with the scans between. Smaller ones count if they grow.
+/// Motions by other ways must show them, too: where persons cover the surfaces, or these leave a
+/// direction open, both directions of one registration agree about what the next one contradicts.
 bool measure_errors(const Evidence& evidence, Diagnosis& d) {
   constexpr double kGrowing = 2.5;  // ratio of errors over three scans or more and over one
-  MotionError least;
-  least.translation = kInexact;
-  least.rotation = kInexact / kLever;
+  const Recording& recording = evidence.recording;
+  const auto within = error_within_scans(recording);
+  double translation = kInexact, rotation = kInexact / kLever;  // least
   for (std::size_t gap = 1; gap <= kMaxSpan; gap *= 3) {
-    const MotionError error =
-        motion_error(evidence.motions, given_motion(evidence.recording), Pose::Identity(), gap);
+    const auto error_of = [&](const std::vector<RegisteredMotion>& motions) {
+      return motion_error(motions, given_motion(recording), Pose::Identity(), gap);
+    };
+    const auto is_inexact = [&](const MotionError& error) {
+      return error.pairs >= kMinPairs && !is_exact(error) &&
+             (error.translation >
+                  std::max({translation, within.first, 3.0 * error.translation_noise}) ||
+              error.rotation > std::max({rotation, within.second, 3.0 * error.rotation_noise}));
+    };
+    const MotionError error = error_of(evidence.motions);
     if (error.pairs < kMinPairs) break;
-    const bool is_found = is_inexact(evidence.recording, error, least);
+    const bool is_found =
+        is_inexact(error) && is_inexact(error_of(by_other_ways(recording, evidence.motions, gap)));
     if (gap > 1 && !is_found) continue;
-    least.translation = std::max(kExact, kGrowing * error.translation);
-    least.rotation = std::max(kExact / kLever, kGrowing * error.rotation);
+    translation = std::max(kExact, kGrowing * error.translation);
+    rotation = std::max(kExact / kLever, kGrowing * error.rotation);
     d.translation_error = error.translation;
     d.rotation_error = error.rotation;
     d.registered_pairs = error.pairs;

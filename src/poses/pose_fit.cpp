@@ -20,14 +20,17 @@ namespace {
 /// A scan, as planes and as landmarks.
 class ChainScan {
  public:
-  explicit ChainScan(const PointBuffer& points)
-      : planes_(points), landmarks_(points, estimate_mounting(points), kWayRange) {}
+  ChainScan(const Recording& recording, std::size_t i)
+      : ChainScan(sampled_points(recording.read_scan(i))) {}
 
   const SurfaceGrid& surfaces() const { return planes_.surfaces(); }
   const std::vector<Eigen::Vector3d>& points() const { return planes_.points(); }
   const Landmarks& landmarks() const { return landmarks_; }
 
  private:
+  explicit ChainScan(const PointBuffer& points)
+      : planes_(points), landmarks_(points, estimate_mounting(points), kWayRange) {}
+
   RegistrationScan planes_;
   Landmarks landmarks_;
 };
@@ -263,14 +266,12 @@ std::vector<std::size_t> starts_of_chains(const Recording& recording) {
 std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t number,
                                        std::size_t first, const std::optional<Pose>& elsewhere) {
   constexpr double kFar = 3.0;  // m, at points kLever away
-  const auto read = [&](std::size_t i) {
-    return ChainScan(sampled_points(recording.read_scan(i)));
-  };
-  const ChainScan a = read(first);
+  const ChainScan a(recording, first);
   std::vector<RegisteredMotion> motions;
   const auto add = [&](std::size_t second, const std::vector<Pose>& guesses, double farthest) {
-    const auto found = register_both_ways(a, read(second), motion_between(recording, first, second),
-                                          guesses, farthest);
+    const auto found =
+        register_both_ways(a, ChainScan(recording, second),
+                           motion_between(recording, first, second), guesses, farthest);
     if (!found) return false;
     motions.push_back({number, first, second, found->T_a_b, found->difference, found->deviation});
     return true;
@@ -312,6 +313,34 @@ std::vector<RegisteredMotion> register_motions(
     if (suffice(motions) || (motions.empty() && number > 0)) break;
   }
   return motions;
+}
+
+std::vector<RegisteredMotion> by_other_ways(const Recording& recording,
+                                            const std::vector<RegisteredMotion>& motions,
+                                            std::size_t gap) {
+  const auto other_way = [&](std::size_t i) -> std::optional<RegisteredMotion> {
+    RegisteredMotion motion = motions[i];
+    const std::size_t between = motion.first + (gap == 1 ? 2 : gap / 3);
+    if (motion.second != motion.first + gap || between >= recording.size()) return std::nullopt;
+    const ChainScan via(recording, between);
+    const auto motion_to = [&](std::size_t scan) {
+      const double ratio = (double(scan) - double(between)) / double(gap);
+      const Pose guess = detail::scaled_motion(motion.T_first_second, ratio);
+      return register_both_ways(via, ChainScan(recording, scan),
+                                motion_between(recording, between, scan), {guess}, kMaxFromGuess);
+    };
+    const auto first = motion_to(motion.first), second = motion_to(motion.second);
+    if (!first || !second) return std::nullopt;
+    const Pose T_other = first->T_a_b.inverse() * second->T_a_b;
+    motion.difference = residual(motion.T_first_second, T_other, Pose::Identity());
+    motion.T_first_second = T_other;
+    return motion;
+  };
+  std::vector<RegisteredMotion> others;
+  for (const auto& one : in_two_threads(motions.size(), other_way)) {
+    if (one) others.push_back(*one);
+  }
+  return others;
 }
 
 bool are_poses_exact(const Recording& recording) {

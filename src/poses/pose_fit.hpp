@@ -36,6 +36,13 @@ std::vector<RegisteredMotion> register_motions(
     const Recording& recording,
     const std::function<bool(const std::vector<RegisteredMotion>&)>& suffice);
 
+/// Those of `motions` over `gap` scans, each by the registrations of both scans to another one,
+/// which share no pair of scans with the direct one. Their differences are from that. Without
+/// motions that are not determined so.
+std::vector<RegisteredMotion> by_other_ways(const Recording& recording,
+                                            const std::vector<RegisteredMotion>& motions,
+                                            std::size_t gap);
+
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
 using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
 
