@@ -1,7 +1,6 @@
 #include "input_file.hpp"
 
 #include <cerrno>
-#include <string>
 #include <system_error>
 
 #include "failure.hpp"

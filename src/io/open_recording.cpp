@@ -18,7 +18,6 @@
 #include "logs/log_scans.hpp"
 #include "nuscenes.hpp"
 #include "points/bin_layout.hpp"
-#include "points/point_clock.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"
 #include "text.hpp"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>

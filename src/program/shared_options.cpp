@@ -1,7 +1,5 @@
 #include "shared_options.hpp"
 
-#include <algorithm>
-#include <utility>
 
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"

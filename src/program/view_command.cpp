@@ -1,5 +1,4 @@
 #include <iostream>
-#include <string>
 
 #include "command.hpp"
 #include "run/write_view.hpp"

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "bindings.hpp"
 #include "dynains/errors.hpp"
@@ -24,12 +23,10 @@ namespace fs = std::filesystem;
 using run::RunOutcome;
 using run::RunSettings;
 
-// The arguments of run().
+// What run() was given.
 struct RunArguments {
   RunSettings settings;
-  std::optional<std::string> preset;
-  std::optional<DynaInsRemover::Config> config;
-  py::object progress = py::none();
+  py::object progress;
   std::shared_ptr<SharedRecording> recording;
 };
 
@@ -39,57 +36,40 @@ struct RunArguments {
                        expected);
 }
 
-/// Takes an argument that is no flag of the program. False if `name` is none.
-bool take_object(RunArguments& run, const std::string& name, const py::handle& value) {
-  if (name == "preset") {
-    const auto& names = run::preset_names();
-    run.preset = to_text(value);
-    if (std::find(names.begin(), names.end(), *run.preset) == names.end()) {
-      refuse_value(name, value, "'default', 'offline', 'paper' or 'published'");
-    }
-  } else if (name == "config") {
-    if (value.is_none()) return true;
-    if (!py::isinstance<DynaInsRemover::Config>(value)) refuse_value(name, value, "a Config");
-    run.config = value.cast<DynaInsRemover::Config>();
-  } else if (name == "progress") {
-    if (!value.is_none() && PyCallable_Check(value.ptr()) == 0) {
-      refuse_value(name, value, "a function");
-    }
-    run.progress = py::reinterpret_borrow<py::object>(value);
-  } else {
-    return false;
-  }
-  return true;
-}
-
 constexpr const char* kObjects =
     "  preset: parameters to start from; 'default', 'offline', 'paper' or 'published'\n"
     "  config: all parameters, in place of a preset; a Config\n"
     "  progress: called with the numbers of finished scans and of all scans; a function\n";
 
-/// Takes the arguments of a run out of `values`, which keeps the options of the recording.
-RunArguments take_arguments(py::dict& values) {
-  RunArguments run;
-  py::dict rest;
+/// Takes the settings of a run out of `values`. Returns the options of the recording.
+py::dict take_settings(const py::kwargs& values, RunSettings& settings) {
+  py::dict options;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (take_object(run, name, value) || assign_setting(run.settings, name, value)) continue;
+    if (assign_setting(settings, name, value)) continue;
     if (!has_setting<run::RecordingSettings>(name)) {
       throw ConfigError("unknown parameter " + name);
     }
-    rest[key] = value;
+    options[key] = value;
   }
-  values = rest;
-  return run;
+  return options;
 }
 
-void take_config(RunArguments& run) {
-  if (run.config && run.preset) throw ConfigError("run: give preset or config, not both");
-  RunSettings& settings = run.settings;
-  settings.preset = run.preset.value_or("default");
-  settings.config = run.config ? *run.config : DynaInsRemover::Config::preset(settings.preset);
+void take_config(const py::object& preset, const py::object& config, RunSettings& settings) {
+  const bool is_given = !config.is_none();
+  if (is_given && !preset.is_none()) throw ConfigError("run: give preset or config, not both");
+  const auto& names = run::preset_names();
+  if (!preset.is_none()) settings.preset = to_text(preset);
+  if (std::find(names.begin(), names.end(), settings.preset) == names.end()) {
+    refuse_value("preset", preset, "'default', 'offline', 'paper' or 'published'");
+  }
+  if (is_given && !py::isinstance<DynaInsRemover::Config>(config)) {
+    refuse_value("config", config, "a Config");
+  }
+  settings.config = is_given ? config.cast<DynaInsRemover::Config>()
+                             : DynaInsRemover::Config::preset(settings.preset);
   settings.config.validate();
-  settings.find_own_body = !run.config && !run::has_ranges_of_paper(settings.preset);
+  settings.find_own_body = !is_given && !run::has_ranges_of_paper(settings.preset);
 }
 
 run::RunListener listen(const RunArguments& run) {
@@ -129,11 +109,16 @@ struct RunResult {
   py::dict report;
 };
 
-RunArguments prepare(const py::object& recording, const fs::path& out, const py::kwargs& values) {
-  py::dict options(values);
-  RunArguments arguments = take_arguments(options);
-  take_config(arguments);
+RunArguments prepare(const py::object& recording, const fs::path& out, const py::object& preset,
+                     const py::object& config, const py::object& progress,
+                     const py::kwargs& values) {
+  RunArguments arguments{{}, progress, nullptr};
   RunSettings& settings = arguments.settings;
+  const py::dict options = take_settings(values, settings);
+  take_config(preset, config, settings);
+  if (!progress.is_none() && PyCallable_Check(progress.ptr()) == 0) {
+    refuse_value("progress", progress, "a function");
+  }
   settings.outputs.folder = out;
   run::check_settings(settings);
   arguments.recording = to_recording(recording, options);
@@ -145,8 +130,9 @@ RunArguments prepare(const py::object& recording, const fs::path& out, const py:
   return arguments;
 }
 
-RunResult run(const py::object& recording, const fs::path& out, const py::kwargs& values) {
-  const RunArguments arguments = prepare(recording, out, values);
+RunResult run(const py::object& recording, const fs::path& out, const py::object& preset,
+              const py::object& config, const py::object& progress, const py::kwargs& values) {
+  const RunArguments arguments = prepare(recording, out, preset, config, progress, values);
   const run::RunListener listener = listen(arguments);
   RunOutcome outcome;
   {
@@ -224,7 +210,9 @@ void bind_run(py::module_& module) {
       "KeyboardInterrupt; the results so far stay in out.partial until the next run. Raises "
       "IoError, ConfigError, PoseError, and UsageError if another run writes to the folder. Warns "
       "by RuntimeWarning. Other threads run meanwhile.";
-  module.def("run", &run, py::arg("recording"), py::arg("out"), doc.c_str());
+  module.def("run", &run, py::arg("recording"), py::arg("out"), py::kw_only(),
+             py::arg("preset") = py::none(), py::arg("config") = py::none(),
+             py::arg("progress") = py::none(), doc.c_str());
   // For dynains.view().
   module.def("_write_page", &write_page, py::arg("out"), py::arg("recording") = py::none(),
              py::arg("max_points") = run::kDefaultViewPoints);

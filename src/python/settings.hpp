@@ -6,7 +6,6 @@
 #include <pybind11/stl.h>
 
 #include <string>
-#include <type_traits>
 
 #include "dynains/errors.hpp"
 #include "dynains/parameters.hpp"

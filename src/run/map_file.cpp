@@ -1,7 +1,6 @@
 #include "map_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace dynains::run {

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "dynains/poses/diagnosis.hpp"
 #include "run/output/output_folder.hpp"
 #include "run_plan.hpp"
 #include "run_results.hpp"

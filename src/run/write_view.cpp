@@ -10,7 +10,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "run/output/output_folder.hpp"
-#include "run_report.hpp"
 #include "run_settings.hpp"
 #include "verdict_files.hpp"
 

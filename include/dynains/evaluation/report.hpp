@@ -1,7 +1,6 @@
 // Output of an evaluation as table, JSON and CSV.
 #pragma once
 
-#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>

@@ -13,7 +13,6 @@
 #include "../scan_reader.hpp"
 #include "../text.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
 #include "dynains/pose.hpp"
