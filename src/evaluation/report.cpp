@@ -6,7 +6,6 @@
 #include <locale>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -16,6 +15,34 @@ namespace dynains::evaluation {
 namespace {
 
 using Json = nlohmann::ordered_json;
+using Rows = std::vector<std::vector<std::string>>;
+
+/// A line per row with aligned columns, the first one to the left, the others to the right. The
+/// first row has all columns.
+std::string aligned(const Rows& rows) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  }
+  std::ostringstream text;
+  for (const auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      text << (c == 0 ? "" : "  ") << (c == 0 ? std::left : std::right)
+           << std::setw(static_cast<int>(widths[c])) << row[c];
+    }
+    text << '\n';
+  }
+  return text.str();
+}
+
+/// With a number of decimals; `missing` if it is not finite.
+std::string format_number(double value, int decimals, const char* missing = "-") {
+  if (!std::isfinite(value)) return missing;
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << std::fixed << std::setprecision(decimals) << value;
+  return text.str();
+}
 
 const char* name(Truth truth) { return truth == Truth::kDynamic ? "dynamic" : "static"; }
 
@@ -98,13 +125,14 @@ Json to_json(const std::vector<ClassScore>& classes) {
 
 /// Objects of one estimate by class.
 std::string objects_to_table(const EvaluationRow& row) {
-  TextTable table({"class", "truth", "objects", "right", "right %", "points", "points kept %"});
+  Rows table = {{"class", "truth", "objects", "right", "right %", "points", "points kept %"}};
   for (const ClassScore& one : classes_of_objects(row)) {
-    table.add({semantic_class_name(one.id), name(one.truth), std::to_string(one.objects),
-               std::to_string(one.right), format_number(percent(one.right, one.objects), 1),
-               std::to_string(one.points), format_number(percent(one.points_kept, one.points), 2)});
+    table.push_back({semantic_class_name(one.id), name(one.truth), std::to_string(one.objects),
+                     std::to_string(one.right), format_number(percent(one.right, one.objects), 1),
+                     std::to_string(one.points),
+                     format_number(percent(one.points_kept, one.points), 2)});
   }
-  return "\nobjects, " + row.name + '\n' + table.to_string();
+  return "\nobjects, " + row.name + '\n' + aligned(table);
 }
 
 Json errors_to_json(const Evaluation& evaluation) {
@@ -131,42 +159,11 @@ Json errors_to_json(const Evaluation& evaluation) {
 
 }  // namespace
 
-void TextTable::add(std::vector<std::string> row) {
-  if (row.size() > rows_.front().size()) {
-    throw std::invalid_argument("a table row has more cells than the header");
-  }
-  rows_.push_back(std::move(row));
-}
-
-std::string TextTable::to_string() const {
-  std::vector<std::size_t> widths(rows_.front().size(), 0);
-  for (const auto& row : rows_) {
-    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-  }
-  std::ostringstream text;
-  for (const auto& row : rows_) {
-    for (std::size_t c = 0; c < row.size(); ++c) {
-      text << (c == 0 ? "" : "  ") << (c == 0 ? std::left : std::right)
-           << std::setw(static_cast<int>(widths[c])) << row[c];
-    }
-    text << '\n';
-  }
-  return text.str();
-}
-
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + '"';
-}
-
-std::string format_number(double value, int decimals, const char* missing) {
-  if (!std::isfinite(value)) return missing;
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::fixed << std::setprecision(decimals) << value;
-  return text.str();
 }
 
 std::string to_table(const Evaluation& evaluation) {
@@ -181,18 +178,17 @@ std::string to_table(const Evaluation& evaluation) {
        << "\nkept, left: instances of " << ObjectLimits::kMinPoints
        << " and more points; static ones that keep 90 % (people left out), moving ones that lose "
           "95 %\n";
-  std::vector<std::string> titles = {""};
-  for (const Rate& rate : kRates) titles.emplace_back(rate.title);
-  titles.insert(titles.end(), {"kept %", "left %"});
-  TextTable table(titles);
+  Rows table = {{""}};
+  for (const Rate& rate : kRates) table.front().emplace_back(rate.title);
+  table.front().insert(table.front().end(), {"kept %", "left %"});
   for (const EvaluationRow& row : evaluation.rows) {
     std::vector<std::string> cells = {row.name};
     for (const Rate& rate : kRates) cells.push_back(format_number(rate.of(row), rate.decimals));
     cells.push_back(row.objects ? format_number(row.objects->kept(), 1) : "-");
     cells.push_back(row.objects ? format_number(row.objects->removed(), 1) : "-");
-    table.add(cells);
+    table.push_back(cells);
   }
-  text << table.to_string();
+  text << aligned(table);
   for (const EvaluationRow& row : evaluation.rows) {
     if (!classes_of_objects(row).empty()) text << objects_to_table(row);
   }
@@ -210,21 +206,21 @@ std::string to_table(const Evaluation& evaluation) {
 
 std::string errors_to_table(const Evaluation& evaluation) {
   if (evaluation.first_estimate() == nullptr) return {};
-  TextTable classes({"class", "id", "truth", "points", "removed", "removed %"});
+  Rows classes = {{"class", "id", "truth", "points", "removed", "removed %"}};
   for (const ClassScore& one : evaluation.first_estimate()->classes) {
-    classes.add({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
-                 std::to_string(one.points), std::to_string(one.removed()),
-                 format_number(percent(one.removed(), one.points), 2)});
+    classes.push_back({semantic_class_name(one.id), std::to_string(one.id), name(one.truth),
+                       std::to_string(one.points), std::to_string(one.removed()),
+                       format_number(percent(one.removed(), one.points), 2)});
   }
-  if (evaluation.causes.empty()) return classes.to_string();
-  TextTable causes({"cause", "missed dynamic", "lost static", "right"});
+  if (evaluation.causes.empty()) return aligned(classes);
+  Rows causes = {{"cause", "missed dynamic", "lost static", "right"}};
   for (std::size_t c = 0; c < evaluation.causes.size(); ++c) {
     const CauseErrors& cause = evaluation.causes[c];
     if (cause.missed_dynamic + cause.lost_static + cause.right == 0) continue;
-    causes.add({kCauseNames[c], std::to_string(cause.missed_dynamic),
-                std::to_string(cause.lost_static), std::to_string(cause.right)});
+    causes.push_back({kCauseNames[c], std::to_string(cause.missed_dynamic),
+                      std::to_string(cause.lost_static), std::to_string(cause.right)});
   }
-  return classes.to_string() + '\n' + causes.to_string();
+  return aligned(classes) + '\n' + aligned(causes);
 }
 
 std::string to_json(const Evaluation& evaluation) {
