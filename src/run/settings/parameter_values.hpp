@@ -119,7 +119,6 @@ class ParameterValues {
     values_[name] = {text, where};
   }
 
-  bool empty() const { return values_.empty(); }
   /// Whether a value has this flag name.
   bool has(const std::string& name) const { return values_.count(name) > 0; }
 
