@@ -5,8 +5,9 @@
     paper_experiments.py sweep SEQ      Fig. 5: scores against a parameter, by default tau-s
     paper_experiments.py runtime SEQ    Fig. 7: milliseconds per component; needs no labels
 
-Recordings have labels of SemanticKITTI. Each experiment writes NAME.csv, and for Fig. 5 and Fig. 7
-also NAME.png, if matplotlib is there.
+Recordings have labels of SemanticKITTI. Further flags go to both programs, such as --start and --end,
+or --poses. Each experiment writes NAME.csv, and for Fig. 5 and Fig. 7 also NAME.png, if matplotlib is
+there.
 """
 import argparse
 import csv
@@ -77,8 +78,8 @@ def scores_of(recording, window, unlabeled, variants):
     for name, flags in variants.items():
         with tempfile.TemporaryDirectory() as folder:
             out, scores = Path(folder) / "out", Path(folder) / "scores.json"
-            dynains("run", recording, "--out", out, "--accept-poses", "-q", *window, *flags)
-            dynains("eval", recording, out, "--unlabeled", unlabeled, "--json", scores)
+            dynains("run", recording, "--out", out, "--accept-poses", "-q", *window, *flags, *further)
+            dynains("eval", recording, out, "--unlabeled", unlabeled, "--json", scores, *further)
             rows.update((row["name"], row) for row in json.loads(scores.read_text())["rows"])
             rows[name] = rows.pop("run")
     return rows
@@ -87,7 +88,8 @@ def scores_of(recording, window, unlabeled, variants):
 def table1():
     yield "sequence", "method", "pr", "rr", "f1", "source"
     folders = [options.recording / below for below in ("sequences", "dataset/sequences", ".")]
-    found = {name: folder / name for folder in folders for name in WINDOWS if (folder / name).exists()}
+    places = [(name, folder / name) for folder in folders for name in WINDOWS]
+    found = {name: place for name, place in places if (place / "velodyne").exists()}
     for name, recording in sorted(found.items()) or [(options.recording.name, options.recording)]:
         for method, scores in PUBLISHED.get(name, {}).items():
             yield name, f"{method} (published)", *scores, "published"
@@ -111,7 +113,8 @@ def runtime():
     yield "component", "mean_ms", "median_ms", "p95_ms", "max_ms"
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        dynains("run", options.recording, "--out", out, "--preset", "paper", "--accept-poses", "--one-thread", "-q")
+        flags = ["--preset", "paper", "--accept-poses", "--one-thread", "-q"]
+        dynains("run", options.recording, "--out", out, *flags, *further)
         scans = list(csv.DictReader((out / "timing.csv").read_text().splitlines()))
     for column in (name for name in scans[0] if name.endswith("_ms")):
         times = sorted(float(scan[column]) for scan in scans)
@@ -129,7 +132,8 @@ def draw(rows):
     names, columns = rows[0], list(zip(*rows[1:]))
     if options.experiment == "sweep":
         for name, column, scale in zip(names[1:4], columns[1:4], (1, 1, 100)):
-            axes.plot(list(map(float, columns[0])), [scale * value for value in column], "o-", label=name.upper())
+            scores = [scale * value for value in column]
+            axes.plot(list(map(float, columns[0])), scores, "o-", label=name.upper())
         axes.set(xlabel=names[0], ylabel="%")
         axes.legend()
     else:
@@ -146,7 +150,7 @@ parser.add_argument("recording", type=Path)
 parser.add_argument("--parameter", default="tau-s", help="of sweep")
 parser.add_argument("--values", default="0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9", help="of sweep")
 parser.add_argument("--program", default="dynains", help="[dynains of PATH]")
-options = parser.parse_args()
+options, further = parser.parse_known_args()
 
 table = []
 with open(f"{options.experiment}.csv", "w", newline="") as file:
