@@ -47,12 +47,12 @@ class ObjectTracks {
     follow_points(scan, evidence);
     begin_tracks(scan);
     measure_extents(scan, evidence);
-    objects_.clear();
     for (Track& track : tracks_) {
       if (track.points > 0) update(scan, track);
     }
     name_parts(scan);
     join_tracks();
+    list_objects();
     forget(scan.scan);
     std::sort(objects_.begin(), objects_.end(),
               [](const MovingObject& a, const MovingObject& b) { return a.id < b.id; });
@@ -70,6 +70,7 @@ class ObjectTracks {
   // Distances between points of an object, m. Those between rings grow with the range.
   static constexpr float kGap = 0.3F, kGapOfRange = 0.02F;
   static constexpr float kGapOfInstance = 0.2F;  // m, added for points of an instance of the object
+  static constexpr float kAtSide = 0.1F;  // m: points nearer to a side of a box count equally
 
   struct Track {
     MovingObject object;
@@ -77,9 +78,6 @@ class ObjectTracks {
     double pp = 0.0, pv = 0.0, vv = 0.0;  // covariance of position and velocity, per axis
     bool is_directed = false;             // its motion is certain, and so is its yaw
     double yaw = 0.0, yaw_variance = M_PI * M_PI;
-    // When the motion became certain:
-    double first_time = 0.0, first_vv = 0.0;
-    Eigen::Vector2d first_velocity = Eigen::Vector2d::Zero();
     // In the newest scan:
     std::uint32_t points = 0;
     Eigen::Vector2f along = Eigen::Vector2f::Zero();  // direction
@@ -89,6 +87,7 @@ class ObjectTracks {
     // Axes that its box may have, and extents along them and to their left, m from the sensor.
     std::array<Eigen::Vector2f, kAxes> axes;
     std::array<Eigen::AlignedBox2f, kAxes> extents;
+    std::array<float, kAxes> closeness = {};  // of the points to the sides of the box, 1/m
   };
 
   // The dynamic points of an instance.
@@ -114,11 +113,9 @@ class ObjectTracks {
   };
 
   // Whether a point shows by itself where an object is. Others were removed with what is near them,
-  // or provisionally: they count inside the box of an object alone. The newest scans have too
-  // little evidence to do without those of their instances.
-  bool is_certain(Cause cause) const {
-    return cause != Cause::kPresumed && cause != Cause::kDynamicOccupancy &&
-           (cause != Cause::kWithInstance || later_ == nullptr);
+  // or provisionally: they count inside the box of an object alone.
+  static bool is_certain(Cause cause) {
+    return cause != Cause::kPresumed && cause != Cause::kDynamicOccupancy;
   }
 
   template <class Visit>
@@ -209,34 +206,21 @@ class ObjectTracks {
     return around;
   }
 
-  // Other points begin tracks, those of the largest part first.
+  // The other points of a part begin a track.
   void begin_tracks(const ScanSlot& scan) {
     constexpr std::uint32_t kMinPoints = 5;
-    order_.clear();
-    for (std::uint32_t p = 0; p < parts_.size(); ++p) {
-      const Eigen::Vector3d size = parts_[p].box.sizes().cast<double>();
-      if (parts_[p].points > 0 && size.head<2>().norm() <= max_length_ && size.z() <= max_height_) {
-        order_.push_back(p);
-      }
-    }
-    std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(parts_[b].points, a) < std::pair(parts_[a].points, b);
-    });
-    const std::size_t begun = tracks_.size();
-    for (const std::uint32_t p : order_) {
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
       Part& part = parts_[p];
+      if (part.points < kMinPoints) continue;
+      const Eigen::Vector3d size = part.box.sizes().cast<double>();
+      if (size.head<2>().norm() > max_length_ || size.z() > max_height_) continue;
       MovingObject object;
       object.centre = sensor_ + part.box.center().cast<double>();
-      object.length = static_cast<double>(part.box.sizes().x());
-      object.width = static_cast<double>(part.box.sizes().y());
-      std::size_t t = begun;
-      while (t < tracks_.size() && !common_box(tracks_[t].object, object)) ++t;
-      if (t == tracks_.size()) {
-        if (part.points < kMinPoints) continue;
-        begin_track(scan, scan.ids[p], object);
-      }
-      tracks_[t].points += part.points;
-      part.begun = static_cast<std::uint32_t>(t);
+      object.length = size.x();
+      object.width = size.y();
+      part.begun = static_cast<std::uint32_t>(tracks_.size());
+      begin_track(scan, scan.ids[p], object);
+      tracks_.back().points = part.points;
       if (part.track == kNoIndex) part.track = part.begun;
     }
   }
@@ -272,12 +256,12 @@ class ObjectTracks {
     track.object.first_scan = scan.scan;
     track.pp = kError * kError;
     track.vv = kSpeed * kSpeed;
-    if (known != nullptr && known->is_directed) {
+    if (known != nullptr && known->is_directed && later_->time_ > time_) {
       track.object.length = known->object.length;
       track.object.width = known->object.width;
-      track.object.velocity = known->first_velocity;
-      const double deviation = kAcceleration * (known->first_time - time_);
-      track.vv = known->first_vv + deviation * deviation;
+      const double duration = later_->time_ - time_;
+      track.object.velocity = (known->object.centre - object.centre).head<2>() / duration;
+      track.vv = 2.0 * kError * kError / (duration * duration);
       turn(track);
     }
     tracks_.push_back(track);
@@ -312,37 +296,53 @@ class ObjectTracks {
     return track.yaw + range / kAxes * (static_cast<double>(k) - 0.5 * (kAxes - 1));
   }
 
+  template <class Visit>
+  void for_each_followed(const ScanSlot& scan, const EvidenceVerdict& evidence, Visit&& visit) {
+    std::size_t i = 0;
+    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
+      std::uint32_t t = track_of_[i++];
+      if (t == kNoIndex && certain) t = parts_[p].begun;
+      if (t != kNoIndex) visit(tracks_[t], point);
+    });
+  }
+
   void measure_extents(const ScanSlot& scan, const EvidenceVerdict& evidence) {
     for (Track& track : tracks_) {
       track.height.setEmpty();
+      track.closeness.fill(0.0F);
       for (std::size_t k = 0; k < kAxes && track.points > 0; ++k) {
         track.axes[k] = axes_of(yaw_of(track, k)).col(0).cast<float>();
         track.extents[k].setEmpty();
       }
     }
-    std::size_t i = 0;
-    for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
-      std::uint32_t t = track_of_[i++];
-      if (t == kNoIndex && certain) t = parts_[p].begun;
-      if (t == kNoIndex) return;
-      tracks_[t].height.extend(Eigen::Matrix<float, 1, 1>(point.z()));
+    for_each_followed(scan, evidence, [](Track& track, const Eigen::Vector3f& point) {
+      track.height.extend(Eigen::Matrix<float, 1, 1>(point.z()));
       for (std::size_t k = 0; k < kAxes; ++k) {
-        tracks_[t].extents[k].extend(along(tracks_[t].axes[k], point));
+        track.extents[k].extend(along(track.axes[k], point));
+      }
+    });
+    for_each_followed(scan, evidence, [](Track& track, const Eigen::Vector3f& point) {
+      for (std::size_t k = 0; k < kAxes; ++k) {
+        const Eigen::Vector2f place = along(track.axes[k], point);
+        const Eigen::AlignedBox2f& box = track.extents[k];
+        const float inside = (place - box.min()).cwiseMin(box.max() - place).minCoeff();
+        track.closeness[k] += 1.0F / std::max(inside, kAtSide);
       }
     });
   }
 
-  // The yaw with the smallest box: vehicles have right angles. Its first side is the longest unless
-  // the motion is known.
+  // The yaw with the points nearest to the sides of the box (Zhang et al., "Efficient L-shape
+  // fitting", IV 2017): few beams hit a vehicle elsewhere. Its first side is the longest unless the
+  // motion is known.
   static Eigen::AlignedBox2f choose_yaw(Track& track) {
-    const auto best = std::min_element(
-        track.extents.begin(), track.extents.end(),
-        [](const auto& a, const auto& b) { return a.sizes().prod() < b.sizes().prod(); });
-    track.object.yaw = yaw_of(track, static_cast<std::size_t>(best - track.extents.begin()));
-    if (track.is_directed || best->sizes().x() >= best->sizes().y()) return *best;
+    const auto closest = std::max_element(track.closeness.begin(), track.closeness.end());
+    const auto k = static_cast<std::size_t>(closest - track.closeness.begin());
+    const Eigen::AlignedBox2f& best = track.extents[k];
+    track.object.yaw = yaw_of(track, k);
+    if (track.is_directed || best.sizes().x() >= best.sizes().y()) return best;
     track.object.yaw += 0.5 * M_PI;
-    return {Eigen::Vector2f(best->min().y(), -best->max().x()),
-            Eigen::Vector2f(best->max().y(), -best->min().x())};
+    return {Eigen::Vector2f(best.min().y(), -best.max().x()),
+            Eigen::Vector2f(best.max().y(), -best.min().x())};
   }
 
   void update(const ScanSlot& scan, Track& track) {
@@ -353,11 +353,14 @@ class ObjectTracks {
       track.seen = kNever;
       return;
     }
+    const Eigen::Vector2d size = size_of(object);
     const Eigen::Vector2d centre = measure_centre(extent, track);
     if (object.first_scan == scan.scan) {
       object.centre.head<2>() = centre;
     } else {
-      correct(centre, track);
+      // Without a direction, what a box grows at one side is as well a motion.
+      const double growth = track.is_directed ? 0.0 : 0.5 * (size_of(object) - size).norm();
+      correct(centre, kError * kError + 0.5 * growth * growth, track);
     }
     object.centre.z() = sensor_.z() + static_cast<double>(track.height.center().x());
     object.height = static_cast<double>(track.height.sizes().x());
@@ -365,10 +368,6 @@ class ObjectTracks {
     object.last_scan = scan.scan;
     track.seen = scan.time;
     turn(track);
-    if (!track.is_directed) return;
-    objects_.push_back(with_hidden_length(object));
-    const Track* const known = known_later(object.id);
-    if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
   }
 
   // The measured centre, by the side towards the sensor and the size: a far side may be hidden.
@@ -419,8 +418,9 @@ class ObjectTracks {
     return size + (seen > size ? kGrowth : kShrinkage * across) * (seen - size);
   }
 
-  static void correct(const Eigen::Vector2d& centre, Track& track) {
-    const double variance = track.pp + kError * kError;
+  // `noise`: m^2, variance of the centre, per axis.
+  static void correct(const Eigen::Vector2d& centre, double noise, Track& track) {
+    const double variance = track.pp + noise;
     const double gain = track.pp / variance, speed_gain = track.pv / variance;
     const Eigen::Vector2d error = centre - track.object.centre.head<2>();
     track.object.centre.head<2>() += gain * error;
@@ -431,15 +431,12 @@ class ObjectTracks {
   }
 
   // The yaw follows the motion while that is certain.
-  void turn(Track& track) const {
+  static void turn(Track& track) {
     const Eigen::Vector2d& velocity = track.object.velocity;
     const double variance = track.vv / velocity.squaredNorm();  // of the direction
     if (!(variance * kDeviations * kDeviations <= 1.0)) return;
     const double direction = std::atan2(velocity.y(), velocity.x());
     if (!std::exchange(track.is_directed, true)) {
-      track.first_time = time_;
-      track.first_vv = track.vv;
-      track.first_velocity = velocity;
       track.yaw = direction;
       track.yaw_variance = variance;
     }
@@ -472,6 +469,7 @@ class ObjectTracks {
         to.centre.head<2>() += axes_of(to.yaw) * box->center();
         to.length = box->sizes().x();
         to.width = box->sizes().y();
+        to.points += from.points;
         for (Named& named : named_) {
           if (named.object == from.id) named.object = to.id;
         }
@@ -481,6 +479,16 @@ class ObjectTracks {
   }
   bool is_directed_now(const Track& track) const {
     return track.is_directed && track.seen >= time_;
+  }
+
+  void list_objects() {
+    objects_.clear();
+    for (const Track& track : tracks_) {
+      if (!is_directed_now(track)) continue;
+      objects_.push_back(with_hidden_length(track.object));
+      const Track* const known = known_later(track.object.id);
+      if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
+    }
   }
 
   void forget_all() {
@@ -510,7 +518,6 @@ class ObjectTracks {
   std::vector<Named> named_;
   std::vector<Part> parts_;              // by cluster of the newest scan
   std::vector<std::uint32_t> track_of_;  // by dynamic point, the track that it continues
-  std::vector<std::uint32_t> order_;     // parts with points that continue no track, largest first
   std::vector<MovingObject> objects_;
 };
 
