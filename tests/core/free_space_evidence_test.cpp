@@ -125,6 +125,17 @@ TEST_CASE("only compact instances are presumed to move, from the third scan of a
   CHECK_FALSE(is_presumed({11.7F, 3.6F}));
 }
 
+TEST_CASE("an instance that was tracked for five scans is no longer presumed to move") {
+  FreeSpaceConfig config;
+  config.lookback_scans = 0;  // no evidence
+  Watch watch(config);
+  watch.see(PointBuffer()).see(PointBuffer());
+  for (std::size_t scan = 2; scan < 8; ++scan) {
+    watch.see(car());
+    CHECK(watch.causes(scan, false) == Causes{scan < 7 ? Cause::kPresumed : Cause::kNoEvidence});
+  }
+}
+
 TEST_CASE("the first scan of an epoch is evidence on the second one until a third one comes") {
   Watch watch(FreeSpaceConfig{});
   watch.see(PointBuffer()).see(car());

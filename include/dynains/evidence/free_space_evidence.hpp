@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
@@ -78,7 +77,13 @@ class FreeSpaceEvidence {
     if (scan == 0 || epoch_ != epoch) begin_epoch(scan, epoch, T_world_sensor);
     newest_ = scan;
     Record& record = record_of(scan);
-    if (scan == epoch_begin_ + 2) forget_adjacent(record_of(scan - 1).evidence);
+    // The first scan of an epoch is the only reference of the second one, and shows what moves
+    // fast. It is adjacent: what moves slowly still hides the places that it left. So its hits
+    // serve only until a third scan comes: for the verdict without latency, or if none comes.
+    if (scan == epoch_begin_ + 2) {
+      detail::InstanceEvidence& second = record_of(scan - 1).evidence;
+      updater_.begin(second.samples, second.beliefs);
+    }
     record.T_world_sensor = T_world_sensor;
     record.epoch = epoch;
     record.since_begin = scan - epoch_begin_;
@@ -228,13 +233,6 @@ class FreeSpaceEvidence {
     }
   }
 
-  // The first scan of an epoch is the only reference of the second one, and shows what moves fast.
-  // It is adjacent: what moves slowly still hides the places that it left. So its hits serve only
-  // until a third scan comes: for the verdict without latency, or if none comes.
-  void forget_adjacent(detail::InstanceEvidence& evidence) const {
-    updater_.begin(evidence.samples, evidence.beliefs);
-  }
-
   // Scans since the latest reference.
   std::uint64_t phase_of(const Record& record) const {
     return record.since_begin % static_cast<std::uint64_t>(references_.span().step);
@@ -314,9 +312,6 @@ class FreeSpaceEvidence {
                         judged.supervoxels);
   }
 
-  bool surely_moves(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
-    return judge_.surely_moves(evidence, supervoxel, provisional_.supervoxels[supervoxel].cause);
-  }
   // Whether the instance of a supervoxel is small enough to move, and is not static by the evidence
   // on this scan. Slow vehicles around the sensor would bias its pose.
   bool may_move(const detail::InstanceEvidence& evidence, std::uint32_t supervoxel) const {
@@ -330,7 +325,8 @@ class FreeSpaceEvidence {
     const detail::InstanceSamples& samples = evidence.samples;
     mark_of_group_.assign(samples.instance_of.size() + 1, 0);
     for (std::uint32_t s = 0; s < samples.supervoxel_count(); ++s) {
-      mark_of_group_[s + 1] = surely_moves(evidence, s) ? 1 : may_move(evidence, s) ? 2 : 0;
+      const bool moves = judge_.surely_moves(evidence, s, provisional_.supervoxels[s].cause);
+      mark_of_group_[s + 1] = moves ? 1 : may_move(evidence, s) ? 2 : 0;
     }
     detail::resize_with_margin(may_move_, newest_group_of_point_.size());
     // Local copies: the compiler must assume that a store of a byte changes members.

@@ -138,12 +138,14 @@ class InstanceJudge {
     return may_presume && is_presumed(evidence, instance) ? Cause::kPresumed : Cause::kNoEvidence;
   }
 
-  // Whether a provisional verdict removes a compact instance without evidence: it may be a moving
-  // vehicle ahead, or a static object that came into view.
+  // Whether a provisional verdict removes a compact instance without evidence: a moving vehicle
+  // ahead, or a static object that came into view, as are most of those that are tracked longer.
   bool is_presumed(const InstanceEvidence& evidence, std::size_t instance) const {
     constexpr std::uint32_t kMinSamples = 5;
-    constexpr float kMaxDecided = 0.1F;  // ratio to all samples
-    if (!presume_dynamic_ || !evidence.tracked.shapes[instance].carried) return false;
+    constexpr std::uint32_t kMaxAge = 4;  // scans
+    constexpr float kMaxDecided = 0.1F;   // ratio to all samples
+    const TrackedInstances::Shape& shape = evidence.tracked.shapes[instance];
+    if (!presume_dynamic_ || !shape.carried || shape.age > kMaxAge) return false;
     const InstanceBeliefs::Counts& counts = evidence.beliefs.counts[instance];
     return counts.total >= kMinSamples &&
            static_cast<float>(counts.decided) <= kMaxDecided * static_cast<float>(counts.total);

@@ -48,6 +48,7 @@ struct TrackedInstances {
     float length = 0.0F;            ///< m, horizontal diagonal
     float height = 0.0F;            ///< m
     std::uint32_t cells = 0;        ///< number of its cells
+    std::uint32_t age = 0;          ///< number of scans of its track before this one
     float previous_overlap = 0.0F;  ///< ratio of common to all cells, with Instance::past
     float next_overlap = 0.0F;      ///< ratio of common to all cells, with Instance::future
     bool carried = false;           ///< whether it is tracked: small enough to be one object
@@ -156,6 +157,7 @@ class InstanceLinker {
     if (overlap < overlap_) return;
     if (overlap > to_shape.previous_overlap) {
       to_shape.previous_overlap = overlap;
+      to_shape.age = from_shape.age + 1;
       now.instances[to].past.instance = from;
     }
     if (overlap > from_shape.next_overlap) {
