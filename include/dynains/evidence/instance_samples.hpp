@@ -121,48 +121,47 @@ class InstanceSampler {
     constexpr float kReachSlope = 0.005F;  // m/m
     const PointBuffer& points = samples.points;
     grow(samples.reach, samples.size() + kPackWidth);
+    const auto height_of = [&](std::uint32_t s) { return voxel_index(samples.place[s], 2); };
     for (std::size_t instance = 0; instance < samples.instance_count(); ++instance) {
       const std::uint32_t first = samples.supervoxel_begin[instance];
       const std::uint32_t last = samples.supervoxel_begin[instance + 1];
       if (first == last) continue;
+      std::int64_t lowest = height_of(first), highest = lowest;
+      for (std::uint32_t s = first + 1; s < last; ++s) {
+        lowest = std::min(lowest, height_of(s));
+        highest = std::max(highest, height_of(s));
+      }
+      layers_.assign(static_cast<std::size_t>(highest - lowest) + 1, Layer());
+      Layer* const layers = layers_.data();
       // The direction of any sample serves for all.
       const std::uint32_t any = samples.sample_begin[first];
       const float x = points.x[any], y = points.y[any];
       const float distance = std::max(std::sqrt(x * x + y * y), 1e-3F);
-      for_each_layer(samples, first, last, [&](Layer& layer, std::uint32_t i) {
-        const float aside = (x * points.y[i] - y * points.x[i]) / distance;
-        layer.left = std::max(layer.left, aside);
-        layer.right = std::min(layer.right, aside);
-      });
-      for_each_layer(samples, first, last, [&](const Layer& layer, std::uint32_t i) {
-        samples.reach[i] = kReach * (layer.left - layer.right) + kReachSlope * distance;
-      });
-      layers_.clear();
+      for (std::uint32_t s = first; s < last; ++s) {
+        Layer layer = layers[height_of(s) - lowest];
+        for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
+          const float aside = x * points.y[i] - y * points.x[i];
+          layer.left = std::max(layer.left, aside);
+          layer.right = std::min(layer.right, aside);
+        }
+        layers[height_of(s) - lowest] = layer;
+      }
+      for (std::uint32_t s = first; s < last; ++s) {
+        const Layer& layer = layers[height_of(s) - lowest];
+        const float width = layer.left / distance - layer.right / distance;
+        std::fill(samples.reach.begin() + samples.sample_begin[s],
+                  samples.reach.begin() + samples.sample_begin[s + 1],
+                  kReach * width + kReachSlope * distance);
+      }
     }
   }
 
  private:
-  // Extent of an instance at a height, along the direction to the left, m.
+  // Extent of an instance at a height, along the direction to the left, m times the distance.
   struct Layer {
     float left = -std::numeric_limits<float>::infinity();
     float right = std::numeric_limits<float>::infinity();
   };
-  // Calls `use(layer, sample)` for the samples of supervoxels [first, last) of an instance. Each
-  // height of its supervoxels has a layer.
-  template <class Use>
-  void for_each_layer(const InstanceSamples& samples, std::uint32_t first, std::uint32_t last,
-                      Use&& use) {
-    const auto height_of = [&](std::uint32_t s) { return voxel_index(samples.place[s], 2); };
-    std::int64_t lowest = height_of(first);
-    for (std::uint32_t s = first; s < last; ++s) lowest = std::min(lowest, height_of(s));
-    for (std::uint32_t s = first; s < last; ++s) {
-      const auto height = static_cast<std::size_t>(height_of(s) - lowest);
-      if (layers_.size() <= height) layers_.resize(height + 1);
-      for (std::uint32_t i = samples.sample_begin[s]; i < samples.sample_begin[s + 1]; ++i) {
-        use(layers_[height], i);
-      }
-    }
-  }
 
   // Part of an instance in one voxel, or beyond the range. `xy` contains the voxel indices along x
   // and y, 16 bits each.
