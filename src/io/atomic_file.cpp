@@ -19,13 +19,15 @@
 
 namespace dynains {
 
-/// Buffer of a stream to an open file, which it owns. It keeps the error of a failed write and can
-/// write to the disk; std::filebuf cannot.
+/// Buffer of a stream to a new file. It keeps the error of a failed write and can write to the
+/// disk; std::filebuf cannot.
 class FileBuffer : public std::streambuf {
  public:
-  /// `descriptor`: what open() returned. After a failure of open(), error() is its errno.
-  explicit FileBuffer(int descriptor)
-      : descriptor_(descriptor), error_(descriptor < 0 ? errno : 0), bytes_(std::size_t{1} << 16) {
+  explicit FileBuffer(const std::filesystem::path& path)
+      : descriptor_(
+            ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666)),
+        error_(descriptor_ < 0 ? errno : 0),
+        bytes_(std::size_t{1} << 16) {
     setp(bytes_.data(), bytes_.data() + bytes_.size());
   }
   ~FileBuffer() override { close(); }
@@ -119,22 +121,6 @@ std::string random_digits() {
   return digits;
 }
 
-struct OpenTemporary {
-  fs::path path;
-  int descriptor = -1;
-};
-
-/// A new file. Throws IoError.
-OpenTemporary open_temporary(const fs::path& target) {
-  const std::string name = target.filename().string();
-  OpenTemporary file{target};
-  file.path.replace_filename('.' + name + '.' + random_digits() + std::string(kTemporaryEnd));
-  file.descriptor =
-      ::open(file.path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-  if (file.descriptor < 0) fail_by_system(target, "cannot be written", errno);
-  return file;
-}
-
 /// A rename is on the disk when its folder is. Some file systems cannot sync folders (EINVAL), and
 /// some folders cannot be opened; the file is whole either way.
 void sync_folder(const fs::path& folder) {
@@ -155,9 +141,10 @@ AtomicFile::AtomicFile(fs::path target)
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     fail(target_, "cannot be replaced: expected a regular file or none");
   }
-  OpenTemporary file = open_temporary(target_);
-  temporary_ = std::move(file.path);
-  buffer_ = std::make_unique<FileBuffer>(file.descriptor);
+  temporary_ = target_.parent_path() / ('.' + target_.filename().string() + '.' + random_digits() +
+                                        std::string(kTemporaryEnd));
+  buffer_ = std::make_unique<FileBuffer>(temporary_);
+  if (buffer_->error() != 0) fail_by_system(target_, "cannot be written", buffer_->error());
   stream_.rdbuf(buffer_.get());
 }
 

@@ -1,5 +1,7 @@
 #include "point_sink.hpp"
 
+#include <utility>
+
 #include "../scalar.hpp"
 #include "../text.hpp"
 
@@ -62,38 +64,32 @@ std::uint8_t sensor_number(double value) {
 }
 
 bool PointSink::claim(Role role) {
-  bool& claimed = claimed_[static_cast<std::size_t>(role)];
-  if (claimed) return false;
-  claimed = true;
-  return true;
+  return !std::exchange(claimed_[static_cast<std::size_t>(role)], true);
 }
 
 std::optional<std::string> PointSink::missing() const {
   for (const Role role : {Role::kX, Role::kY, Role::kZ}) {
-    const auto index = static_cast<std::size_t>(role);
-    if (!claimed_[index]) return std::string(1, "xyz"[index]);
+    if (!has(role)) return std::string(1, "xyz"[static_cast<std::size_t>(role)]);
   }
   return std::nullopt;
 }
 
 PointColumns PointSink::columns() const {
-  const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
   PointColumns columns;
-  columns.intensity = claimed(Role::kIntensity);
-  columns.ring = claimed(Role::kRing);
-  columns.time = claimed(Role::kTime);
-  columns.label = claimed(Role::kLabel);
+  columns.intensity = has(Role::kIntensity);
+  columns.ring = has(Role::kRing);
+  columns.time = has(Role::kTime);
+  columns.label = has(Role::kLabel);
   return columns;
 }
 
 void PointSink::resize(std::size_t count) {
-  const auto claimed = [this](Role role) { return claimed_[static_cast<std::size_t>(role)]; };
   file_.positions.resize(count, Eigen::Vector3d::Zero());
-  if (claimed(Role::kIntensity)) file_.intensity.resize(count);
-  if (claimed(Role::kRing)) file_.ring.resize(count);
-  if (claimed(Role::kTime)) file_.time.resize(count);
-  if (claimed(Role::kLabel)) file_.label.resize(count);
-  if (claimed(Role::kSensor)) file_.sensor.resize(count);
+  if (has(Role::kIntensity)) file_.intensity.resize(count);
+  if (has(Role::kRing)) file_.ring.resize(count);
+  if (has(Role::kTime)) file_.time.resize(count);
+  if (has(Role::kLabel)) file_.label.resize(count);
+  if (has(Role::kSensor)) file_.sensor.resize(count);
 }
 
 bool PointSink::set(std::size_t i, Role role, double value) {

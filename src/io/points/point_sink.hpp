@@ -47,6 +47,8 @@ class PointSink {
   PointFile& file() { return file_; }
 
  private:
+  bool has(Role role) const { return claimed_[static_cast<std::size_t>(role)]; }
+
   std::array<bool, static_cast<std::size_t>(Role::kNone)> claimed_{};
   PointFile file_;
 };
