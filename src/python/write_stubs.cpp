@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -66,19 +67,15 @@ std::string lines_of(const std::string& indent, const std::string& end) {
 
 /// The lines that replace a line of the template, which starts with `indent`.
 std::string expand(const std::string& indent, const std::string& line) {
+  using namespace dynains;
   const std::string as_argument = " = ...,";
-  if (line == "@CONFIG_ATTRIBUTES@") return lines_of<dynains::DynaInsRemover::Config>(indent, "");
-  if (line == "@CONFIG_ARGUMENTS@")
-    return lines_of<dynains::DynaInsRemover::Config>(indent, as_argument);
-  if (line == "@EVALUATION_ARGUMENTS@") {
-    return lines_of<dynains::evaluation::EvaluationConfig>(indent, as_argument);
-  }
-  if (line == "@RECORDING_ARGUMENTS@") {
-    return lines_of<dynains::run::RecordingSettings>(indent, as_argument);
-  }
-  if (line == "@RUN_ARGUMENTS@") {
-    return lines_of<dynains::run::RunSettings>(indent, as_argument);
-  }
+  const std::map<std::string, std::string> lists = {
+      {"@CONFIG_ATTRIBUTES@", lines_of<DynaInsRemover::Config>(indent, "")},
+      {"@CONFIG_ARGUMENTS@", lines_of<DynaInsRemover::Config>(indent, as_argument)},
+      {"@EVALUATION_ARGUMENTS@", lines_of<evaluation::EvaluationConfig>(indent, as_argument)},
+      {"@RECORDING_ARGUMENTS@", lines_of<run::RecordingSettings>(indent, as_argument)},
+      {"@RUN_ARGUMENTS@", lines_of<run::RunSettings>(indent, as_argument)}};
+  if (const auto list = lists.find(line); list != lists.end()) return list->second;
   if (line.rfind("@property ", 0) == 0) {  // NAME: TYPE
     const std::size_t name = line.find(' ') + 1, colon = line.find(':');
     return indent + "@property\n" + indent + "def " + line.substr(name, colon - name) +
