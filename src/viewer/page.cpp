@@ -19,8 +19,8 @@
 
 namespace dynains::viewer {
 
-/// A file of the page, embedded by CMake: "html", "style" or "script".
-std::string_view page_file(std::string_view name);
+/// The page without data, embedded by CMake.
+std::string_view page_template();
 
 namespace {
 
@@ -297,18 +297,15 @@ void ThinnedPoints::thin() {
 
 void write_page(std::ostream& out, const ViewData& data) {
   const PackedPoints points = pack(data);
-  const auto content_of = [&](std::string_view mark) -> std::string {
-    if (mark == "description") return script_json(describe(data, points.description));
-    return mark == "points" ? base64(points.bytes) : std::string(page_file(mark));
+  std::string_view page = page_template();
+  const auto fill = [&](std::string_view mark, const std::string& content) {
+    const std::size_t begin = page.find(mark);
+    out << page.substr(0, begin) << content;
+    page.remove_prefix(begin + mark.size());
   };
-  // Each {{NAME}} becomes content_of(NAME).
-  std::string_view html = page_file("html");
-  for (std::size_t begin = html.find("{{"); begin != html.npos; begin = html.find("{{")) {
-    const std::size_t end = html.find("}}", begin);
-    out << html.substr(0, begin) << content_of(html.substr(begin + 2, end - begin - 2));
-    html.remove_prefix(end + 2);
-  }
-  out << html;
+  fill("{{description}}", script_json(describe(data, points.description)));
+  fill("{{points}}", base64(points.bytes));
+  out << page;
 }
 
 }  // namespace dynains::viewer
