@@ -96,10 +96,9 @@ class Packer {
 
   std::string columns() const {
     std::string bytes;
-    for (const Column16* column : {&steps_[0], &steps_[1], &steps_[2], &scan_, &instance_}) {
-      bytes += column->bytes();
-    }
-    return bytes + intensity_ + belief_ + cause_ + flags_;
+    for (const Column16& column : words_) bytes += column.bytes();
+    for (const std::string& column : octets_) bytes += column;
+    return bytes;
   }
 
  private:
@@ -109,31 +108,27 @@ class Packer {
       origin.push_back(static_cast<double>(number * kChunkSteps) * kUnit);
     }
     chunks_.push_back({{"layer", layer}, {"count", 0}, {"origin", origin}});
-    for (Column16* column : {&steps_[0], &steps_[1], &steps_[2], &scan_, &instance_}) {
-      column->restart();
-    }
+    for (Column16& column : words_) column.restart();
   }
 
   void add(const PackedPoint& packed_point) {
     const ViewPoint& point = *packed_point.point;
-    for (std::size_t axis = 0; axis < 3; ++axis) steps_[axis].add(packed_point.steps[axis]);
-    scan_.add(point.scan);
-    instance_.add(point.instance);
+    const auto& [x, y, z] = packed_point.steps;
+    const std::array<std::uint16_t, 5> words = {x, y, z, point.scan, point.instance};
+    for (std::size_t i = 0; i < words.size(); ++i) words_[i].add(words[i]);
     const double share = static_cast<double>(point.intensity) / full_intensity_;
-    intensity_ += static_cast<char>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
-    belief_ += static_cast<char>(point.belief);
-    cause_ += static_cast<char>(point.cause);
-    flags_ += static_cast<char>(static_cast<unsigned>(point.label) +
-                                4U * static_cast<unsigned>(point.truth));
+    const long intensity = std::lround(255.0 * std::clamp(share, 0.0, 1.0));
+    const long flags = static_cast<long>(point.label) + 4 * static_cast<long>(point.truth);
+    const std::array<long, 4> octets = {intensity, point.belief, point.cause, flags};
+    for (std::size_t i = 0; i < octets.size(); ++i) octets_[i] += static_cast<char>(octets[i]);
     auto& count = chunks_.back()["count"];
     count = count.get<std::size_t>() + 1;
   }
 
   double full_intensity_;
   Json chunks_ = Json::array();
-  std::array<Column16, 3> steps_;
-  Column16 scan_, instance_;
-  std::string intensity_, belief_, cause_, flags_;
+  std::array<Column16, 5> words_;      // see PackedPoints::bytes
+  std::array<std::string, 4> octets_;  // behind them
 };
 
 /// The 99th percentile of the intensities; 1 if it is not positive.
