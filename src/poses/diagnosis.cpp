@@ -468,7 +468,13 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
     }
   }
   d.verdict = verdict_of_agreement(evidence);
-  if (all.at_points > kRough || miss_motion(motions, given)) {
+  const auto are_wrong = [&](const std::vector<RegisteredMotion>& some) {
+    return some.size() >= kMinPairs &&
+           (error_at_points(some, given) > kRough || miss_motion(some, given));
+  };
+  // Traffic on both lanes of a tunnel moves registrations, now forwards and now backwards.
+  if (are_wrong(motions) &&
+      (d.verdict == PoseVerdict::kDisagree || are_wrong(by_other_ways(recording, motions, 1)))) {
     d.verdict = PoseVerdict::kDisagree;
   } else if (are_inexact || (d.verdict == PoseVerdict::kDisagree && !is_exact(all))) {
     d.verdict = PoseVerdict::kInexact;

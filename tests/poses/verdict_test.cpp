@@ -340,6 +340,12 @@ TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with fe
   }
 }
 
+TEST_CASE("Traffic on both lanes of a tunnel does not refute right poses") {
+  auto config = simulation::random_world(870012);
+  config.scans = 40;
+  CHECK(diagnose(Recording(Drive(config).path())).sound());
+}
+
 TEST_CASE("Traffic of nearly the own speed does not make right ways too long, and wrong ones are") {
   simulation::Config config = short_world(22025);
   config.seed = 5;
