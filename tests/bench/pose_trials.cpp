@@ -44,20 +44,10 @@ std::vector<double> times_of(const Poses& poses) {
   return times;
 }
 
-/// Rows time x y z qx qy qz qw, or with the quaternion as w x y z.
 void write_timed(const fs::path& folder, const std::vector<double>& times, const Poses& poses,
                  bool w_first = false) {
-  std::ofstream file(folder / "poses.txt");
-  file.precision(12);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Eigen::Quaterniond q(poses[i].linear());
-    const Eigen::Vector3d t = poses[i].translation();
-    file << times[i] << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ';
-    if (w_first) file << q.w() << ' ';
-    file << q.x() << ' ' << q.y() << ' ' << q.z();
-    if (!w_first) file << ' ' << q.w();
-    file << '\n';
-  }
+  const auto pose_of = [&](std::size_t i) { return poses[i]; };
+  test::write_text(folder / "poses.txt", test::timed_rows(times, pose_of, w_first));
 }
 
 void write_rows(const fs::path& folder, const Poses& poses,

@@ -106,10 +106,9 @@ TEST_CASE("cells lie in the world frame: their counts do not depend on the pose 
   DynamicOccupancyGrid grid(config);
   const Eigen::Vector3f place(20.3F, -7.7F, 0.3F);  // the middle of a cell
   for (std::uint64_t scan = 0; scan < 10; ++scan) {
-    Eigen::Isometry3d T_origin_sensor = Eigen::Isometry3d::Identity();
-    T_origin_sensor.translate(Eigen::Vector3d(1.5 * static_cast<double>(scan), 0.3, 0.1));
-    T_origin_sensor.rotate(
-        Eigen::AngleAxisd(0.3 * static_cast<double>(scan), Eigen::Vector3d::UnitZ()));
+    const auto i = static_cast<double>(scan);
+    const Eigen::Isometry3d T_origin_sensor = Eigen::Translation3d(1.5 * i, 0.3, 0.1) *
+                                              Eigen::AngleAxisd(0.3 * i, Eigen::Vector3d::UnitZ());
     const std::vector<Eigen::Vector3f> seen(1, T_origin_sensor.inverse().cast<float>() * place);
     SparseScan one(seen);
     one.say(scan < 9 ? Cause::kFreeSpace : Cause::kOccupied);

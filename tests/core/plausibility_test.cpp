@@ -127,8 +127,7 @@ TEST_CASE("right poses of a drive are plausible, inverse and turned ones are not
   };
   CHECK(first_doubt([](const Pose& T) { return T; }) == Suspicion::kNone);
   CHECK(first_doubt([](const Pose& T) { return Pose(T.inverse()); }) != Suspicion::kNone);
-  Pose T_sensor_body = Pose::Identity();
-  T_sensor_body.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Pose T_sensor_body(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
   CHECK(first_doubt([&](const Pose& T) { return Pose(T * T_sensor_body); }) != Suspicion::kNone);
 }
 

@@ -5,20 +5,11 @@
 namespace dynains::test {
 namespace {
 
-Eigen::Isometry3d random_pose(Random& random, double reach) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  const Eigen::Vector3d ones = Eigen::Vector3d::Ones();
-  const Eigen::Vector3d axis = random.vector(-ones, ones).normalized();
-  T.linear() = Eigen::AngleAxisd(random.uniform(0.0, 2.0 * M_PI), axis).toRotationMatrix();
-  T.translation() = random.vector(-reach * ones, reach * ones);
-  return T;
-}
-
 TEST_CASE("points of the window are at the place of Eq. 3 in double") {
   // All counts up to three packs of eight, so that tails of every length occur.
   Random random(1);
   for (std::size_t count = 0; count <= 24; ++count) {
-    const Eigen::Isometry3d T = random_pose(random, 5.0);
+    const Eigen::Isometry3d T = random.pose(5.0);
     PointBuffer points;
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector3f p = random.vector({-60, -60, -5}, {60, 60, 10}).cast<float>();

@@ -41,14 +41,6 @@ void read_point_file(Bytes bytes) {
 
 std::string pose_row(double x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 -2.5 0 0 1 1e-3\n"; }
 
-std::string floats(std::initializer_list<float> values) {
-  std::string bytes;
-  for (const float value : values) {
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
-  }
-  return bytes;
-}
-
 std::string pcd(const std::string& data, const std::string& points) {
   return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z intensity label\nSIZE 4 4 4 4 4\nTYPE F F F F U\n"
          "COUNT 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\nDATA " +
@@ -136,20 +128,22 @@ std::string session_file() {
 }  // namespace
 
 std::vector<Target> reader_targets() {
-  const std::string ply_point = floats({1.0F, -2.0F, 3.0F}) + "\x7F";
+  const std::string ply_point = test::bytes_of<float>({1.0F, -2.0F, 3.0F}) + "\x7F";
   const std::string ply_list = std::string("\1\0\0\0\0", 5);
-  const std::string pcd_point = floats({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
+  const std::string pcd_point =
+      test::bytes_of<float>({1.0F, 2.0F, 3.0F, 0.5F}) + std::string("\xFB\0\0\0", 4);
   // Twice 20 bytes column by column, in LZF: a literal run of 32 bytes and one of 8.
   const std::string columns(40, '\0');
   const std::string lzf = '\x1F' + columns.substr(0, 32) + '\x07' + columns.substr(0, 8);
   const std::string sizes = std::string("\x2A\0\0\0\x28\0\0\0", 8);
   const std::string extra = test::extra_bytes("ring", 3) + test::extra_bytes("label", 5);
-  const std::string xyzi = floats({1.0F, 2.0F, 3.0F, 0.5F}), session = session_file();
+  const std::string xyzi = test::bytes_of<float>({1.0F, 2.0F, 3.0F, 0.5F}),
+                    session = session_file();
   return {
       {"scan",
        read_scan_file,
-       {"", xyzi, floats({1.0F, 2.0F, 3.0F}),
-        floats({1e30F, -40.0F, 0.0F, 0.0F, NAN, INFINITY, 0.0F, 1.0F}) + "cut"}},
+       {"", xyzi, test::bytes_of<float>({1.0F, 2.0F, 3.0F}),
+        test::bytes_of<float>({1e30F, -40.0F, 0.0F, 0.0F, NAN, INFINITY, 0.0F, 1.0F}) + "cut"}},
       {"labels", read_labels_file, {"", std::string("\xFB\0\1\0", 4), "abc"}},
       {"calib",
        read_calib,

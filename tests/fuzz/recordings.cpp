@@ -61,10 +61,7 @@ void write_folder(const fs::path& folder, const std::string& text) {
   }
 }
 
-std::string bin(float x) {
-  const float values[] = {x, 1.0F, -1.0F, 0.5F, x + 3.0F, 2.0F, 0.0F, 0.25F};
-  return {reinterpret_cast<const char*>(values), sizeof(values)};
-}
+std::string bin(float x) { return test::packed(x, 1.0F, -1.0F, 0.5F, x + 3.0F, 2.0F, 0.0F, 0.25F); }
 
 std::string pcd(const std::string& viewpoint) {
   return "VERSION 0.7\nFIELDS x y z ring time label\nSIZE 4 4 4 2 8 4\nTYPE F F F U F U\n"

@@ -1,6 +1,7 @@
 // Removal of the distortion by the motion of the sensor during a scan.
 
 #include "dynains/errors.hpp"
+#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "files.hpp"
@@ -33,7 +34,7 @@ void write_drive(const fs::path& folder, const std::function<double(double, doub
                  double first_time = 0.0) {
   PointColumns columns;
   columns.time = true;
-  std::string times, poses;
+  std::vector<double> times;
   for (int i = 0; i < 3; ++i) {
     const double time = 0.1 * i;
     fs::create_directories(folder);
@@ -45,19 +46,11 @@ void write_drive(const fs::path& folder, const std::function<double(double, doub
       writer.add(point);
     }
     writer.commit();
-    const auto seconds = [&](double value) { return std::to_string(first_time + value) + ' '; };
-    times += seconds(time) + '\n';
-    const Eigen::Isometry3d T = motion(time);
-    const Eigen::Quaterniond q(T.linear());
-    poses += seconds(time);
-    for (const double value : {T.translation().x(), T.translation().y(), T.translation().z(), q.x(),
-                               q.y(), q.z(), q.w()}) {
-      poses += std::to_string(value) + ' ';
-    }
-    poses += '\n';
+    times.push_back(first_time + time);
   }
-  write_text(folder / "times.txt", times);
-  write_text(folder / "poses.tum", poses);
+  write_times(folder / "times.txt", times);
+  const auto pose_of = [](std::size_t i) { return motion(0.1 * static_cast<double>(i)); };
+  write_text(folder / "poses.tum", timed_rows(times, pose_of));
 }
 
 /// Two scans of points at (x, 0, 0), each with x (m) and its time (s).

@@ -51,6 +51,38 @@ inline std::size_t count_entries(const std::filesystem::path& folder) {
   return static_cast<std::size_t>(std::distance(Iterator(folder), Iterator()));
 }
 
+/// Bytes of values in memory order, one value after the other.
+template <class... Values>
+std::string packed(const Values&... values) {
+  std::string bytes;
+  (bytes.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
+  return bytes;
+}
+
+/// Bytes of numbers.
+template <class Number>
+std::string bytes_of(const std::vector<Number>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
+}
+
+/// Rows of a trajectory: time, x y z, and the quaternion as x y z w, or as w x y z. `pose_of(i)`
+/// gives the pose of time i.
+template <class PoseOf>
+std::string timed_rows(const std::vector<double>& times, PoseOf&& pose_of, bool w_first = false) {
+  std::ostringstream rows;
+  rows.precision(12);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const Eigen::Isometry3d T(pose_of(i));
+    const Eigen::Quaterniond q(T.linear());
+    rows << times[i] << ' ' << T.translation().transpose() << ' ';
+    if (w_first) rows << q.w() << ' ';
+    rows << q.vec().transpose();
+    if (!w_first) rows << ' ' << q.w();
+    rows << '\n';
+  }
+  return rows.str();
+}
+
 /// Text of the exception that `action` throws. Fails if its type is another or nothing is thrown.
 template <class Exception, class Action>
 std::string message_of(Action&& action) {

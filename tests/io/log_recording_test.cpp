@@ -595,7 +595,7 @@ TEST_CASE("A field label gives the labels, and a truncated log gives the scans b
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
   std::vector<CloudField> fields = kXyz;
   fields.push_back({"label", 12, 6});
-  const std::string points = xyz_of({1, 2, 3}) + ByteWriter().number(0x1000FBU).bytes();
+  const std::string points = bytes_of<float>({1, 2, 3}) + ByteWriter().number(0x1000FBU).bytes();
   for (WrittenMessage& message : messages) {
     if (message.channel != 0) continue;
     message.data = cloud_message(MessageEncoding::kCdr, 1e-9 * static_cast<double>(message.time),

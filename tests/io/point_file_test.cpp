@@ -9,17 +9,6 @@ using namespace dynains::test;
 
 namespace {
 
-/// Bytes of values in memory order, one value after the other.
-template <class... T>
-std::string pack(const T&... values) {
-  std::string bytes;
-  const auto append = [&](const auto& value) {
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
-  };
-  (append(values), ...);
-  return bytes;
-}
-
 std::string reversed(std::string bytes) { return {bytes.rbegin(), bytes.rend()}; }
 
 PointFile read(const std::string& name, const std::string& content) {
@@ -103,7 +92,7 @@ TEST_CASE("A written PLY has the bytes of the format") {
   CHECK(text.substr(text.find("\nelement")) ==
         "\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
         "property uint label\nend_header\n" +
-            pack(1.0F, 2.0F, 3.0F) + pack(7U));
+            packed(1.0F, 2.0F, 3.0F) + packed(7U));
 }
 
 TEST_CASE("A point file without commit leaves no file") {
@@ -165,7 +154,7 @@ TEST_CASE("PLY: binary of both byte orders, all types, lists before and within")
     CHECK(file.label == std::vector<std::uint32_t>{4000000000U});
     CHECK(file.time == std::vector<double>{0.1});
   };
-  const auto v = [](auto value) { return pack(value); };
+  const auto v = [](auto value) { return packed(value); };
   const auto build = [&](auto&& order) {
     return order(v(std::uint16_t{2})) + order(v(std::int16_t{1})) + order(v(std::int16_t{2})) +
            order(v(std::uint16_t{0})) + v(std::int8_t{-1}) + order(v(std::int16_t{-2})) +
@@ -212,16 +201,16 @@ TEST_CASE("PCD: binary and compressed files hold equal points") {
     CHECK(file.positions[1] == Eigen::Vector3d(4.0, 5.0, 6.0));
     CHECK(file.time == std::vector<double>{0.25, 0.5});
   };
-  check(read("a.pcd", header + "binary\n" + pack(1.0F) + "abc" + pack(2.0F, 3.0F, 0.25) +
-                          pack(4.0F) + "def" + pack(5.0F, 6.0F, 0.5)));
+  check(read("a.pcd", header + "binary\n" + packed(1.0F) + "abc" + packed(2.0F, 3.0F, 0.25) +
+                          packed(4.0F) + "def" + packed(5.0F, 6.0F, 0.5)));
   // Field after field, stored in literals of at most 32 bytes.
   const std::string plain =
-      pack(1.0F, 4.0F) + "abcdef" + pack(2.0F, 5.0F, 3.0F, 6.0F) + pack(0.25, 0.5);
+      packed(1.0F, 4.0F) + "abcdef" + packed(2.0F, 5.0F, 3.0F, 6.0F) + packed(0.25, 0.5);
   REQUIRE(plain.size() == 46);
   const std::string compressed =
       std::string(1, 31) + plain.substr(0, 32) + std::string(1, 13) + plain.substr(32);
-  check(read("a.pcd", header + "binary_compressed\n" + pack(std::uint32_t{48}, std::uint32_t{46}) +
-                          compressed));
+  check(read("a.pcd", header + "binary_compressed\n" +
+                          packed(std::uint32_t{48}, std::uint32_t{46}) + compressed));
 }
 
 TEST_CASE("Empty clouds") {
@@ -331,18 +320,18 @@ TEST_CASE("Malformed point files are refused with position and expectation") {
       {"a.pcd", pcd_header("2", "binary") + std::string(23, 'x'), "the file has 23 bytes left"},
       {"a.pcd", pcd_header("1", "binary_compressed") + "1234567", "file ends, expected the sizes"},
       {"a.pcd",
-       pcd_header("1", "binary_compressed") + pack(std::uint32_t{13}, std::uint32_t{12}) +
+       pcd_header("1", "binary_compressed") + packed(std::uint32_t{13}, std::uint32_t{12}) +
            std::string(12, '\0'),
        "expected 13 bytes of compressed points, the file has 12"},
       {"a.pcd",
-       pcd_header("1", "binary_compressed") + pack(std::uint32_t{4}, std::uint32_t{13}) + "1234",
+       pcd_header("1", "binary_compressed") + packed(std::uint32_t{4}, std::uint32_t{13}) + "1234",
        "expected a block of 1 points of 12 bytes, its size is given as 13"},
       {"a.pcd",
        pcd_header("100000000", "binary_compressed") +
-           pack(std::uint32_t{4}, std::uint32_t{1200000000}) + "1234",
+           packed(std::uint32_t{4}, std::uint32_t{1200000000}) + "1234",
        "4 bytes cannot hold 1200000000"},
       {"a.pcd",
-       pcd_header("1", "binary_compressed") + pack(std::uint32_t{2}, std::uint32_t{12}) + "\x20" +
+       pcd_header("1", "binary_compressed") + packed(std::uint32_t{2}, std::uint32_t{12}) + "\x20" +
            std::string(1, '\0'),
        "expected a sound compressed block"},
   };
@@ -360,7 +349,7 @@ TEST_CASE("A truncated point file is detected without reading its points") {
     std::string data;
     std::string expected;
   };
-  const std::string block = pack(std::uint32_t{13}, std::uint32_t{12}) + std::string(13, '\0');
+  const std::string block = packed(std::uint32_t{13}, std::uint32_t{12}) + std::string(13, '\0');
   for (const Case& whole : std::vector<Case>{
            {"a.pcd", pcd_header("2", "ascii"), "1 2 3\n1 2 3", "expected 2 points"},
            {"a.pcd", pcd_header("2", "binary"), std::string(24, 'x'), "expected 2 points"},

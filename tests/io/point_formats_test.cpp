@@ -38,11 +38,6 @@ std::string error(const std::string& name, const std::string& content) {
   return text;
 }
 
-template <class Number>
-std::string bytes_of(const std::vector<Number>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Number)};
-}
-
 const std::string kTwoPoints = bytes_of<float>({1, 2, 3, 0.5F, 4, 5, 6, 0.25F});
 const std::string kFields =
     "[('x', '<f8'), ('y', '<f8'), ('z', '<f8'), ('name', '<U2'), "

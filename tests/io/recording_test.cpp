@@ -432,8 +432,7 @@ std::string raw_scan(int columns, int points = 300) {
   for (int i = 0; i < points; ++i) {
     for (int column = 0; column < columns; ++column) {
       const double values[] = {5.0 + 0.05 * (i % 100), 2.0 + 0.5 * (i / 100), -1.5};
-      const auto value = static_cast<Number>(column < 3 ? values[column] : 7.0);
-      bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+      bytes += packed(static_cast<Number>(column < 3 ? values[column] : 7.0));
     }
   }
   return bytes;
@@ -476,10 +475,9 @@ TEST_CASE("Raw scans with other columns are refused with the option, and read wi
   std::string alternating;
   for (int i = 0; i < 600; ++i) {
     const double angle = 0.005 * i + (i % 2) * M_PI;
-    const float values[] = {
-        static_cast<float>(9.0 * std::cos(angle)), static_cast<float>(7.0 * std::sin(angle)),
-        -1.5F + 0.01F * static_cast<float>(i % 40), 0.1F * static_cast<float>(i % 7)};
-    alternating.append(reinterpret_cast<const char*>(values), sizeof(values));
+    alternating += bytes_of<float>(
+        {static_cast<float>(9.0 * std::cos(angle)), static_cast<float>(7.0 * std::sin(angle)),
+         -1.5F + 0.01F * static_cast<float>(i % 40), 0.1F * static_cast<float>(i % 7)});
   }
   write_text(file, alternating);
   CHECK(Recording(folder.path()).read_scan(0).size() == 600);

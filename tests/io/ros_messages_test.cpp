@@ -75,13 +75,13 @@ TEST_CASE("Clouds may be big-endian, and their row step may be that of another c
   const std::vector<float> values = {1, 2, 3, 4, 5, 6};
   std::string swapped;
   for (const float value : values) {
-    const std::string bytes = xyz_of({value});
+    const std::string bytes = bytes_of<float>({value});
     swapped.append(bytes.rbegin(), bytes.rend());
   }
   const std::vector<float> expected = {1, 2, 3, 0, 4, 5, 6, 0};
-  CHECK(decode(message(0, 24, 1, xyz_of(values)), MessageEncoding::kRos1).xyzi == expected);
+  CHECK(decode(message(0, 24, 1, bytes_of(values)), MessageEncoding::kRos1).xyzi == expected);
   CHECK(decode(message(1, 24, 1, swapped), MessageEncoding::kRos1).xyzi == expected);
-  const std::string two_rows = xyz_of(values) + xyz_of({7, 8, 9, 1, 1, 1});
+  const std::string two_rows = bytes_of(values) + bytes_of<float>({7, 8, 9, 1, 1, 1});
   for (const std::uint32_t row_step : {0U, 24U, 4000U}) {
     CAPTURE(row_step);
     CHECK(decode(message(0, row_step, 2, two_rows), MessageEncoding::kRos1).xyzi[8] == 7.0F);
@@ -120,14 +120,14 @@ TEST_CASE("Malformed clouds are refused with their place") {
   const auto error_of = [&](const std::string& bytes) {
     return message_of<IoError>([&] { decode(bytes, cdr); });
   };
-  const std::string good = cloud_message(cdr, 1, "l", kXyz, 12, xyz_of({1, 2, 3}));
+  const std::string good = cloud_message(cdr, 1, "l", kXyz, 12, bytes_of<float>({1, 2, 3}));
   CHECK(error_of(good) == "(nothing was thrown)");
   for (std::size_t size = 0; size < good.size() - 4; ++size) {
     CHECK(error_of(good.substr(0, size)).rfind("log: /t: ", 0) == 0);
   }
   CHECK(error_of("\1" + good.substr(1)).find("plain CDR") != std::string::npos);
   const auto with_fields = [&](const std::vector<CloudField>& fields, std::uint32_t step) {
-    return error_of(cloud_message(cdr, 1, "l", fields, step, xyz_of({1, 2, 3})));
+    return error_of(cloud_message(cdr, 1, "l", fields, step, bytes_of<float>({1, 2, 3})));
   };
   CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}}, 12).find("fields x, y and z") != std::string::npos);
   CHECK(with_fields({{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 5}}, 12).find("float32 or float64") !=

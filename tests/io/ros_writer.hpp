@@ -1,6 +1,7 @@
 // Serialised messages of ROS for tests.
 #pragma once
 
+#include "io/files.hpp"
 #include "io/logs/message_writer.hpp"
 #include "io/logs/ros_messages.hpp"
 #include "support/standard.hpp"
@@ -36,10 +37,6 @@ inline std::string cloud_message(MessageEncoding encoding, double time, const st
 
 inline const std::vector<CloudField> kXyz = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}};
 
-inline std::string xyz_of(const std::vector<float>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)};
-}
-
 inline Eigen::Isometry3d pose_at(double x, double yaw) {
   return Eigen::Translation3d(x, 1, 2) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ());
 }
@@ -62,7 +59,7 @@ inline std::string transform(double time, const std::string& parent, const std::
 
 inline std::string small_cloud(double time, const std::string& frame,
                                MessageEncoding encoding = MessageEncoding::kCdr) {
-  return cloud_message(encoding, time, frame, kXyz, 12, xyz_of({1, 2, 3, 4, 5, 6}));
+  return cloud_message(encoding, time, frame, kXyz, 12, bytes_of<float>({1, 2, 3, 4, 5, 6}));
 }
 
 }  // namespace dynains::test

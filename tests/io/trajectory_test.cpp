@@ -17,10 +17,7 @@ Trajectory read(const std::string& text) {
 }
 
 Eigen::Isometry3d pose(double x, double angle) {
-  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
-  result.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  result.translation().x() = x;
-  return result;
+  return Eigen::Translation3d(x, 0.0, 0.0) * Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ());
 }
 
 }  // namespace

@@ -50,11 +50,8 @@ Points seen_from(const Pose& T_map_scan, const Points& points) {
 }
 
 Pose motion(const Eigen::Vector3d& translation, double degrees) {
-  Pose T = Pose::Identity();
-  T.translate(translation);
   const Eigen::Vector3d axis = Eigen::Vector3d(0.1, 0.2, 1.0).normalized();
-  T.rotate(Eigen::AngleAxisd(degrees * M_PI / 180.0, axis));
-  return T;
+  return Eigen::Translation3d(translation) * Eigen::AngleAxisd(degrees * M_PI / 180.0, axis);
 }
 
 double angle_between(const Pose& a, const Pose& b) {

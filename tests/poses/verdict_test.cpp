@@ -68,8 +68,7 @@ TEST_CASE("Right poses of a sparse sensor in a crowd raise no doubt, wrong ones 
   INFO("seed " << seed);
   const Drive drive(drive_of(simulation::Scene::kCrowd, simulation::Sensor::kMid360, 40, seed));
   CHECK(is_accepted(diagnose(Recording(drive.path()))));
-  CHECK_FALSE(is_accepted(
-      diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }))));
+  CHECK_FALSE(is_accepted(diagnose(drive.with_poses(inverse_pose))));
   CHECK_FALSE(is_accepted(diagnose(drive.with_poses(Noise(0.2)))));
 }
 
@@ -91,10 +90,7 @@ TEST_CASE("Errors that add up over many scans make poses inexact, and no mirror 
     CHECK(d.error_span > 1);
     CHECK_FALSE(d.proposal.convention.left_handed);
   }
-  const Diagnosis scaled = diagnose(drive.with_poses([](std::size_t, Pose T) {
-    T.translation() *= 1.03;
-    return T;
-  }));
+  const Diagnosis scaled = diagnose(drive.with_poses(scaled_poses(1.03)));
   CHECK(scaled.verdict == PoseVerdict::kInexact);
 }
 
@@ -102,14 +98,9 @@ TEST_CASE("Exact poses are confirmed at a few places, and no others") {
   const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12));
   CHECK(are_poses_exact(Recording(drive.path())));
   CHECK_FALSE(are_poses_exact(drive.with_poses(Noise(0.1))));
-  CHECK_FALSE(are_poses_exact(
-      drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); })));
-  CHECK_FALSE(
-      are_poses_exact(drive.with_poses([](std::size_t, const Pose&) { return Pose::Identity(); })));
-  CHECK_FALSE(are_poses_exact(drive.with_poses([](std::size_t, Pose T) {
-    T.translation() *= 1.05;
-    return T;
-  })));
+  CHECK_FALSE(are_poses_exact(drive.with_poses(inverse_pose)));
+  CHECK_FALSE(are_poses_exact(drive.with_poses(no_motion)));
+  CHECK_FALSE(are_poses_exact(drive.with_poses(scaled_poses(1.05))));
 }
 
 TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexact") {
@@ -185,8 +176,7 @@ TEST_CASE("Right poses of a sparse sensor that comes to rest are no other record
 TEST_CASE("A drive that stands for most of the time tells what its poses mean") {
   const Drive drive(drive_of(simulation::Scene::kVegetation, simulation::Sensor::kVlp16, 60, 112));
   CHECK(diagnose(Recording(drive.path())).sound());
-  const Diagnosis d =
-      diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }));
+  const Diagnosis d = diagnose(drive.with_poses(inverse_pose));
   CHECK(d.verdict == PoseVerdict::kOtherwise);
   CHECK(d.proposal.convention.invert);
 }
@@ -204,8 +194,7 @@ TEST_CASE("Poses that stand are right if the sensor stands, and wrong if it move
   auto config = drive_of(simulation::Scene::kHighway, simulation::Sensor::kMid360, 30, 603);
   const auto standing = [&](double metres_per_second) {
     config.ego_speed = metres_per_second;
-    return diagnose(
-        Drive(config).with_poses([](std::size_t, const Pose&) { return Pose::Identity(); }));
+    return diagnose(Drive(config).with_poses(no_motion));
   };
   CHECK(standing(0.0).verdict == PoseVerdict::kNoMotion);
   CHECK(standing(10.0).verdict == PoseVerdict::kDisagree);
@@ -329,13 +318,9 @@ TEST_CASE("Right poses on a motorway are sound with oncoming traffic and with fe
     const Diagnosis right = diagnose(Recording(drive.path()));
     CHECK(right.sound());
     if (config.seed == 21057) CHECK(right.verdict != PoseVerdict::kInexact);
-    const Diagnosis inverse =
-        diagnose(drive.with_poses([](std::size_t, const Pose& T) { return Pose(T.inverse()); }));
+    const Diagnosis inverse = diagnose(drive.with_poses(inverse_pose));
     CHECK(inverse.proposal.convention.invert);
-    const Diagnosis in_mm = diagnose(drive.with_poses([](std::size_t, Pose T) {
-      T.translation() *= 1000.0;
-      return T;
-    }));
+    const Diagnosis in_mm = diagnose(drive.with_poses(scaled_poses(1000.0)));
     CHECK(in_mm.proposal.convention.unit == 0.001);
   }
 }
@@ -351,10 +336,7 @@ TEST_CASE("Traffic of nearly the own speed does not make right ways too long, an
   config.seed = 5;
   const Drive drive(config);
   CHECK(diagnose(Recording(drive.path())).sound());
-  const Diagnosis scaled = diagnose(drive.with_poses([](std::size_t, Pose T) {
-    T.translation() *= 1.1;
-    return T;
-  }));
+  const Diagnosis scaled = diagnose(drive.with_poses(scaled_poses(1.1)));
   CHECK(scaled.verdict == PoseVerdict::kOtherwise);
   CHECK(scaled.proposal.convention.scale == Approx(1.0 / 1.1).margin(0.02));
 }

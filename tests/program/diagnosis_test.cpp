@@ -85,17 +85,10 @@ TEST_CASE("check names the mistake in the poses and the option against it") {
           return scaled((axes * T * axes.inverse()).inverse(), 1000.0);
         }) == "--invert-poses --pose-units mm --pose-frame camera");
 
-  std::string rows;
-  for (std::size_t i = 0; i < street.size(); ++i) {
-    const Eigen::Quaterniond q(street.pose(i).linear());
-    const Eigen::Vector3d t = street.pose(i).translation();
-    for (const double value :
-         {0.2 * static_cast<double>(i), t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()}) {
-      rows += std::to_string(value) + ' ';
-    }
-    rows += '\n';
-  }
-  write_text(street.path() / "poses.txt", rows);
+  std::vector<double> times;
+  for (std::size_t i = 0; i < street.size(); ++i) times.push_back(0.2 * static_cast<double>(i));
+  const auto pose_of = [&](std::size_t i) { return street.pose(i); };
+  write_text(street.path() / "poses.txt", timed_rows(times, pose_of, true));
   const Diagnosis quaternions = diagnose(Recording(street.path()));
   CHECK(quaternions.verdict == PoseVerdict::kOtherwise);
   CHECK(street.flags(quaternions) == "--quaternion-order wxyz");
@@ -128,8 +121,7 @@ TEST_CASE("check names poses that belong to the scan before or behind, if the dr
 
 TEST_CASE("check estimates the place of the lidar in the body whose poses are given") {
   const Street street(dense());
-  Eigen::Isometry3d T_body_sensor = Eigen::Isometry3d::Identity();
-  T_body_sensor.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Isometry3d T_body_sensor(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
   const auto of_body = [&](const Eigen::Isometry3d& T) { return T * T_body_sensor.inverse(); };
   const Diagnosis yawed = street.diagnose(of_body);
   CHECK(yawed.verdict == PoseVerdict::kOtherwise);
@@ -154,19 +146,13 @@ TEST_CASE("check estimates the place of the lidar in the body whose poses are gi
 
 TEST_CASE("check estimates the offset of the clocks") {
   const Street street(dense());
-  std::string scan_times;
-  std::string rows;
+  std::vector<double> times, late_times;
   for (std::size_t i = 0; i < street.size(); ++i) {
-    const double time = 0.2 * static_cast<double>(i);
-    scan_times += std::to_string(time) + '\n';
-    const Eigen::Vector3d t = street.pose(i).translation();
-    const Eigen::Quaterniond q(street.pose(i).linear());
-    for (const double value : {time + 0.15, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
-      rows += std::to_string(value) + ' ';
-    }
-    rows += '\n';
+    times.push_back(0.2 * static_cast<double>(i));
+    late_times.push_back(times.back() + 0.15);
   }
-  write_text(street.path() / "times.txt", scan_times);
+  write_times(street.path() / "times.txt", times);
+  const std::string rows = timed_rows(late_times, [&](std::size_t i) { return street.pose(i); });
   write_text(street.path() / "poses.txt", rows);
   const Diagnosis late = diagnose(Recording(street.path()));
   CHECK(late.verdict == PoseVerdict::kOtherwise);
@@ -204,9 +190,8 @@ TEST_CASE("check reports what it cannot decide") {
   // Poses as if every scan came from another place.
   std::size_t i = 0;
   const Diagnosis chaos = street.diagnose([&](const Eigen::Isometry3d&) {
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.translation().x() = static_cast<double>((7919 * ++i) % 101);
-    return pose;
+    const auto x = static_cast<double>((7919 * ++i) % 101);
+    return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
   });
   CHECK(chaos.verdict == PoseVerdict::kDisagree);
   CHECK_FALSE(chaos.sound());

@@ -37,13 +37,6 @@ class Drive : public WrittenDrive {
   TemporaryFolder folder_;
 };
 
-Pose yawed(double degrees) {
-  Pose T = Pose::Identity();
-  T.linear() =
-      Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  return T;
-}
-
 /// Writes points in the frame of a world that is moved by `shift`, and its poses.
 void write_world(const Drive& drive, const Eigen::Vector3d& shift) {
   drive.move_points([&](const simulation::SimulatedScan& scan, const Eigen::Vector3d& p) {
@@ -70,8 +63,8 @@ TEST_CASE("run says nothing about a right recording, and its report has no doubt
 TEST_CASE("run names the scan at which poses jump, and the size") {
   const Drive drive;
   const Pose& T_world_c = drive.pose(15);
-  Pose sideways = yawed(2.0);
-  sideways.translation().y() = 3.0;
+  const Pose sideways = Eigen::Translation3d(0.0, 3.0, 0.0) *
+                        Eigen::AngleAxisd(2.0 * M_PI / 180.0, Eigen::Vector3d::UnitZ());
   const Pose change = T_world_c * sideways * T_world_c.inverse();
   drive.with_poses([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
   const Outcome outcome = drive.run();
@@ -307,9 +300,7 @@ TEST_CASE("one scan alone is told") {
 
 /// Turns the sensor of a drive nose down by this angle (deg), in addition.
 void turn_down(const Drive& drive, double angle) {
-  Pose T_level_sensor = Pose::Identity();
-  T_level_sensor.linear() =
-      Eigen::AngleAxisd(angle * M_PI / 180.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Pose T_level_sensor(Eigen::AngleAxisd(angle * M_PI / 180.0, Eigen::Vector3d::UnitY()));
   drive.move_points([&](const simulation::SimulatedScan&, const Eigen::Vector3d& p) {
     return Eigen::Vector3d(T_level_sensor.linear().transpose() * p);
   });
@@ -391,7 +382,7 @@ TEST_CASE("Clouds of more than a turn without times are told, and those of one t
 
 TEST_CASE("People near a robot that stands are judged, and many points that are not are told") {
   const Drive drive;
-  drive.with_poses([](std::size_t, const Pose&) { return Pose::Identity(); });
+  drive.with_poses(no_motion);
   // One still scene, with a person who walks around the sensor, 1.8 m away.
   for (std::size_t i = 0; i < drive.size(); ++i) {
     std::vector<float> xyzi = drive.scan(0).xyzi;
@@ -414,11 +405,7 @@ TEST_CASE("People near a robot that stands are judged, and many points that are 
 TEST_CASE("check names ways of the poses that are too long, and the factor") {
   const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 30, 41));
   for (const double factor : {1.1, 0.9}) {
-    drive.with_poses([&](std::size_t, const Pose& T) {
-      Pose scaled = T;
-      scaled.translation() *= factor;
-      return scaled;
-    });
+    drive.with_poses(scaled_poses(factor));
     const Outcome outcome = start({"check", drive.path()});
     CHECK(outcome.code == 1);
     CHECK_THAT(outcome.out, ContainsSubstring(factor > 1.0 ? "pass --pose-scale 0.909"

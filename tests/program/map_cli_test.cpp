@@ -166,9 +166,7 @@ TEST_CASE("map: remap --update moves one session to corrected poses, as if it ha
 
   // Whole numbers of metres change no verdict, so that a run over the corrected poses is
   // comparable.
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = Eigen::Vector3d(64.0, -32.0, 2.0);
-  const std::vector<Pose> poses(kDayScans, pose);
+  const std::vector<Pose> poses(kDayScans, Pose(Eigen::Translation3d(64.0, -32.0, 2.0)));
   write_poses(days.at("corrected.txt"), poses);
   succeed(remap("corrected.txt", "city"));
   succeed(days.update(0, "expected", "out2"));

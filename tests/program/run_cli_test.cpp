@@ -161,8 +161,7 @@ TEST_CASE("Labels, causes and moving points of a run are those of the remover, s
   };
   DynaInsRemover remover(preset == "paper" ? DynaInsRemover::Config::paper()
                                            : DynaInsRemover::Config());
-  Pose pose = Pose::Identity();
-  pose.translation() = place;
+  const Pose pose(Eigen::Translation3d{place});
   for (std::size_t i = 1; i < 12; ++i) {
     const std::vector<float> scan = tiny_scan(i);
     const RawPoints<float> points{scan.data(), scan.size() / 4, 4};
@@ -442,11 +441,9 @@ TEST_CASE("One odd scan does not decide how much memory a run takes") {
   int made = 1;
   for (; made + 264 <= 3 * kPoints; made += 264) lzf += std::string("\xE0\xFF\0", 3);
   for (; made < 3 * kPoints; ++made) lzf += std::string("\0\5", 2);
-  std::string odd = head + size_lines(kPoints) + "DATA binary_compressed\n";
-  for (const std::uint32_t size : {static_cast<std::uint32_t>(lzf.size()), 3U * kPoints}) {
-    odd.append(reinterpret_cast<const char*>(&size), sizeof(size));
-  }
-  write_text(scans / "000000.pcd", odd + lzf);
+  const std::string sizes = packed(static_cast<std::uint32_t>(lzf.size()), 3U * kPoints);
+  write_text(scans / "000000.pcd",
+             head + size_lines(kPoints) + "DATA binary_compressed\n" + sizes + lzf);
   std::string poses;
   for (int i = 0; i < 40; ++i) {
     poses += "1 0 0 0 0 1 0 0 0 0 1 0\n";

@@ -43,9 +43,7 @@ inline void write_tiny_sequence(const std::filesystem::path& folder, std::size_t
     const std::vector<float> scan = tiny_scan(i);
     write_scan(folder / "velodyne" / (scan_name(i) + ".bin"), scan);
   }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = position;
-  const std::vector<Pose> poses(scans, pose);
+  const std::vector<Pose> poses(scans, Pose(Eigen::Translation3d(position)));
   write_poses(folder / "poses.txt", poses);
 }
 

@@ -147,9 +147,7 @@ class Rehearsal {
     for (const char* disk : {"/disk", "/maps"}) std::filesystem::create_directories(root_ + disk);
     write_small_recording(root_ + "/seq", 4);
     write_text(root_ + "/seq/run.cfg", "window = 3\n");
-    Eigen::Isometry3d corrected = Eigen::Isometry3d::Identity();
-    corrected.translation() << 64.0, -32.0, 2.0;
-    const std::vector<Pose> poses(4, corrected);
+    const std::vector<Pose> poses(4, Pose(Eigen::Translation3d(64.0, -32.0, 2.0)));
     write_poses(root_ + "/seq/corrected.txt", poses);
     for (const Arguments& arguments : scenario.before) {
       REQUIRE(start_or_stop(with_root(arguments)).code == 0);

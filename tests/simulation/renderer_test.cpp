@@ -29,7 +29,7 @@ TEST_CASE("rendering by solid angle gives the result of testing all pairs") {
     std::vector<Primitive> primitives;
     Random random(17);
     for (int i = 0; i < 60; ++i) {
-      const auto shape = static_cast<Shape>(random.index(4));
+      const auto shape = static_cast<Shape>(random.index(3));
       const double azimuth = random.uniform(-3.2, 3.2), far = random.uniform(3, 40);
       const double turn = random.uniform(0, 6), tilt = random.uniform(-1, 1);
       const auto up = static_cast<float>(random.uniform(-3, 8));

@@ -27,6 +27,14 @@ class Random {
     for (int i = 0; i < 12; ++i) sum += uniform(0.0, 1.0);
     return sum;
   }
+  /// Any rotation, translated by at most `reach` (m) along each axis.
+  Eigen::Isometry3d pose(double reach) {
+    const Eigen::Vector3d ones = Eigen::Vector3d::Ones();
+    const Eigen::Vector3d axis = vector(-ones, ones).normalized();
+    const double angle = uniform(0.0, 2.0 * M_PI);
+    return Eigen::Translation3d(vector(-reach * ones, reach * ones)) *
+           Eigen::AngleAxisd(angle, axis);
+  }
   /// Uniform in [0, count).
   std::size_t index(std::size_t count) { return static_cast<std::size_t>(engine_() % count); }
 

@@ -94,10 +94,8 @@ struct Scene {
 
 /// Pose of a sensor at (x, y), kSensorHeight over the plane, turned by `yaw` (rad).
 inline Eigen::Isometry3d sensor_at(double x, double y = 0.0, double yaw = 0.0) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() = Eigen::Vector3d(x, y, kSensorHeight);
-  T.linear() = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  return T;
+  return Eigen::Translation3d(x, y, kSensorHeight) *
+         Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ());
 }
 
 /// `count` scans at 10 Hz along x at `speed` (m/s). The sensor is turned by `yaw` (rad).

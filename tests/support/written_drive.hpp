@@ -90,4 +90,16 @@ class WrittenDrive {
   std::vector<simulation::SimulatedScan> scans_;
 };
 
+// Wrong poses of a drive.
+
+inline Pose inverse_pose(std::size_t, const Pose& T) { return T.inverse(); }
+inline Pose no_motion(std::size_t, const Pose&) { return Pose::Identity(); }
+/// Ways `factor` times as long.
+inline std::function<Pose(std::size_t, const Pose&)> scaled_poses(double factor) {
+  return [factor](std::size_t, Pose T) {
+    T.translation() *= factor;
+    return T;
+  };
+}
+
 }  // namespace dynains::test
