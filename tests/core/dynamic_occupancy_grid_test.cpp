@@ -79,6 +79,25 @@ TEST_CASE("presumed instances are not counted, and a ratio of 1 turns the grid o
   CHECK(verdict_behind(100, 0, never).cause == Cause::kOccupied);
 }
 
+TEST_CASE("a part of a large instance needs a lower ratio for a final verdict") {
+  const std::vector<Eigen::Vector3f> place(1, {10.1F, 5.2F, 0.3F});
+  for (const bool carried : {true, false}) {
+    DynamicOccupancyGrid grid(three_quarters());
+    TrackedInstances tracked;
+    tracked.shapes.resize(1);
+    tracked.shapes[0].carried = carried;
+    SparseScan scan(place);
+    for (std::uint64_t i = 0; i < 4; ++i) {  // three of four moved
+      scan = SparseScan(place);
+      scan.say(i < 3 ? Cause::kFreeSpace : Cause::kOccupied);
+      if (i < 3) scan.judge(i, grid);
+    }
+    CHECK(scan.judge(3, grid).cause == Cause::kOccupied);
+    grid.judge(3, scan.samples, Pose::Identity(), scan.counted, scan.verdicts, &tracked);
+    CHECK(scan.verdicts[0].cause == (carried ? Cause::kOccupied : Cause::kDynamicOccupancy));
+  }
+}
+
 TEST_CASE("a later verdict on a scan replaces the earlier one in the count") {
   DynamicOccupancyGrid grid(three_quarters());
   const std::vector<Eigen::Vector3f> place(1, {-3.0F, 4.0F, 1.0F});

@@ -10,6 +10,7 @@
 
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/evidence/instance_samples.hpp"
+#include "dynains/evidence/instance_tracks.hpp"
 #include "dynains/pose.hpp"
 #include "dynains/verdict.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
@@ -44,9 +45,12 @@ class DynamicOccupancyGrid {
   /// Counts the samples of scan number `scan` by their verdicts, and changes verdicts of static
   /// supervoxels in dynamic cells to kDynamicOccupancy. `counted`: by supervoxel, counts of the
   /// preceding call for the scan, which this call replaces; kNone before the first call.
-  /// `verdicts`: by supervoxel. The origin frame is fixed until clear() and near all scans.
+  /// `verdicts`: by supervoxel. `tracked`: of final verdicts, else null; instances that are too
+  /// large for tracks need a lower ratio, since they may include a dynamic object beside a static
+  /// one. The origin frame is fixed until clear() and near all scans.
   void judge(std::uint64_t scan, const InstanceSamples& samples, const Pose& T_origin_sensor,
-             std::vector<Count>& counted, std::vector<Verdict>& verdicts) {
+             std::vector<Count>& counted, std::vector<Verdict>& verdicts,
+             const TrackedInstances* tracked = nullptr) {
     if (lines_.empty()) return;
     find_cells(samples, cell_, T_origin_sensor, keys_);
     line_of_.resize(keys_.size());
@@ -63,7 +67,9 @@ class DynamicOccupancyGrid {
       counted[s] = count;
     }
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
-      if (counted[s] == Count::kStatic) judge_supervoxel(samples, s, now, verdicts[s]);
+      if (counted[s] != Count::kStatic) continue;
+      const bool is_large = tracked != nullptr && !tracked->shapes[samples.instance_of[s]].carried;
+      judge_supervoxel(samples, s, now, is_large ? kOfLarge * ratio_ : ratio_, verdicts[s]);
     }
   }
 
@@ -82,6 +88,7 @@ class DynamicOccupancyGrid {
   static constexpr std::size_t kLines = 1U << 15;
   static constexpr std::uint16_t kMaxCount = 1000;      // total at which both counts are halved
   static constexpr std::size_t kPrefetchDistance = 32;  // samples
+  static constexpr float kOfLarge = 0.7F;               // factor of the ratio of large instances
 
   // Presumed instances count as static: they have no evidence of motion.
   static Count count_of(Cause cause) {
@@ -142,7 +149,7 @@ class DynamicOccupancyGrid {
   }
 
   void judge_supervoxel(const InstanceSamples& samples, std::size_t s, std::uint32_t now,
-                        Verdict& verdict) const {
+                        float ratio, Verdict& verdict) const {
     const std::uint32_t begin = samples.sample_begin[s];
     const std::uint32_t end = samples.sample_begin[s + 1];
     float highest = 0.0F;
@@ -151,7 +158,7 @@ class DynamicOccupancyGrid {
       const Cell* const cell = find(i, now);
       if (cell != nullptr) highest = std::max(highest, dynamic_ratio(*cell));
     }
-    if (!(highest > ratio_)) return;
+    if (!(highest > ratio)) return;
     verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
   }
 

@@ -108,9 +108,17 @@ class FreeSpaceEvidence {
   void judge(std::uint64_t scan, bool is_final) {
     Judged& judged = is_final ? final_ : provisional_;
     judged.scan = scan;
-    judge_instances(is_final, judged);
-    judge_by_dynamic_grid(judged);
-    if (!is_final && is_reference()) mark_movers(record_of(scan).evidence);
+    Record& record = record_of(scan);
+    // Everything is without evidence in a scan that no earlier one is compared with.
+    const bool was_compared =
+        record.since_begin >= static_cast<std::uint64_t>(detail::kReferenceLags.front());
+    judge_.judge(record.evidence, updater_, !is_final && was_compared, judged.supervoxels);
+    if (scan >= epoch_begin_) {  // the grid has the origin frame of the newest epoch
+      dynamic_grid_.judge(scan, record.evidence.samples,
+                          detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
+                          judged.supervoxels, is_final ? &record.evidence.tracked : nullptr);
+    }
+    if (!is_final && is_reference()) mark_movers(record.evidence);
   }
 
   /// Verdict on the scan of the last judge() with the same `is_final`, before the next observe().
@@ -294,22 +302,6 @@ class FreeSpaceEvidence {
                                linked ? &record_of(scan + 1).evidence.tracked : nullptr,
                                record.evidence.beliefs.counts, record.evidence.tracked);
     }
-  }
-
-  void judge_instances(bool is_final, Judged& judged) {
-    const Record& record = record_of(judged.scan);
-    // Everything is without evidence in a scan that no earlier one is compared with.
-    const bool was_compared =
-        record.since_begin >= static_cast<std::uint64_t>(detail::kReferenceLags.front());
-    judge_.judge(record.evidence, updater_, !is_final && was_compared, judged.supervoxels);
-  }
-
-  void judge_by_dynamic_grid(Judged& judged) {
-    if (judged.scan < epoch_begin_) return;  // the grid has the origin frame of the newest epoch
-    Record& record = record_of(judged.scan);
-    dynamic_grid_.judge(judged.scan, record.evidence.samples,
-                        detail::composed(T_origin_world_, record.T_world_sensor), record.counted,
-                        judged.supervoxels);
   }
 
   // Whether the instance of a supervoxel is small enough to move, and is not static by the evidence
