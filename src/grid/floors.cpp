@@ -19,14 +19,6 @@ std::int64_t index(double position, double edge) {
   return detail::floor_to<std::int64_t>(position / edge);
 }
 
-/// Columns of this edge around a box, with a margin (m).
-Columns columns_around(const Eigen::AlignedBox2d& box, double edge, double margin) {
-  const Eigen::Array2d low = ((box.min().array() - margin) / edge).floor();
-  const Eigen::Array2d size = ((box.max().array() + margin) / edge).floor() + 1.0 - low;
-  return {edge, low * edge, static_cast<std::int64_t>(size.x()),
-          static_cast<std::int64_t>(size.y())};
-}
-
 /// Columns around take the value of the nearest that has one, at most `reach` columns away along
 /// the axes. `value`: by column, or kNoIndex.
 void spread(const Columns& columns, std::int64_t reach, std::vector<std::uint32_t>& value) {
@@ -170,7 +162,7 @@ void Floors::finish(double step, double resolution) {
   for (const Floor& floor : all) {
     box.extend(kEdge * Eigen::Vector2d(static_cast<double>(floor.x), static_cast<double>(floor.y)));
   }
-  columns_ = columns_around(box, kEdge, kMargin);
+  columns_ = Columns(kEdge, box.min().array() - kMargin, box.max().array() + kMargin);
   const double cells = static_cast<double>(columns_.size()) * std::pow(kEdge / resolution, 2);
   if (cells > kMaxCells) {
     throw IoError(place_ + ": a grid of " + std::to_string(static_cast<int>(box.sizes().x())) +

@@ -33,19 +33,9 @@ std::size_t OccupancyGrid::count(CellState state) const {
 GridMaker::GridMaker(const Config& config, const Floors& floors, double spacing)
     : config_((config.validate(), config)),
       reach_(static_cast<std::int64_t>(std::max(1.0, std::round(spacing / config.resolution)))),
-      floors_(floors) {
-  const Columns& coarse = floors.columns();
-  columns_.edge = config.resolution;
-  columns_.origin = (coarse.origin.array() / columns_.edge).floor() * columns_.edge;
-  const auto cells = [&](std::int64_t count) {
-    return static_cast<std::int64_t>(
-               std::ceil(static_cast<double>(count) * coarse.edge / columns_.edge)) +
-           1;
-  };
-  columns_.width = cells(coarse.width);
-  columns_.height = cells(coarse.height);
-  cells_.resize(columns_.size());
-}
+      floors_(floors),
+      columns_(config.resolution, floors.columns().origin, floors.columns().end()),
+      cells_(columns_.size()) {}
 
 GridMaker::Cell* GridMaker::cell_at(const Eigen::Vector3d& position) {
   const std::int64_t x = columns_.along(0, position.x()), y = columns_.along(1, position.y());

@@ -371,7 +371,10 @@ class ObjectTracks {
   }
 
   // The measured centre, by the side towards the sensor and the size: a far side may be hidden.
+  // The size is nearly the largest one that was seen, until the object is directed the last one:
+  // before, the box may have other axes.
   Eigen::Vector2d measure_centre(const Eigen::AlignedBox2f& extent, Track& track) const {
+    constexpr double kGrowth = 0.5, kShrinkage = 0.2;  // of the difference, in each scan
     MovingObject& object = track.object;
     const Eigen::Matrix2d axes = axes_of(object.yaw);
     const Eigen::Vector2d expected = axes.transpose() * from_sensor(object);
@@ -381,9 +384,12 @@ class ObjectTracks {
       double& size = k == 0 ? object.length : object.width;
       const double low = static_cast<double>(extent.min()[k]);
       const double high = static_cast<double>(extent.max()[k]);
-      const double before = size, middle = 0.5 * (low + high);
-      size = remembered_size(track, size, high - low, view[1 - k]);
-      const double hidden = 0.5 * (size - (high - low));
+      const double middle = 0.5 * (low + high), difference = high - low - size;
+      // Along the view, the far end cannot be seen.
+      const double gain = difference > 0.0 ? kGrowth : kShrinkage * view[1 - k];
+      const double growth = (track.is_directed ? gain : 1.0) * difference;
+      size += growth;
+      const double hidden = 0.5 * (growth - difference);
       if (std::abs(expected[k]) <= 0.5 * size) {  // both ends are equally far away
         const double slack = std::abs(hidden);
         centre += std::clamp(expected[k], middle - slack, middle + slack) * axes.col(k);
@@ -391,7 +397,7 @@ class ObjectTracks {
       }
       const double away = expected[k] > 0.0 ? 1.0 : -1.0;
       centre += (middle + away * hidden) * axes.col(k);
-      object.centre.head<2>() += 0.5 * away * (size - before) * axes.col(k);
+      object.centre.head<2>() += 0.5 * away * growth * axes.col(k);
     }
     return centre;
   }
@@ -407,15 +413,6 @@ class ObjectTracks {
     object.centre.head<2>() += 0.5 * std::copysign(hidden, cosine) * axis;
     object.length += hidden;
     return object;
-  }
-
-  // The size of an object after it was seen as `seen`: nearly the largest one, since parts may be
-  // hidden. `across`: squared sine of the angle between this side and the view; along it, the far
-  // end cannot be seen. The box may have other axes until it is directed.
-  static double remembered_size(const Track& track, double size, double seen, double across) {
-    constexpr double kGrowth = 0.5, kShrinkage = 0.2;  // of the difference, in each scan
-    if (!track.is_directed) return seen;
-    return size + (seen > size ? kGrowth : kShrinkage * across) * (seen - size);
   }
 
   // `noise`: m^2, variance of the centre, per axis.
