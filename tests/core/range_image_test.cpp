@@ -63,6 +63,7 @@ TEST_CASE("cells of an image are derived from the beams of a sensor, within limi
   CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.2) < 3.0);
   sensor.elevation_gap = 3.0;
   CHECK(std::abs(RangeImageGrid::for_sensor(sensor).rows - 34.0 / 0.4) < 2.0);
+  CHECK(RangeImageGrid::for_sensor(sensor, 8).columns == 900);
 }
 
 TEST_CASE("a direction outside the image has cell 0") {

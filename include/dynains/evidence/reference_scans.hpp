@@ -86,10 +86,10 @@ struct ReferenceSpan {
   }
 };
 
-/// The range image of one sensor of a scan.
+/// The range image of one sensor, of one scan or of several ones from nearly the same place.
 struct ReferenceView {
-  std::uint64_t scan = 0;
-  Pose T_world_beams = Pose::Identity();
+  std::uint64_t first = 0, last = 0;      ///< its scans
+  Pose T_world_beams = Pose::Identity();  ///< of the scan in the middle
   RangeImage image;
 };
 
@@ -117,21 +117,18 @@ class ReferenceScans {
   /// the sensors of a scan. If this number changes, all references are invalid. Allocates all
   /// images.
   void adapt(Span<const SensorModel> sensors) {
-    grids_.clear();
+    int scans = 1;
+    sensors_.assign(sensors.begin(), sensors.end());
     T_level_beams_.clear();
     viewpoint_.setZero();
     for (const SensorModel& sensor : sensors) {
+      scans = std::max(scans, scans_to_see_things(sensor, kMaxScans));
       viewpoint_ += sensor.origin / static_cast<double>(sensors.size());
-      grids_.push_back(RangeImageGrid::for_sensor(sensor));
       T_level_beams_.emplace_back(Pose::Identity());
       T_level_beams_.back().linear() = sensor.R_level_headed;
       T_level_beams_.back().translation() = sensor.origin;
     }
     is_level_ = sensors.size() == 1 && sensors[0].is_level();
-    int scans = 1;
-    for (const SensorModel& sensor : sensors) {
-      scans = std::max(scans, scans_to_see_things(sensor, kMaxScans));
-    }
     if (scans != scans_) forget();
     scans_ = scans;
     span_ = ReferenceSpan(config_, scans_);
@@ -139,7 +136,9 @@ class ReferenceScans {
     for (ReferenceScan& reference : references_) {
       reference.views.resize(static_cast<std::size_t>(scans_) * sensors.size());
       for (std::size_t i = 0; i < reference.views.size(); ++i) {
-        reference.views[i].image.allocate(grids_[i % grids_.size()]);
+        const bool is_first = i < sensors.size();  // the one of several scans, if there is only one
+        reference.views[i].image.allocate(
+            RangeImageGrid::for_sensor(sensors[i % sensors.size()], is_first ? scans_ : 1));
       }
     }
   }
@@ -157,24 +156,25 @@ class ReferenceScans {
     for (ReferenceScan& reference : references_) reference.epoch = ReferenceScan::kNoEpoch;
   }
 
-  /// Adds the images of a scan that takes() accepts to a reference, in the place of one that is not
-  /// needed any more. Each image is in the tilted frame of its sensor, in which each beam is a row.
-  /// `scan`, `epoch`: numbers of the scan and of its epoch. `since_begin`: scans since the first
-  /// scan of the epoch. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground
-  /// point, as in RangeImage::build().
+  /// Adds a scan that takes() accepts to a reference, in the place of one that is not needed any
+  /// more. Each image is in the tilted frame of its sensor, in which each beam is a row. `scan`,
+  /// `epoch`: numbers of the scan and of its epoch. `since_begin`: scans since the first scan of
+  /// the epoch. `T_world_level`: pose of the frame of `split`. `moving`: by non-ground point, as in
+  /// RangeImage::build().
   void add(std::uint64_t scan, std::uint64_t epoch, std::uint64_t since_begin,
            const Pose& T_world_level, const GroundSplit& split, Span<const std::uint8_t> moving) {
     if (since_begin == 0) open_.reset();
     if (!open_) open_ = begin_reference(scan, epoch);
     ReferenceScan& reference = references_[*open_];
-    if (grids_.size() > 1) {
-      for (std::size_t i = 0; i < grids_.size(); ++i) {
-        build_view(i, T_world_level, split, moving, next_view(scan, reference));
-      }
+    const bool is_last = scans_until_reference(since_begin) == 0;
+    if (scans_ == 1 && sensors_.size() == 1) {
+      build_only_view(scan, T_world_level, split, moving, reference);
     } else {
-      build_only_view(T_world_level, split, moving, next_view(scan, reference));
+      if (part_count_ > 0 && !shares_image(T_world_level)) build_views(reference);
+      keep(scan, T_world_level, split, moving);
+      if (is_last) build_views(reference);
     }
-    if (scans_until_reference(since_begin) > 0) return;
+    if (!is_last) return;
     reference.scan = scan;
     reference.epoch = epoch;
     reference.since_begin = since_begin;
@@ -204,7 +204,7 @@ class ReferenceScans {
     std::size_t tested = 0;
     for (std::size_t i = 0; i < reference.count; ++i) {
       const ReferenceView& view = reference.views[i];
-      if (scans_ > 1 && view.scan <= scan + 1 && scan <= view.scan + 1) continue;
+      if (scans_ > 1 && view.first <= scan + 1 && scan <= view.last + 1) continue;
       const Pose T_view_points = composed(inverted(view.T_world_beams), T_world_points);
       const Eigen::Vector3d viewpoint = T_view_points * viewpoint_;
       add_visibility(view.image, T_view_points, points, count, static_cast<float>(config_.margin),
@@ -217,6 +217,16 @@ class ReferenceScans {
 
  private:
   static constexpr int kMaxScans = 10;  // of a reference
+  // m: within it, scans share an image. Farther apart, their beams differ in direction.
+  static constexpr double kSamePlace = 0.25;
+
+  // The points of one sensor of one scan.
+  struct Part {
+    std::uint64_t scan = 0;
+    Pose T_world_level = Pose::Identity();
+    GroundSplit own;
+    std::vector<std::uint8_t> moving;  // by point above the ground
+  };
 
   float lateral_margin() const { return static_cast<float>(config_.lateral_margin); }
 
@@ -234,18 +244,16 @@ class ReferenceScans {
         });
     unneeded->epoch = ReferenceScan::kNoEpoch;
     unneeded->count = 0;
+    part_count_ = 0;
     return static_cast<std::size_t>(unneeded - references_.begin());
   }
 
-  static ReferenceView& next_view(std::uint64_t scan, ReferenceScan& reference) {
-    ReferenceView& view = reference.views[reference.count++];
-    view.scan = scan;
-    return view;
-  }
-
-  // The image of the only sensor.
-  void build_only_view(const Pose& T_world_level, const GroundSplit& split,
-                       Span<const std::uint8_t> moving, ReferenceView& view) {
+  // The image of the only scan of the only sensor.
+  void build_only_view(std::uint64_t scan, const Pose& T_world_level, const GroundSplit& split,
+                       Span<const std::uint8_t> moving, ReferenceScan& reference) {
+    reference.count = 1;
+    ReferenceView& view = reference.views.front();
+    view.first = view.last = scan;
     view.T_world_beams = T_world_level;
     PointsView ground = split.ground();
     PointsView rest = split.non_ground();
@@ -255,42 +263,92 @@ class ReferenceScans {
       ground = rotate(ground, R_beams_level, rotated_ground_);
       rest = rotate(rest, R_beams_level, rotated_rest_);
     }
-    view.image.build(grids_.front(), ground, rest, moving, lateral_margin(), scratch_);
+    view.image.build(RangeImageGrid::for_sensor(sensors_.front()), ground, rest, moving,
+                     lateral_margin(), scratch_);
   }
 
-  // The image of one of several sensors, of its own points.
-  void build_view(std::size_t sensor, const Pose& T_world_level, const GroundSplit& split,
-                  Span<const std::uint8_t> moving, ReferenceView& view) {
-    own_.points.grow(split.count + kPackWidth);
-    own_.count = own_.ground_count = 0;
-    own_moving_.clear();
-    for (std::size_t i = 0; i < split.count; ++i) {
-      if (split.sensor_of(i) != sensor) continue;
-      own_.points.set(own_.count++, split.points, i);
-      if (i < split.ground_count) {
-        ++own_.ground_count;
-      } else {
-        own_moving_.push_back(moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count]);
+  // Whether a scan shares its image with those that are kept. Images of several sensors overlap
+  // without that.
+  bool shares_image(const Pose& T_world_level) const {
+    return sensors_.size() == 1 &&
+           distance(parts_.front().T_world_level, T_world_level) <= kSamePlace;
+  }
+
+  // Keeps the points of a scan until its images are built, by sensor.
+  void keep(std::uint64_t scan, const Pose& T_world_level, const GroundSplit& split,
+            Span<const std::uint8_t> moving) {
+    for (std::size_t sensor = 0; sensor < sensors_.size(); ++sensor) {
+      if (part_count_ == parts_.size()) parts_.emplace_back();
+      Part& part = parts_[part_count_++];
+      part.scan = scan;
+      part.T_world_level = T_world_level;
+      part.own.points.grow(split.count + kPackWidth);
+      part.own.count = part.own.ground_count = 0;
+      part.moving.clear();
+      for (std::size_t i = 0; i < split.count; ++i) {
+        if (split.sensor_of(i) != sensor) continue;
+        part.own.points.set(part.own.count++, split.points, i);
+        if (i < split.ground_count) {
+          ++part.own.ground_count;
+        } else {
+          part.moving.push_back(moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count]);
+        }
       }
     }
-    transform_points(own_.all(), PackTransform(inverted(T_level_beams_[sensor])), own_.points, 0);
-    view.T_world_beams = composed(T_world_level, T_level_beams_[sensor]);
-    view.image.build(grids_[sensor], own_.ground(), own_.non_ground(), own_moving_,
-                     lateral_margin(), scratch_);
+  }
+
+  // Adds the images of the points that were kept.
+  void build_views(ReferenceScan& reference) {
+    for (std::size_t sensor = 0; sensor < sensors_.size(); ++sensor) {
+      ReferenceView& view = reference.views[reference.count++];
+      view.first = parts_.front().scan;
+      view.last = parts_[part_count_ - 1].scan;
+      build_view(sensor, view);
+    }
+    part_count_ = 0;
+  }
+
+  void build_view(std::size_t sensor, ReferenceView& view) {
+    const std::size_t sensors = sensors_.size();
+    const std::size_t scans = part_count_ / sensors;
+    view.T_world_beams =
+        composed(parts_[scans / 2 * sensors].T_world_level, T_level_beams_[sensor]);
+    std::size_t count = 0;
+    for (std::size_t i = sensor; i < part_count_; i += sensors) count += parts_[i].own.count;
+    all_.points.grow(count + kPackWidth);
+    all_.count = 0;
+    const auto append = [&](const Part& part, PointsView points) {
+      const Pose T_beams_points = composed(inverted(view.T_world_beams), part.T_world_level);
+      transform_points(points, PackTransform(T_beams_points), all_.points, all_.count);
+      all_.count += points.size();
+    };
+    for (std::size_t i = sensor; i < part_count_; i += sensors) {
+      append(parts_[i], parts_[i].own.ground());
+    }
+    all_.ground_count = all_.count;
+    all_moving_.clear();
+    for (std::size_t i = sensor; i < part_count_; i += sensors) {
+      append(parts_[i], parts_[i].own.non_ground());
+      all_moving_.insert(all_moving_.end(), parts_[i].moving.begin(), parts_[i].moving.end());
+    }
+    view.image.build(RangeImageGrid::for_sensor(sensors_[sensor], static_cast<int>(scans)),
+                     all_.ground(), all_.non_ground(), all_moving_, lateral_margin(), scratch_);
   }
 
   FreeSpaceConfig config_;
   ReferenceSpan span_;
   std::vector<ReferenceScan> references_;
-  std::size_t newest_ = 0;             // index of the newest reference
-  std::optional<std::size_t> open_;    // index of the one that has scans, but not its last one
-  int scans_ = 1;                      // of a reference
-  std::vector<RangeImageGrid> grids_;  // by sensor
-  std::vector<Pose> T_level_beams_;    // by sensor
+  std::size_t newest_ = 0;           // index of the newest reference
+  std::optional<std::size_t> open_;  // index of the one that has scans, but not its last one
+  int scans_ = 1;                    // of a reference
+  std::vector<SensorModel> sensors_;
+  std::vector<Pose> T_level_beams_;                      // by sensor
   Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();  // mean origin of the sensors, level frame
   bool is_level_ = true;                  // the images of the only sensor are in the level frame
-  GroundSplit own_;                       // of one of several sensors
-  std::vector<std::uint8_t> own_moving_;  // by its point above the ground
+  std::vector<Part> parts_;               // of the open reference: by scan, then by sensor
+  std::size_t part_count_ = 0;            // of those in use
+  GroundSplit all_;                       // points of one sensor
+  std::vector<std::uint8_t> all_moving_;  // by its point above the ground
   PointBuffer rotated_ground_;
   PointBuffer rotated_rest_;
   RangeImage::Scratch scratch_;
