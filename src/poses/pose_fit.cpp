@@ -292,6 +292,19 @@ std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t n
   return motions;
 }
 
+/// Weights of the axes of residuals, at most 1, from the differences of both registrations.
+Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
+  constexpr double kGood = 0.02;  // m
+  Vector6 weights;
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    std::vector<double> differences;
+    differences.reserve(motions.size());
+    for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
+    weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
+  }
+  return weights;
+}
+
 }  // namespace
 
 std::vector<RegisteredMotion> register_motions(
@@ -373,23 +386,6 @@ bool are_poses_exact(const Recording& recording) {
   const std::vector<bool> confirmed = in_two_threads(places, is_confirmed);
   return places > 0 && std::find(confirmed.begin(), confirmed.end(), false) == confirmed.end();
 }
-
-namespace {
-
-/// Weights of the axes of residuals, at most 1, from the differences of both registrations.
-Vector6 weights_of_axes(const std::vector<RegisteredMotion>& motions) {
-  constexpr double kGood = 0.02;  // m
-  Vector6 weights;
-  for (Eigen::Index axis = 0; axis < 6; ++axis) {
-    std::vector<double> differences;
-    differences.reserve(motions.size());
-    for (const RegisteredMotion& m : motions) differences.push_back(std::abs(m.difference[axis]));
-    weights[axis] = kGood / std::max(kGood, median(std::move(differences)));
-  }
-  return weights;
-}
-
-}  // namespace
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
                          const Pose& T_body_sensor, std::size_t gap) {

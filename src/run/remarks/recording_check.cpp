@@ -22,16 +22,12 @@ namespace {
 
 using text::fixed;
 
-/// Over how many scans errors are: "from one scan to the next" or "over 9 scans".
-std::string span_text(const Diagnosis& d) {
-  return d.error_span == 1 ? "from one scan to the next"
-                           : "over " + std::to_string(d.error_span) + " scans";
-}
-
-/// "12 cm and 0.3 deg over 9 scans".
-std::string error_text(const Diagnosis& d) {
-  return text::fixed(100.0 * d.translation_error, 0) + " cm and " +
-         text::fixed(180.0 / M_PI * d.rotation_error, 1) + " deg " + span_text(d);
+/// "12 cm and 0.3 deg over 9 scans", with this many digits of the centimetres.
+std::string error_text(const Diagnosis& d, int digits = 0) {
+  return fixed(100.0 * d.translation_error, digits, " cm and ") +
+         fixed(180.0 / M_PI * d.rotation_error, digits + 1, " deg ") +
+         (d.error_span == 1 ? "from one scan to the next"
+                            : "over " + std::to_string(d.error_span) + " scans");
 }
 
 /// A setting as its flag has it; "false" for a flag that is left out. Empty for settings that no
@@ -205,10 +201,8 @@ std::string describe(const Recording& recording, const Diagnosis& d,
                fixed(d.longest_step, 2, " m"));
   if (d.registered_pairs > 0) {
     add_line(text, "poses",
-             "off by " + fixed(100.0 * d.translation_error, 1, " cm and ") +
-                 fixed(180.0 / M_PI * d.rotation_error, 2, " deg ") + span_text(d) +
-                 ", by the registration of " + std::to_string(d.registered_pairs) +
-                 " pairs of scans");
+             "off by " + error_text(d, 1) + ", by the registration of " +
+                 std::to_string(d.registered_pairs) + " pairs of scans");
   }
   text << "\nscans " << d.stride << " apart, placed by\n";
   add_line(text, "  poses as given", to_text(d.as_given));
