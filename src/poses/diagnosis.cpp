@@ -314,30 +314,23 @@ struct Evidence {
   /// poses, its unit or scale no more than turns alone, or if landmarks meet better under the given
   /// poses.
   double misfit_of(const Reading& reading) const {
+    const PoseConvention &given = recording.convention(), &other = reading.convention;
+    const bool mirrors = other.left_handed != given.left_handed;
+    const bool changes_ways = other.unit != given.unit || other.scale != given.scale;
     const BodyMotion motion = motion_under(recording, reading);
     const Evidence known = where_known(motion);
     const double error = error_at_points(known.motions, motion);
+    const auto is_better_than = [&](const BodyMotion& simpler) {
+      return is_much_smaller(error, error_at_points(known.motions, simpler));
+    };
     const bool is_explained =
         2 * known.motions.size() > motions.size() &&
         error < std::min(kRough, 0.5 * error_at_points(known.motions, no_motion)) &&
-        !miss_motion(known.motions, motion) && (!mirrors(reading) || beats_drift(known, error)) &&
-        (!changes_ways(reading) ||
-         is_much_smaller(error, error_at_points(known.motions, turns_of(motion))));
+        !miss_motion(known.motions, motion) &&
+        (!mirrors || is_better_than(with_drift(given_motion(recording), known.motions))) &&
+        (!changes_ways || is_better_than(turns_of(motion)));
     const bool is_as_good = agreement_under(motion, known.pairs).gap <= known.as_given.gap;
     return is_explained && is_as_good ? error : kNever;
-  }
-
- private:
-  bool mirrors(const Reading& reading) const {
-    return reading.convention.left_handed != recording.convention().left_handed;
-  }
-  static bool beats_drift(const Evidence& known, double error) {
-    const BodyMotion drifting = with_drift(given_motion(known.recording), known.motions);
-    return is_much_smaller(error, error_at_points(known.motions, drifting));
-  }
-  bool changes_ways(const Reading& reading) const {
-    const PoseConvention& given = recording.convention();
-    return reading.convention.unit != given.unit || reading.convention.scale != given.scale;
   }
 };
 
@@ -358,8 +351,9 @@ std::optional<Reading> best_reading(const Evidence& evidence, const std::vector<
   return best;
 }
 
-bool is_exact(const MotionError& error) {
-  return error.at_points < std::max(kExact, 2.0 * error.noise);
+/// `share`: of kExact that is allowed.
+bool is_exact(const MotionError& error, double share = 1.0) {
+  return error.at_points < std::max(share * kExact, 2.0 * error.noise);
 }
 
 /// How much registrations may err by the motion within scans (the translation in m, the rotation in
@@ -383,8 +377,10 @@ std::pair<double, double> error_within_scans(const Recording& recording) {
 /// those of single scans do not grow with the scans between. Smaller ones count if they grow.
 /// Motions by other ways must show them, too: where persons cover the surfaces, or these leave a
 /// direction open, both directions of one registration agree about what the next one contradicts.
+/// Errors that agree within a third of the other one are three quarters of the first at least.
 bool measure_errors(const Evidence& evidence, Diagnosis& d) {
-  constexpr double kGrowing = 2.5;  // ratio of errors over three scans or more and over one
+  constexpr double kGrowing = 2.5;      // ratio of errors over three scans or more and over one
+  constexpr double kConfirming = 0.75;  // ratio to the least errors
   const Recording& recording = evidence.recording;
   const auto within = error_within_scans(recording);
   double translation = kInexact, rotation = kInexact / kLever;  // least
@@ -392,16 +388,18 @@ bool measure_errors(const Evidence& evidence, Diagnosis& d) {
     const auto error_of = [&](const std::vector<RegisteredMotion>& motions) {
       return motion_error(motions, given_motion(recording), Pose::Identity(), gap);
     };
-    const auto is_inexact = [&](const MotionError& error) {
-      return error.pairs >= kMinPairs && !is_exact(error) &&
-             (error.translation >
-                  std::max({translation, within.first, 3.0 * error.translation_noise}) ||
-              error.rotation > std::max({rotation, within.second, 3.0 * error.rotation_noise}));
+    const auto is_inexact = [&](const MotionError& error, double share) {
+      const double least_translation = std::max(share * translation, within.first);
+      const double least_rotation = std::max(share * rotation, within.second);
+      return error.pairs >= kMinPairs && !is_exact(error, share) &&
+             (error.translation > std::max(least_translation, 3.0 * error.translation_noise) ||
+              error.rotation > std::max(least_rotation, 3.0 * error.rotation_noise));
     };
     const MotionError error = error_of(evidence.motions);
     if (error.pairs < kMinPairs) break;
     const bool is_found =
-        is_inexact(error) && is_inexact(error_of(by_other_ways(recording, evidence.motions, gap)));
+        is_inexact(error, 1.0) &&
+        is_inexact(error_of(by_other_ways(recording, evidence.motions, gap)), kConfirming);
     if (gap > 1 && !is_found) continue;
     translation = std::max(kExact, kGrowing * error.translation);
     rotation = std::max(kExact / kLever, kGrowing * error.rotation);

@@ -109,6 +109,17 @@ TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexac
   CHECK(diagnosis_with(drive, 0.1).verdict == PoseVerdict::kInexact);
 }
 
+TEST_CASE("Clouds that are de-skewed by reversed times are told") {
+  const Drive drive(skewed_world(42001));
+  const TemporaryFolder folder;
+  drive.write_with_times(folder.path(), [](double s) { return 0.1 - s; });
+  RecordingOptions options;
+  options.deskew = true;
+  const Diagnosis d = diagnose(Recording(folder.path(), options));
+  CHECK(d.verdict == PoseVerdict::kOtherwise);
+  CHECK_FALSE(d.proposal.deskew);
+}
+
 /// Writes the drive as clouds of this many turns, with the poses at their begin.
 void write_turns(const Drive& drive, double turns, const std::filesystem::path& folder) {
   const double period = 0.1 * turns;  // s
