@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using run::RunOutcome;
 using run::RunSettings;
 
-// What run() was given.
+// The checked arguments of run().
 struct RunArguments {
   RunSettings settings;
   py::object progress;

@@ -351,12 +351,18 @@ GroundSplit wall(float range) {
   return split;
 }
 
-TEST_CASE("a scan is not tested against its own beams in a reference of several scans") {
-  ReferenceScans views{FreeSpaceConfig()};
+// Each reference takes six scans.
+ReferenceScans references_of_sparse_sensor() {
   SensorModel sensor = SensorModel::typical();
   sensor.azimuth_step = 1.0;
   sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
-  views.adapt({&sensor, 1});
+  ReferenceScans references{FreeSpaceConfig()};
+  references.adapt({&sensor, 1});
+  return references;
+}
+
+TEST_CASE("a scan is not tested against its own beams in a reference of several scans") {
+  ReferenceScans views = references_of_sparse_sensor();
   views.add(0, 0, 0, Eigen::Isometry3d::Identity(), wall(10.0F), {});
   PointBuffer points;
   points.push_back(5.0F, 0.0F, 0.0F);
@@ -372,11 +378,7 @@ TEST_CASE("a scan is not tested against its own beams in a reference of several 
 }
 
 TEST_CASE("scans of a reference share an image while the sensor stays near") {
-  ReferenceScans views{FreeSpaceConfig()};
-  SensorModel sensor = SensorModel::typical();
-  sensor.azimuth_step = 1.0;
-  sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
-  views.adapt({&sensor, 1});
+  ReferenceScans views = references_of_sparse_sensor();
   REQUIRE(views.span().step == 6);
   Eigen::Isometry3d T_world_level = Eigen::Isometry3d::Identity();
   const auto add = [&](std::uint64_t scan, double step) {

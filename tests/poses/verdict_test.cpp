@@ -109,7 +109,7 @@ TEST_CASE("Uneven motion within de-skewed scans does not make right poses inexac
   CHECK(diagnosis_with(drive, 0.1).verdict == PoseVerdict::kInexact);
 }
 
-TEST_CASE("Clouds that are de-skewed by reversed times are told") {
+TEST_CASE("Reversed times of points bring the advice not to de-skew") {
   const Drive drive(skewed_world(42001));
   const TemporaryFolder folder;
   drive.write_with_times(folder.path(), [](double s) { return 0.1 - s; });
