@@ -1,5 +1,4 @@
-#include "nuscenes.hpp"
-
+// Sweeps of the LiDAR in a folder of nuScenes, by its tables.
 #include <algorithm>
 #include <fstream>
 #include <set>
@@ -10,6 +9,9 @@
 #include "failure.hpp"
 #include "input_file.hpp"
 #include "io/poses/kitti_files.hpp"
+#include "scan_files.hpp"
+#include "scan_reader.hpp"
+#include "text.hpp"
 
 #if defined(DYNAINS_HAS_JSON)
 #include <nlohmann/json.hpp>
@@ -133,9 +135,8 @@ void choose_scene(const fs::path& tables, const std::string& wanted, std::vector
   std::set<std::string> names;
   for (const SweepRow& sweep : sweeps) names.insert(name_of_sample[sweep.sample]);
   if (wanted.empty() ? names.size() > 1 : names.count(wanted) == 0) {
-    std::string list;
-    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-    fail(scenes, "expected one scene, by --nuscenes-scene; found " + list);
+    fail(scenes, "expected one scene, by --nuscenes-scene; found " +
+                     text::listed({names.begin(), names.end()}));
   }
   const std::string name = wanted.empty() ? *names.begin() : wanted;
   sweeps.erase(
@@ -175,35 +176,45 @@ std::optional<fs::path> nuscenes_tables(const fs::path& folder) {
 
 #if defined(DYNAINS_HAS_JSON)
 
-NuScenesSweeps read_nuscenes(const fs::path& folder, const fs::path& tables,
-                             const std::string& scene) {
-  NuScenesSweeps result;
-  result.tables = {tables / "sample_data.json", tables / "ego_pose.json",
-                   tables / "calibrated_sensor.json"};
-  std::vector<SweepRow> rows = read_sample_data(result.tables[0]);
-  choose_scene(tables, scene, rows, result.tables);
+void read_nuscenes(RecordingContents& r, const fs::path& tables) {
+  if (!r.options.times.empty()) {
+    fail(r.options.times, "expected no file of times: " + tables.string() + " has times");
+  }
+  const fs::path data = tables / "sample_data.json";
+  r.files = {data, tables / "ego_pose.json", tables / "calibrated_sensor.json"};
+  std::vector<SweepRow> rows = read_sample_data(data);
+  std::set<std::string> ego_poses, sensors;
+  choose_scene(tables, r.options.scene, rows, r.files);
   std::stable_sort(rows.begin(), rows.end(),
                    [](const SweepRow& a, const SweepRow& b) { return a.time < b.time; });
-  std::set<std::string> ego_poses, sensors;
   for (const SweepRow& row : rows) {
     ego_poses.insert(row.ego_pose);
     sensors.insert(row.sensor);
   }
-  const Poses T_world_ego = read_poses_by_token(result.tables[1], ego_poses);
-  const Poses T_ego_sensor = read_poses_by_token(result.tables[2], sensors);
+  const Poses T_world_ego = read_poses_by_token(r.files[1], ego_poses);
+  const Poses T_ego_sensor = read_poses_by_token(r.files[2], sensors);
   // File names begin at the folder of all data, which may be that above the tables.
-  const bool is_above = !is_there(folder / rows.front().file);
-  const fs::path root = is_above ? folder / ".." : folder;
+  const bool is_above = !is_there(r.folder / rows.front().file);
+  const fs::path root = is_above ? r.folder / ".." : r.folder;
   for (const SweepRow& row : rows) {
-    result.sweeps.push_back({(root / row.file).lexically_normal(), row.time,
-                             T_world_ego.at(row.ego_pose) * T_ego_sensor.at(row.sensor)});
+    const fs::path file = (root / row.file).lexically_normal();
+    if (!r.scans.empty() && !(row.time > r.scans.back().time)) {
+      fail(data,
+           "expected one sweep at a time, found a second one for " + file.filename().string());
+    }
+    r.scans.push_back({file, name_of_scan(file), r.scans.size(), row.time});
+    r.files.push_back(file);
+    r.trajectory.times.push_back(row.time);
+    r.trajectory.poses.push_back(T_world_ego.at(row.ego_pose) * T_ego_sensor.at(row.sensor));
   }
-  return result;
+  r.scan_folder = r.scans.front().file.parent_path();
+  r.format = ScanFormat::kNuScenes;
+  r.notes.push_back("sweeps, poses and times of nuScenes");
 }
 
 #else
 
-NuScenesSweeps read_nuscenes(const fs::path&, const fs::path& tables, const std::string&) {
+void read_nuscenes(RecordingContents&, const fs::path& tables) {
   fail(tables, "this build has no JSON (Debian: nlohmann-json3-dev)");
 }
 

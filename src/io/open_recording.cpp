@@ -16,7 +16,6 @@
 #include "input_file.hpp"
 #include "io/poses/recording_poses.hpp"
 #include "logs/log_scans.hpp"
-#include "nuscenes.hpp"
 #include "points/bin_layout.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"
@@ -112,30 +111,6 @@ void list_scans(RecordingContents& r) {
                               " and " + r.scans[i].file.filename().string());
     }
   }
-}
-
-/// Takes the sweeps of one scene. Poses of a file belong to the sweeps by time.
-void open_nuscenes(RecordingContents& r, const fs::path& tables) {
-  if (!r.options.times.empty()) {
-    fail(r.options.times, "expected no file of times: " + tables.string() + " has times");
-  }
-  const NuScenesSweeps nuscenes = read_nuscenes(r.folder, tables, r.options.scene);
-  r.files = nuscenes.tables;
-  r.scan_folder = nuscenes.sweeps.front().file.parent_path();
-  r.format = ScanFormat::kNuScenes;
-  r.notes.push_back("sweeps, poses and times of nuScenes");
-  for (const NuScenesSweep& sweep : nuscenes.sweeps) {
-    if (!r.scans.empty() && !(sweep.time > r.scans.back().time)) {
-      fail(tables / "sample_data.json", "expected one sweep at a time, found a second one for " +
-                                            sweep.file.filename().string());
-    }
-    r.scans.push_back({sweep.file, name_of_scan(sweep.file), r.scans.size(), sweep.time});
-    r.files.push_back(sweep.file);
-    r.trajectory.times.push_back(sweep.time);
-    r.trajectory.poses.push_back(sweep.T_world_sensor);
-  }
-  check_names(r);
-  pose_by_stamps(r, tables);
 }
 
 /// Whether some scans in the form of DynamicMap_Benchmark have the intensities 0 and 1, and no
@@ -248,7 +223,9 @@ std::unique_ptr<ScanReader> open_scans(RecordingContents& r) {
   const auto tables = is_folder(r.folder) ? nuscenes_tables(r.folder) : std::nullopt;
   if (is_log(r.folder)) return open_log_scans(r);
   if (tables) {
-    open_nuscenes(r, *tables);
+    read_nuscenes(r, *tables);
+    check_names(r);
+    pose_by_stamps(r, *tables);
   } else {
     if (!is_folder(r.folder)) {
       const auto conversion = conversion_of(r.folder);

@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "failure.hpp"
@@ -212,15 +211,7 @@ void Recording::read_sensors(std::size_t i, RecordedScan& scan) const {
     return;
   }
   const fs::path file = contents_.folder / "sensor" / (name(i) + ".id");
-  if (is_file(file)) {
-    ByteReader reader(file);
-    if (reader.remaining() != scan.size()) {
-      fail(file, "has " + std::to_string(reader.remaining()) + " bytes, expected one for each of " +
-                     std::to_string(scan.size()) + " points");
-    }
-    const std::string bytes = reader.read_block(scan.size(), "sensors of points");
-    scan.sensor.assign(bytes.begin(), bytes.end());
-  }
+  if (is_file(file)) scan.sensor = read_point_bytes(file, scan.size());
   if (contents_.options.sensor_beams > 0) {
     for (std::uint8_t& sensor : scan.sensor) {
       sensor = static_cast<std::uint8_t>(sensor / contents_.options.sensor_beams);

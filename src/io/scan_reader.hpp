@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dynains/io/recording.hpp"
@@ -41,6 +42,13 @@ std::unique_ptr<ScanReader> make_file_reader(ScanFormat format, const BinLayout&
 
 /// Moves all points, if there is a transform.
 void transform_scan(const FileTransform* T_target_file, RecordedScan& points);
+
+/// The folder of the tables of nuScenes: `folder`, or its subfolder v1.0-*; empty if it has none.
+std::optional<std::filesystem::path> nuscenes_tables(const std::filesystem::path& folder);
+/// Takes sweeps, times and poses of one scene: that of the options, or the only one. Memory grows
+/// with the number of sweeps, not with the size of the tables. Throws IoError, also if this build
+/// has no JSON.
+void read_nuscenes(RecordingContents& r, const std::filesystem::path& tables);
 
 struct OpenedRecording {
   RecordingContents contents;

@@ -121,7 +121,7 @@ TEST_CASE("points of several sensors have numbers in files beside the scans, or 
     CHECK(tells(recording, "points are of 2 sensors"));
     write_text(folder / "sensor/a1.id", "\1\1");
     CHECK_THROWS_WITH(recording.read_scan(0),
-                      ContainsSubstring("expected one for each of 3 points"));
+                      ContainsSubstring("expected a byte for each of the scan's 3 points"));
     options.sensor_origin.x() = 1.0;
     CHECK_THROWS_AS(Recording(folder.path(), options), ConfigError);
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
 #include "message_reader.hpp"
+#include "message_writer.hpp"
 
 namespace dynains {
 
@@ -32,7 +34,24 @@ class PointCloud2 {
 
   /// Reads what follows the header of the message, without padding at its end. `in` and the message
   /// outlive this. Throws IoError unless all fields of all points lie within the data.
-  explicit PointCloud2(MessageReader& in);
+  explicit PointCloud2(MessageReader& in) {
+    height_ = in.number<std::uint32_t>("a height");
+    places_.height = in.position() - sizeof(height_);
+    width_ = in.number<std::uint32_t>("a width");
+    read_fields(in);
+    places_.fields_end = in.position();
+    const bool is_big_endian = in.number<std::uint8_t>("is_bigendian") != 0;
+    for (Field& field : fields_) field.is_big_endian = is_big_endian;
+    point_step_ = in.number<std::uint32_t>("a point step");
+    row_step_ = in.number<std::uint32_t>("a row step");
+    const std::uint32_t bytes = in.length(1, "data");
+    places_.data = in.position();
+    places_.data_end = places_.data + bytes;
+    data_ = in.take(bytes, "data");
+    if (size() == 0) return;
+    check_fields(in);
+    check_size(in, bytes);
+  }
 
   std::size_t size() const { return static_cast<std::size_t>(height_) * width_; }
   std::uint32_t width() const { return width_; }
@@ -41,7 +60,9 @@ class PointCloud2 {
   const std::uint8_t* point(std::size_t i) const {
     return data_ + i / width_ * row_step_ + i % width_ * point_step_;
   }
-  PointColumns columns() const;
+  PointColumns columns() const {
+    return columns_of([this](Role role) { return field(role).is_there; });
+  }
 
   /// Bytes from the begin of the message.
   struct Places {
@@ -57,9 +78,44 @@ class PointCloud2 {
   const Field& field(Role role) const { return fields_[static_cast<std::size_t>(role)]; }
 
  private:
-  void read_fields(MessageReader& in);
-  void check_fields(const MessageReader& in) const;
-  void check_size(const MessageReader& in, std::uint64_t bytes);
+  void read_fields(MessageReader& in) {
+    // Each has 13 bytes or more: length of the name, offset, datatype, count.
+    field_names_.resize(in.length(13, "fields"));
+    for (std::string& name : field_names_) {
+      name = in.string("a field name");
+      const auto offset = in.number<std::uint32_t>("a field offset");
+      const auto datatype = in.number<std::uint8_t>("a field datatype");
+      in.number<std::uint32_t>("a field count");
+      const Role role = role_of(name);
+      if (role == Role::kNone || field(role).is_there) continue;
+      if (datatype < 1 || datatype > std::size(kFieldTypes)) {
+        in.fail("expected a datatype from 1 to 8 of field " + name + ", found " +
+                std::to_string(datatype));
+      }
+      fields_[static_cast<std::size_t>(role)] = {true, offset, kFieldTypes[datatype - 1], false};
+    }
+  }
+  void check_fields(const MessageReader& in) const {
+    for (const Role axis : {Role::kX, Role::kY, Role::kZ}) {
+      if (!field(axis).is_there || field(axis).is_integer()) {
+        in.fail("expected the fields x, y and z as float32 or float64");
+      }
+    }
+    for (const Field& one : fields_) {
+      if (one.is_there && one.offset + size_of(one.type) > point_step_) {
+        in.fail("expected all fields within the " + std::to_string(point_step_) +
+                " bytes of a point");
+      }
+    }
+  }
+  /// Rows may be padded; some drivers leave the row step 0, or that of the cloud before a filter.
+  void check_size(const MessageReader& in, std::uint64_t bytes) {
+    const std::uint64_t packed = width_ * point_step_;
+    if (height_ == 1 || row_step_ < packed || packed * height_ == bytes) row_step_ = packed;
+    if (packed <= bytes && (bytes - packed) / row_step_ >= height_ - 1) return;
+    in.fail("expected " + std::to_string(height_) + " rows of " + std::to_string(row_step_) +
+            " bytes, found " + std::to_string(bytes) + " bytes");
+  }
 
   std::array<Field, static_cast<std::size_t>(Role::kNone)> fields_;
   std::uint32_t height_ = 0;

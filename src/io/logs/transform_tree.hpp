@@ -2,10 +2,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynains/io/trajectory.hpp"
@@ -15,9 +19,27 @@
 namespace dynains {
 
 /// Adds a pose with its time (s), in any order.
-void append(double time, const Pose& pose, Trajectory& trajectory);
+inline void append(double time, const Pose& pose, Trajectory& trajectory) {
+  trajectory.times.push_back(time);
+  trajectory.poses.push_back(pose);
+}
 /// Orders poses by time. Of several poses of one time, the first one stays.
-void sort_by_time(Trajectory& trajectory);
+inline void sort_by_time(Trajectory& trajectory) {
+  const std::vector<double>& times = trajectory.times;
+  const auto is_late = [](double a, double b) { return !(a < b); };
+  if (std::adjacent_find(times.begin(), times.end(), is_late) == times.end()) return;
+  std::vector<std::size_t> order(times.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
+  Trajectory sorted;
+  sorted.order = trajectory.order;
+  for (const std::size_t i : order) {
+    if (!sorted.times.empty() && sorted.times.back() == times[i]) continue;
+    append(times[i], trajectory.poses[i], sorted);
+  }
+  trajectory = std::move(sorted);
+}
 
 /// Where transforms come from. Robots in one log may name their frames alike, each with transforms
 /// below a namespace of its own.
@@ -38,33 +60,137 @@ class TransformTree {
 
   /// Adds T_frame_child of a pose. A static transform replaces earlier ones of its frame. A pose
   /// that gives a frame a second parent is left out and counted.
-  void add(const StampedPose& pose, bool is_static, const TransformSource& source = {});
+  void add(const StampedPose& pose, bool is_static, const TransformSource& source = {}) {
+    const Edge first{pose.frame, is_static, {}, source, {}};
+    Edge& edge = edges_.try_emplace(pose.child, first).first->second;
+    if (edge.source.nearness > source.nearness) return;
+    if (edge.source.nearness < source.nearness) edge = first;
+    if (edge.source.name_space != source.name_space) {
+      const bool are_equal = edge.is_static && is_static && edge.parent == pose.frame &&
+                             edge.poses.poses.front().isApprox(pose.T_frame_child, 1e-6);
+      if (!are_equal) edge.rival = source.name_space;
+      return;
+    }
+    if (edge.parent != pose.frame || (edge.is_static && !is_static)) {
+      ++left_out_;
+      return;
+    }
+    if (is_static) {
+      edge.is_static = true;
+      edge.poses.poses.assign(1, pose.T_frame_child);
+      edge.poses.times.clear();
+    } else {
+      append(pose.time, pose.T_frame_child, edge.poses);
+    }
+  }
   std::size_t left_out() const { return left_out_; }
 
   /// Orders the poses of each edge by time, for the members below.
-  void sort();
+  void sort() {
+    for (auto& edge : edges_) sort_by_time(edge.second.poses);
+  }
 
   bool has(const std::string& frame) const { return edges_.count(frame) > 0; }
   /// The frame above `frame` that has no parent; nothing if the frames above it form a loop
   /// or are more than kDeepest.
-  std::optional<std::string> root_of(const std::string& frame) const;
+  std::optional<std::string> root_of(const std::string& frame) const {
+    std::string root = frame;
+    std::size_t steps = 0;
+    for (auto edge = edges_.find(root); edge != edges_.end(); edge = edges_.find(root)) {
+      if (++steps > kDeepest) return std::nullopt;
+      root = edge->second.parent;
+    }
+    return root;
+  }
   /// Whether a moving transform leads to `frame` from a frame above it.
-  bool is_moving(const std::string& frame) const;
+  bool is_moving(const std::string& frame) const {
+    const std::vector<std::string> frames = frames_above(frame);
+    return std::any_of(frames.begin(), frames.end(), [this](const std::string& one) {
+      const auto edge = edges_.find(one);
+      return edge != edges_.end() && !edge->second.is_static;
+    });
+  }
   /// Frames with a moving transform to their parent.
-  std::vector<std::string> moving_frames() const;
+  std::vector<std::string> moving_frames() const {
+    std::vector<std::string> names;
+    for (const auto& [name, edge] : edges_) {
+      if (!edge.is_static) names.push_back(name);
+    }
+    return names;
+  }
   /// The lowest of the moving frames that all others lie above or below: the body of a robot, also
   /// if its wheels move. Nothing if there is none.
-  std::optional<std::string> moving_body() const;
+  std::optional<std::string> moving_body() const {
+    std::map<std::string, std::size_t> below;  // moving frames at or below each frame
+    std::vector<std::string> longest;
+    const std::vector<std::string> moving = moving_frames();
+    for (const std::string& frame : moving) {
+      const std::vector<std::string> chain = frames_above(frame);
+      for (const std::string& one : chain) ++below[one];
+      if (chain.size() > longest.size()) longest = chain;
+    }
+    // Every moving frame lies above the body, or at or below it.
+    std::size_t above = 0;
+    std::optional<std::string> body;
+    for (auto frame = longest.rbegin(); frame != longest.rend(); ++frame) {
+      const bool is_moving = std::binary_search(moving.begin(), moving.end(), *frame);
+      if (!is_moving) continue;
+      if (below[*frame] + above < moving.size()) break;
+      body = *frame;
+      ++above;
+    }
+    return body;
+  }
   /// T_target_source at `time` (s), by the nearest frame above both. Nothing if there is none, or
   /// if a moving edge on the way has no pose at that time.
-  std::optional<Pose> find(const std::string& target, const std::string& source, double time) const;
+  std::optional<Pose> find(const std::string& target, const std::string& source,
+                           double time) const {
+    const std::vector<Step> from_source = climb(source, time);
+    const std::vector<Step> from_target = climb(target, time);
+    auto above_source = from_source.rbegin();
+    auto above_target = from_target.rbegin();
+    if (above_source->frame != above_target->frame) return std::nullopt;
+    // From the top down to the last frame that both have.
+    while (std::next(above_source) != from_source.rend() &&
+           std::next(above_target) != from_target.rend() &&
+           std::next(above_source)->frame == std::next(above_target)->frame) {
+      ++above_source;
+      ++above_target;
+    }
+    return above_target->T_frame_source.inverse() * above_source->T_frame_source;
+  }
   /// A frame between both, and two namespaces that are equally near and place it differently: which
   /// of them find() takes is chance.
-  std::optional<std::string> conflict(const std::string& target, const std::string& source) const;
+  std::optional<std::string> conflict(const std::string& target, const std::string& source) const {
+    const std::vector<std::string> ways[] = {frames_above(target), frames_above(source)};
+    for (std::size_t i = 0; i < 2; ++i) {
+      for (const std::string& frame : ways[i]) {
+        const std::vector<std::string>& other = ways[1 - i];
+        const auto edge = edges_.find(frame);
+        const bool is_between = std::find(other.begin(), other.end(), frame) == other.end();
+        if (!is_between || edge == edges_.end() || edge->second.rival.empty()) continue;
+        return "frame " + frame + " by namespaces " + edge->second.source.name_space + " and " +
+               edge->second.rival;
+      }
+    }
+    return std::nullopt;
+  }
   /// Times of all moving transforms, s, strictly increasing.
-  std::vector<double> times() const;
+  std::vector<double> times() const {
+    std::vector<double> times;
+    for (const auto& edge : edges_) {
+      times.insert(times.end(), edge.second.poses.times.begin(), edge.second.poses.times.end());
+    }
+    std::sort(times.begin(), times.end());
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    return times;
+  }
   /// Names of all frames that have a parent.
-  std::vector<std::string> frames() const;
+  std::vector<std::string> frames() const {
+    std::vector<std::string> names;
+    for (const auto& edge : edges_) names.push_back(edge.first);
+    return names;
+  }
 
  private:
   struct Edge {
@@ -80,8 +206,47 @@ class TransformTree {
     Pose T_frame_source = Pose::Identity();
   };
 
-  std::vector<std::string> frames_above(const std::string& frame) const;
-  std::vector<Step> climb(const std::string& source, double time) const;
+  /// Whether points 10 m away keep their place, to 10 cm, from one pose to another.
+  static bool are_alike(const Pose& a, const Pose& b) {
+    const Pose T = a.inverse() * b;
+    return T.translation().norm() + 10.0 * (T.linear() - Eigen::Matrix3d::Identity()).norm() < 0.1;
+  }
+
+  std::optional<Pose> pose_at(const Trajectory& trajectory, double time) const {
+    const std::vector<Pose>& poses = trajectory.poses;
+    if (trajectory.times.empty()) return poses.front();
+    if (const auto match = match_time(trajectory, time, longest_gap_)) {
+      return interpolate(poses[match->before], poses[match->after], match->share);
+    }
+    const auto after = std::upper_bound(trajectory.times.begin(), trajectory.times.end(), time);
+    const auto next = static_cast<std::size_t>(after - trajectory.times.begin());
+    const std::size_t newest = next > 0 ? next - 1 : 0;
+    const std::size_t other = next < poses.size() ? next : newest > 0 ? newest - 1 : 0;
+    if (!are_alike(poses[newest], poses[other])) return std::nullopt;
+    return poses[newest];
+  }
+
+  /// `frame` and the frames above it, at most kDeepest.
+  std::vector<std::string> frames_above(const std::string& frame) const {
+    std::vector<std::string> frames = {frame};
+    for (auto edge = edges_.find(frame); edge != edges_.end() && frames.size() <= kDeepest;
+         edge = edges_.find(frames.back())) {
+      frames.push_back(edge->second.parent);
+    }
+    return frames;
+  }
+  /// `source` and the frames above it, as far as transforms lead at that time.
+  std::vector<Step> climb(const std::string& source, double time) const {
+    std::vector<Step> steps = {{source, Pose::Identity()}};
+    while (steps.size() <= kDeepest) {
+      const auto edge = edges_.find(steps.back().frame);
+      if (edge == edges_.end()) break;
+      const std::optional<Pose> T_parent_child = pose_at(edge->second.poses, time);
+      if (!T_parent_child) break;
+      steps.push_back({edge->second.parent, *T_parent_child * steps.back().T_frame_source});
+    }
+    return steps;
+  }
 
   std::map<std::string, Edge> edges_;  ///< by child
   std::size_t left_out_ = 0;
