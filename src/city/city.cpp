@@ -12,9 +12,9 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/io/atomic_file.hpp"
+#include "io/byte_reader.hpp"
 #include "io/failure.hpp"
 #include "io/folder.hpp"
-#include "io/input_file.hpp"
 #include "io/text.hpp"
 #include "session_file.hpp"
 

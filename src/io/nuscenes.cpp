@@ -5,9 +5,9 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "byte_reader.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "failure.hpp"
-#include "input_file.hpp"
 #include "io/poses/kitti_files.hpp"
 #include "scan_files.hpp"
 #include "scan_reader.hpp"

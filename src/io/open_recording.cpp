@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
 #include "failure.hpp"
-#include "input_file.hpp"
 #include "io/poses/recording_poses.hpp"
 #include "logs/log_scans.hpp"
 #include "points/bin_layout.hpp"

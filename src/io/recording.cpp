@@ -6,10 +6,10 @@
 #include <optional>
 #include <utility>
 
+#include "byte_reader.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "failure.hpp"
-#include "input_file.hpp"
 #include "io/poses/recording_poses.hpp"
 #include "points/finite_points.hpp"
 #include "points/point_clock.hpp"

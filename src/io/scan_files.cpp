@@ -4,9 +4,9 @@
 #include <cmath>
 #include <string_view>
 
+#include "byte_reader.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
-#include "input_file.hpp"
 #include "text.hpp"
 
 namespace dynains {

@@ -11,7 +11,6 @@
 #include "interrupt.hpp"
 #include "io/byte_reader.hpp"
 #include "io/fingerprint.hpp"
-#include "io/input_file.hpp"
 #include "io/text.hpp"
 #include "recorded_scans.hpp"
 #include "run_plan.hpp"

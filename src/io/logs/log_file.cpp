@@ -6,7 +6,6 @@
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../input_file.hpp"
 #include "../text.hpp"
 
 namespace dynains {

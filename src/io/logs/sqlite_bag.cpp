@@ -12,7 +12,6 @@
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../input_file.hpp"
 #include "log_file.hpp"
 #include "message_writer.hpp"
 

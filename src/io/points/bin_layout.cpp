@@ -8,7 +8,6 @@
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../input_file.hpp"
 #include "../scalar.hpp"
 #include "../text.hpp"
 #include "dynains/errors.hpp"

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
-#include "../input_file.hpp"
 #include "../points/point_clock.hpp"
 #include "../scan_files.hpp"
 #include "../scan_reader.hpp"

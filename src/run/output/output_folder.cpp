@@ -15,7 +15,6 @@
 #include "dynains/version.hpp"
 #include "io/byte_reader.hpp"
 #include "io/fingerprint.hpp"
-#include "io/input_file.hpp"
 #include "io/scan_files.hpp"
 
 namespace dynains::run {

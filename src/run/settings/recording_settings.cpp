@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "dynains/errors.hpp"
-#include "io/input_file.hpp"
+#include "io/byte_reader.hpp"
 #include "parameter_values.hpp"
 
 namespace dynains::run {
