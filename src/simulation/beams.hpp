@@ -219,10 +219,7 @@ class BeamTable {
         const double y = sines[k] * cos_turn + cosines[k] * sin_turn;
         unordered_.push_back(
             {static_cast<float>(c * x), static_cast<float>(c * y), static_cast<float>(s)});
-        const double wrapped = azimuth < -kPi   ? azimuth + 2 * kPi
-                               : azimuth >= kPi ? azimuth - 2 * kPi
-                                                : azimuth;
-        cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrapped)));
+        cells_.push_back(static_cast<std::uint32_t>(row * kColumns + column_of(wrap(azimuth))));
       }
     }
   }

@@ -53,7 +53,7 @@ constexpr std::array<const char*, 10> value_names(Sensor) {
 }
 
 /// Sensors of one type whose points are one cloud, in the frame of the body on the ground. Each has
-/// its own clock. simulator.cpp lists their poses.
+/// its own clock. simulator.hpp lists their poses.
 enum class Rig {
   kNone,       ///< one sensor; points in its own frame
   kRoofTwo,    ///< in front and behind on a roof

@@ -175,7 +175,7 @@ class Traffic {
   /// Advances by `dt` seconds.
   void step(double dt) {
     const Vec2 centre = place_of(drivers[0]).position;
-    collect_bodies(centre, kActiveRadius + 40);
+    collect_bodies(centre);
     for (Driver& driver : drivers) {
       if (!driver.active) continue;
       const bool is_near = norm(place_of(driver).position - centre) <= kActiveRadius;
@@ -221,12 +221,19 @@ class Traffic {
     return {place_of(driver), driver.speed, driver.acceleration, turn_rate_};
   }
 
-  /// Everybody within `radius` of `centre`.
+  /// Everybody within `radius` of `centre`; the vehicle of the sensor is the first if it is.
   std::vector<ObjectPose> around(Vec2 centre, double radius) const {
     std::vector<ObjectPose> result;
-    visit_around(centre, radius, [&](const ObjectPose& pose, const Driver* driver) {
-      if (driver != &drivers[0]) result.push_back(pose);
-    });
+    const auto add = [&](const ObjectPose& pose) {
+      if (norm(pose.at.position - centre) < radius) result.push_back(pose);
+    };
+    for (const Driver& driver : drivers) {
+      if (driver.active) add({driver.object, place_of(driver), driver.speed, 1.1 * driver.s});
+    }
+    for (const Walker& walker : walkers) {
+      add({walker.object, {walker.position, walker.heading}, norm(walker.velocity), walker.phase});
+    }
+    for (const ObjectPose& pose : parked) add(pose);
     return result;
   }
 
@@ -236,27 +243,9 @@ class Traffic {
   struct Body {
     Footprint footprint;
     Vec2 velocity;
-    const Driver* driver;  ///< null if it is none
+    std::size_t object;
     bool person;
   };
-
-  /// Calls `visit(pose, driver)` for everybody within `radius` of `centre`. `driver` is null if it
-  /// is none.
-  template <class Visitor>
-  void visit_around(Vec2 centre, double radius, Visitor&& visit) const {
-    const auto add = [&](const ObjectPose& pose, const Driver* driver) {
-      if (norm(pose.at.position - centre) < radius) visit(pose, driver);
-    };
-    for (const Driver& driver : drivers) {
-      if (!driver.active) continue;
-      add({driver.object, place_of(driver), driver.speed, 1.1 * driver.s}, &driver);
-    }
-    for (const Walker& walker : walkers) {
-      add({walker.object, {walker.position, walker.heading}, norm(walker.velocity), walker.phase},
-          nullptr);
-    }
-    for (const ObjectPose& pose : parked) add(pose, nullptr);
-  }
 
   Kind random_kind(const Flow& flow) {
     double u = random_.unit();
@@ -286,13 +275,13 @@ class Traffic {
     driver.schedule = {{begin, 0}, {begin + random_.uniform(5, 40), speed}};
   }
 
-  void collect_bodies(Vec2 centre, double radius) {
+  void collect_bodies(Vec2 centre) {
     bodies_.clear();
-    visit_around(centre, radius, [this](const ObjectPose& pose, const Driver* driver) {
+    for (const ObjectPose& pose : around(centre, kActiveRadius + 40)) {
       bodies_.push_back({footprint_of(pose.object, pose.at),
-                         pose.speed * direction(pose.at.heading), driver,
+                         pose.speed * direction(pose.at.heading), pose.object,
                          objects[pose.object].kind == Kind::kPedestrian});
-    });
+    }
   }
 
   double free_distance(const Driver& driver, double reach, double& speed_ahead) const {
@@ -302,7 +291,7 @@ class Traffic {
     const Vec2 here = place_of(driver).position;
     std::vector<const Body*> near;
     for (const Body& body : bodies_) {
-      if (body.driver == &driver) continue;
+      if (body.object == driver.object) continue;
       const double far = reach + size.length + body.footprint.half_length + 4;
       if (norm(body.footprint.centre - here) < far) near.push_back(&body);
     }
@@ -339,7 +328,7 @@ class Traffic {
     if (driver.yields && driver.speed < 0.1 && cruise > 0) {
       const Waypoint at = place_of(driver);
       for (const Body& body : bodies_) {
-        if (body.driver == &driver || norm(body.velocity) < 1) continue;
+        if (body.object == driver.object || norm(body.velocity) < 1) continue;
         const Vec2 towards = at.position - body.footprint.centre;
         const double distance = norm(towards);
         if (distance < 25 && dot(towards, body.velocity) > 0.7 * distance * norm(body.velocity)) {
