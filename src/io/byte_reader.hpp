@@ -126,12 +126,7 @@ class Bytes {
     return Bytes(path_, origin, take(size, purpose), static_cast<std::size_t>(size));
   }
   void skip(std::uint64_t size, const char* purpose) { take(size, purpose); }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    fail_at_byte(path_, origin_ + position_, what);
-  }
-
- private:
+  /// The next `size` bytes.
   const std::uint8_t* take(std::uint64_t size, const char* purpose) {
     if (size > remaining()) {
       fail(std::string("expected ") + std::to_string(size) + " bytes of " + purpose + ", found " +
@@ -142,6 +137,12 @@ class Bytes {
     return result;
   }
 
+  const std::filesystem::path& path() const { return path_; }
+  [[noreturn]] void fail(const std::string& what) const {
+    fail_at_byte(path_, origin_ + position_, what);
+  }
+
+ private:
   const std::filesystem::path& path_;
   std::uint64_t origin_;
   const std::uint8_t* data_;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -33,6 +34,10 @@ enum class Scalar : std::uint8_t {
   kFloat,
   kDouble
 };
+
+inline constexpr Scalar kScalars[] = {
+    Scalar::kInt8,   Scalar::kUint8, Scalar::kInt16,  Scalar::kUint16, Scalar::kInt32,
+    Scalar::kUint32, Scalar::kInt64, Scalar::kUint64, Scalar::kFloat,  Scalar::kDouble};
 
 /// Calls `use(zero)` with a zero of the type.
 template <class Use>
@@ -64,6 +69,20 @@ auto with_type(Scalar type, Use&& use) {
 
 inline std::size_t size_of(Scalar type) {
   return with_type(type, [](auto zero) { return sizeof(zero); });
+}
+
+/// The type of that kind, 'i' for signed, 'u' for unsigned and 'f' for floating-point numbers, and
+/// size in bytes; nothing if there is none.
+inline std::optional<Scalar> scalar_of(char kind, std::size_t size) {
+  for (const Scalar type : kScalars) {
+    const char its_kind = with_type(type, [](auto zero) {
+      return std::is_floating_point_v<decltype(zero)> ? 'f'
+             : std::is_signed_v<decltype(zero)>       ? 'i'
+                                                      : 'u';
+    });
+    if (its_kind == kind && size_of(type) == size) return type;
+  }
+  return std::nullopt;
 }
 
 /// Appends the bytes of a number, in the byte order of the machine.

@@ -99,7 +99,7 @@ std::string without_points(const std::string& type, const SerialisedMessage& clo
 std::string with_labels(const std::string& type, const SerialisedMessage& message,
                         Span<const std::uint8_t> labels) {
   if (!can_have_labels(type)) {
-    throw IoError(message.place + ": expected a PointCloud2, for other types have no labels");
+    fail(message.place, "expected a PointCloud2, for other types have no labels");
   }
   MessageReader in(message);
   in.header();

@@ -1,6 +1,7 @@
 // Logs of robots: files of messages by topic and time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -23,6 +24,8 @@ enum class MessageEncoding : std::uint8_t {
   kCdr,   ///< ROS 2: XCDR1 with an encapsulation header of four bytes
   kOther  ///< not readable here
 };
+
+inline constexpr std::size_t kCdrHeader = 4;  ///< bytes
 
 /// What decodes the messages of a topic, in the terms of MCAP.
 struct LogSchema {

@@ -3,11 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 
 #include "../byte_reader.hpp"
-#include "dynains/errors.hpp"
 #include "ros_messages.hpp"
 
 namespace dynains {
@@ -18,38 +16,30 @@ struct MessageHeader {
   std::string frame;
 };
 
-/// Reads the fields of a message of ROS 1, or of ROS 2 by CDR with its alignment.
-class MessageReader {
+/// Reads the fields of a message of ROS 1, or of ROS 2 by CDR with its alignment. The message
+/// outlives it.
+class MessageReader : public Bytes {
  public:
   explicit MessageReader(const SerialisedMessage& message)
-      : encoding_(message.encoding),
-        place_(message.place),
-        bytes_(place_, 0, message.data, message.size) {
+      : Bytes(message.place, 0, message.data, message.size), encoding_(message.encoding) {
     if (encoding_ == MessageEncoding::kOther) fail("expected a message of ROS 1 or ROS 2");
     if (encoding_ != MessageEncoding::kCdr) return;
-    const std::uint8_t* const header = take(4, "the header of CDR");
-    if (header[0] != 0 || header[1] != 1) {
-      fail("expected plain CDR, little endian, found the representation " +
-           std::to_string(header[0] * 256 + header[1]));
-    }
-    begin_ = bytes_.position();
+    const std::uint8_t* const header = take(kCdrHeader, "the header of CDR");
+    if (header[0] == 0 && header[1] == 1) return;
+    fail("expected plain CDR, little endian, found the representation " +
+         std::to_string(header[0] * 256 + header[1]));
   }
-  MessageReader(const MessageReader&) = delete;
-  MessageReader& operator=(const MessageReader&) = delete;
 
   bool is_ros1() const { return encoding_ == MessageEncoding::kRos1; }
-  std::size_t remaining() const { return bytes_.remaining(); }
-  /// Bytes from the begin of the message.
-  std::size_t position() const { return bytes_.position(); }
 
   template <class Number>
   Number number(const char* purpose) {
     align(sizeof(Number));
-    return bytes_.number<Number>(purpose);
+    return Bytes::number<Number>(purpose);
   }
   std::string string(const char* purpose) {
     align(sizeof(std::uint32_t));
-    std::string result = bytes_.string(purpose);
+    std::string result = Bytes::string(purpose);
     if (!is_ros1() && !result.empty() && result.back() == '\0') result.pop_back();
     return result;
   }
@@ -61,12 +51,6 @@ class MessageReader {
     }
     return count;
   }
-  const std::uint8_t* take(std::size_t size, const char* purpose) {
-    const std::uint8_t* const result = bytes_.here();
-    bytes_.skip(size, purpose);
-    return result;
-  }
-
   /// Names of frames in old bags begin with a slash, which is left out.
   std::string frame(const char* purpose) {
     std::string name = string(purpose);
@@ -82,21 +66,15 @@ class MessageReader {
     return {seconds + part, frame("a frame id")};
   }
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw IoError(place_.string() + ": " + what);
-  }
+  [[noreturn]] void fail(const std::string& what) const { dynains::fail(path(), what); }
 
  private:
   void align(std::size_t size) {
-    if (is_ros1()) return;
-    const std::size_t past = (bytes_.position() - begin_) % size;
-    if (past != 0) take(size - past, "padding");
+    const std::size_t past = is_ros1() ? 0 : (position() - kCdrHeader) % size;
+    if (past != 0) skip(size - past, "padding");
   }
 
   MessageEncoding encoding_;
-  std::filesystem::path place_;  ///< of the message, for errors
-  Bytes bytes_;
-  std::size_t begin_ = 0;  ///< alignment counts from here
 };
 
 }  // namespace dynains

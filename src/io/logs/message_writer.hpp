@@ -55,7 +55,6 @@ class MessageWriter {
   const std::string& bytes() const { return bytes_; }
 
  private:
-  static constexpr std::size_t kCdrHeader = 4;  // bytes
   bool is_ros1_;
   std::string bytes_;
 };

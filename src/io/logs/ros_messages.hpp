@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct SerialisedMessage {
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;
   MessageEncoding encoding = MessageEncoding::kCdr;
-  std::string place;  ///< for example "drive.mcap: /points at 12.5 s"
+  std::filesystem::path place;  ///< for example "drive.mcap: /points at 12.5 s"
 };
 
 /// Pose of a frame in another one at a time.

@@ -21,23 +21,23 @@ constexpr std::string_view kNpyMagic("\x93NUMPY", 6);
 constexpr std::size_t kMaxNpyField = 1000000000;              // bytes
 constexpr std::size_t kMaxNpyHeader = std::size_t{1} << 16U;  // bytes
 
+/// Values in the bytes of an array: a field of a structured one, or all values of another one.
+struct NpyColumn {
+  std::string name;            ///< empty if the array is not structured
+  std::optional<Scalar> type;  ///< empty: not a number that is read here
+  bool swap = false;           ///< big-endian
+  std::uint64_t begin = 0;     ///< bytes from the begin of the first item
+  Role role = Role::kNone;
+};
+
 /// Header of an array (.npy, format 1 to 3).
 struct NpyArray {
-  /// A field of a structured array, or the only value of another one.
-  struct Field {
-    std::string name;            ///< empty if the array is not structured
-    std::optional<Scalar> type;  ///< empty: not a number that is read here
-    bool swap = false;           ///< big-endian
-    std::size_t offset = 0;      ///< bytes from the begin of an item
-  };
-
-  std::vector<Field> fields;
+  std::vector<NpyColumn> columns;
   std::vector<std::uint64_t> shape;
   bool is_column_major = false;
   std::size_t item_size = 0;     ///< bytes
   std::uint64_t data_begin = 0;  ///< byte of the first item
 
-  bool is_structured() const { return !fields.front().name.empty(); }
   /// Product of the shape.
   std::uint64_t item_count() const {
     std::uint64_t count = 1;
@@ -74,14 +74,11 @@ class NpyLiteral {
     return text;
   }
   bool boolean() {
-    for (const auto& [name, value] : {std::pair("True", true), std::pair("False", false)}) {
-      if (!is_next(name[0])) continue;
-      const std::string_view word(name);
-      if (rest_.substr(0, word.size()) != word) break;
-      rest_.remove_prefix(word.size());
-      return value;
-    }
-    fail("expected True or False");
+    const bool value = is_next('T');
+    const std::string_view word = value ? "True" : "False";
+    if (rest_.substr(0, word.size()) != word) fail("expected True or False");
+    rest_.remove_prefix(word.size());
+    return value;
   }
   /// (3,), (3, 4) or ().
   std::vector<std::uint64_t> shape() {
@@ -106,47 +103,31 @@ class NpyLiteral {
   std::string_view rest_;
 };
 
-/// Appends a field of a type such as "<f4" and gives its size, bytes.
-std::size_t add_npy_field(const NpyLiteral& literal, const std::string& name,
-                          const std::string& type, NpyArray& array) {
+/// Appends a column of a type such as "<f4" and gives its size, bytes.
+std::size_t add_npy_column(const NpyLiteral& literal, const std::string& name,
+                           const std::string& type, NpyArray& array) {
   std::string_view text = type;
-  const bool is_big = !text.empty() && text.front() == '>';
+  NpyColumn& column = array.columns.emplace_back();
+  column.name = name;
+  column.begin = array.item_size;
+  column.swap = !text.empty() && text.front() == '>';
   if (!text.empty() && std::string_view("<>|=").find(text.front()) != std::string_view::npos) {
     text.remove_prefix(1);
   }
-  if (text == "O") {  // pickled objects, of at least one byte each
-    array.fields.push_back({name, std::nullopt, false, array.item_size});
-    return 1;
-  }
+  if (text == "O") return 1;  // pickled objects, of at least one byte each
   std::uint32_t size = 0;
-  const char* const begin = text.data() + std::min<std::size_t>(1, text.size());
-  const auto [stop, error] = std::from_chars(begin, text.data() + text.size(), size);
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(std::min(text.data() + 1, end), end, size);
   if (text.empty() || error != std::errc{} || size == 0 || size > kMaxNpyField) {
     literal.fail("expected a type such as '<f4', found '" + type.substr(0, 40) + '\'');
   }
-  struct Type {
-    std::string_view name;
-    Scalar scalar;
-  };
-  static constexpr Type kTypes[] = {{"f4", Scalar::kFloat},  {"f8", Scalar::kDouble},
-                                    {"u1", Scalar::kUint8},  {"u2", Scalar::kUint16},
-                                    {"u4", Scalar::kUint32}, {"u8", Scalar::kUint64},
-                                    {"i1", Scalar::kInt8},   {"i2", Scalar::kInt16},
-                                    {"i4", Scalar::kInt32},  {"i8", Scalar::kInt64}};
-  NpyArray::Field field;
-  field.name = name;
-  field.swap = is_big;
-  field.offset = array.item_size;
-  for (const Type& known : kTypes) {
-    if (known.name == text) field.type = known.scalar;
-  }
-  array.fields.push_back(std::move(field));
+  if (stop == end) column.type = scalar_of(text.front(), size);
   return text.front() == 'U' ? 4 * size : size;  // letters have four bytes
 }
 
 void read_npy_type(NpyLiteral& literal, NpyArray& array) {
   if (!literal.skip('[')) {
-    array.item_size += add_npy_field(literal, "", literal.string(), array);
+    array.item_size += add_npy_column(literal, "", literal.string(), array);
     return;
   }
   while (!literal.skip(']')) {
@@ -154,10 +135,10 @@ void read_npy_type(NpyLiteral& literal, NpyArray& array) {
     const std::string name = literal.string();
     literal.expect(',');
     if (name.empty() || literal.is_next('[')) literal.fail("expected fields of one level");
-    std::size_t size = add_npy_field(literal, name, literal.string(), array);
+    std::size_t size = add_npy_column(literal, name, literal.string(), array);
     if (literal.skip(',') && literal.is_next('(')) {
       // Several values in one field are no column.
-      array.fields.back().type.reset();
+      array.columns.back().type.reset();
       for (const std::uint64_t length : literal.shape()) {
         if (length > 0 && size > kMaxNpyField / length) {
           literal.fail("expected fields of at most 1 GB");
@@ -169,7 +150,7 @@ void read_npy_type(NpyLiteral& literal, NpyArray& array) {
     array.item_size += size;
     literal.skip(',');
   }
-  if (array.fields.empty()) literal.fail("expected at least one field");
+  if (array.columns.empty()) literal.fail("expected at least one field");
 }
 
 void read_npy_description(NpyLiteral& literal, NpyArray& array) {
@@ -178,7 +159,7 @@ void read_npy_description(NpyLiteral& literal, NpyArray& array) {
   while (!literal.skip('}')) {
     const std::string key = literal.string();
     literal.expect(':');
-    if (key == "descr" && array.fields.empty()) {
+    if (key == "descr" && array.columns.empty()) {
       read_npy_type(literal, array);
     } else if (key == "fortran_order") {
       array.is_column_major = literal.boolean();
@@ -190,7 +171,7 @@ void read_npy_description(NpyLiteral& literal, NpyArray& array) {
     }
     literal.skip(',');
   }
-  if (array.fields.empty() || !has_shape) literal.fail("expected descr and shape");
+  if (array.columns.empty() || !has_shape) literal.fail("expected descr and shape");
 }
 
 /// Reads the header at the begin of `in`, which holds the first bytes of an array of `size` bytes,
@@ -224,73 +205,38 @@ NpyArray parse_npy_header(Bytes in, std::uint64_t size) {
   return array;
 }
 
-/// A column of numbers in the bytes of an array.
-struct NpyColumn {
-  Role role;
-  Scalar type;
-  bool swap;
-  std::uint64_t begin;   // byte of the first value
-  std::uint64_t stride;  // bytes from value to value
-};
-
-struct NpyPoints {
-  std::uint64_t count = 0;
-  std::vector<NpyColumn> columns;
-};
-
-void add_npy_column(const Bytes& place, const NpyArray& array, const NpyArray::Field& field,
-                    Role role, std::uint64_t begin, std::uint64_t stride, PointSink& sink,
-                    NpyPoints& points) {
-  if (role == Role::kNone || !sink.claim(role)) return;
-  if (!field.type) place.fail("expected numbers of 1, 2, 4 or 8 bytes (float16 is not read)");
-  points.columns.push_back({role, *field.type, field.swap, array.data_begin + begin, stride});
-}
-
-/// Points of a structured array, by the names of its fields.
-NpyPoints structured_points(const Bytes& place, const NpyArray& array, PointSink& sink) {
-  NpyPoints points{array.item_count(), {}};
-  for (const NpyArray::Field& field : array.fields) {
-    add_npy_column(place, array, field, role_of(field.name), field.offset, array.item_size, sink,
-                   points);
+/// Gives the columns of points their meaning, and leaves out the others. Returns the number of
+/// points: the items of a structured array, or the rows of one whose last dimension is x y z,
+/// intensity if there is a fourth value, others. `stride`: bytes from value to value of a column.
+std::uint64_t find_points(const Bytes& place, NpyArray& array, PointSink& sink,
+                          std::uint64_t& stride) {
+  const std::vector<std::uint64_t>& shape = array.shape;
+  std::uint64_t points = array.item_count();
+  stride = array.item_size;
+  if (!array.columns.front().name.empty()) {
+    for (NpyColumn& column : array.columns) column.role = role_of(column.name);
+  } else {
+    const bool is_table = shape.size() >= 2 && shape.back() >= 3 && shape.back() <= kMaxHeaderItems;
+    if (!is_table || (array.is_column_major && shape.size() > 2)) {
+      place.fail(
+          "expected an array of N rows with x y z, or a structured array with the fields x, y and "
+          "z");
+    }
+    points /= shape.back();
+    if (!array.is_column_major) stride *= shape.back();
+    array.columns.resize(std::min<std::size_t>(shape.back(), std::size(kUsualRoles)),
+                         array.columns.front());
+    for (std::size_t i = 0; i < array.columns.size(); ++i) {
+      array.columns[i].role = kUsualRoles[i];
+      array.columns[i].begin = i * array.item_size * (array.is_column_major ? points : 1);
+    }
+  }
+  for (NpyColumn& column : array.columns) {
+    if (column.role != Role::kNone && !sink.claim(column.role)) column.role = Role::kNone;
+    if (column.role == Role::kNone || column.type) continue;
+    place.fail("expected numbers of 1, 2, 4 or 8 bytes (float16 is not read)");
   }
   return points;
-}
-
-/// Points of an array whose last dimension is x y z, intensity if there is a fourth value, others.
-NpyPoints plain_points(const Bytes& place, const NpyArray& array, PointSink& sink) {
-  const bool is_table =
-      array.shape.size() >= 2 && array.shape.back() >= 3 && array.shape.back() <= kMaxHeaderItems;
-  if (!is_table || (array.is_column_major && array.shape.size() > 2)) {
-    place.fail(
-        "expected an array of N rows with x y z, or a structured array with the fields x, y and z");
-  }
-  const std::uint64_t columns = array.shape.back();
-  NpyPoints points{array.item_count() / columns, {}};
-  const std::uint64_t step = array.is_column_major ? points.count : 1;
-  const std::uint64_t stride = array.item_size * (array.is_column_major ? 1 : columns);
-  for (std::uint64_t i = 0; i < columns && i < std::size(kUsualRoles); ++i) {
-    add_npy_column(place, array, array.fields.front(), kUsualRoles[i], i * step * array.item_size,
-                   stride, sink, points);
-  }
-  return points;
-}
-
-NpyPoints points_of_array(const Bytes& place, const NpyArray& array, PointSink& sink) {
-  return array.is_structured() ? structured_points(place, array, sink)
-                               : plain_points(place, array, sink);
-}
-
-void store_column(const Bytes& place, const NpyColumn& column, std::uint64_t count,
-                  const std::uint8_t* bytes, PointSink& sink) {
-  const char* value = reinterpret_cast<const char*>(bytes) + column.begin;
-  for (std::size_t i = 0; i < count; ++i, value += column.stride) {
-    if (sink.set(i, column.role, load_scalar(column.type, value, column.swap))) continue;
-    place.fail("expected whole numbers of at least 0 for rings and labels");
-  }
-}
-
-void require_xyz(const std::filesystem::path& path, const PointSink& sink) {
-  if (const auto name = sink.missing()) fail(path, "expected arrays x, y and z; found no " + *name);
 }
 
 }  // namespace
@@ -300,15 +246,22 @@ std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool 
   const std::uint64_t wanted = with_points ? raw.size() : kMaxNpyHeader + 16;
   const FilePart content(raw, 0, std::min(raw.size(), wanted), "an array");
   const Bytes& place = content.fields;
-  const NpyArray array = parse_npy_header(place, raw.size());
-  const NpyPoints points = points_of_array(place, array, sink);
-  require_xyz(path, sink);
-  if (!with_points) return points.count;
-  sink.resize(static_cast<std::size_t>(points.count));
-  for (const NpyColumn& column : points.columns) {
-    store_column(place, column, points.count, content.bytes.data(), sink);
+  NpyArray array = parse_npy_header(place, raw.size());
+  std::uint64_t stride = 0;
+  const std::uint64_t count = find_points(place, array, sink, stride);
+  if (const auto name = sink.missing()) fail(path, "expected arrays x, y and z; found no " + *name);
+  if (!with_points) return count;
+  sink.resize(static_cast<std::size_t>(count));
+  for (const NpyColumn& column : array.columns) {
+    if (column.role == Role::kNone) continue;
+    const auto* value =
+        reinterpret_cast<const char*>(content.bytes.data()) + array.data_begin + column.begin;
+    for (std::size_t i = 0; i < count; ++i, value += stride) {
+      if (sink.set(i, column.role, load_scalar(*column.type, value, column.swap))) continue;
+      place.fail("expected whole numbers of at least 0 for rings and labels");
+    }
   }
-  return points.count;
+  return count;
 }
 
 }  // namespace dynains

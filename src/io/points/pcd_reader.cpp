@@ -18,7 +18,7 @@ namespace {
 struct Field {
   std::string name;
   std::size_t size = 0;
-  char type_letter = 0;
+  char kind = 0;  ///< of its type, as of scalar_of()
   std::size_t count = 1;
   Scalar type = Scalar::kFloat;
   Role role = Role::kNone;
@@ -63,20 +63,6 @@ PcdEncoding parse_encoding(const ByteReader& reader, std::string_view line) {
   reader.fail_on_line("expected DATA ascii, binary or binary_compressed");
 }
 
-Scalar scalar_of(const ByteReader& reader, const Field& field) {
-  const auto pick = [&](Scalar one, Scalar two, Scalar four, Scalar eight) {
-    return field.size == 1 ? one : field.size == 2 ? two : field.size == 4 ? four : eight;
-  };
-  if (field.type_letter == 'I') {
-    return pick(Scalar::kInt8, Scalar::kInt16, Scalar::kInt32, Scalar::kInt64);
-  }
-  if (field.type_letter == 'U') {
-    return pick(Scalar::kUint8, Scalar::kUint16, Scalar::kUint32, Scalar::kUint64);
-  }
-  if (field.size < 4) reader.fail_on_line("expected SIZE 4 or 8 for field " + field.name);
-  return field.size == 4 ? Scalar::kFloat : Scalar::kDouble;
-}
-
 void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& header) {
   if (!header.fields.empty()) reader.fail_on_line("expected FIELDS once");
   for (const std::string_view name : text::tokens(line)) {
@@ -86,25 +72,25 @@ void parse_fields(const ByteReader& reader, std::string_view line, PcdHeader& he
   if (header.fields.empty()) reader.fail_on_line("expected the names of the fields");
 }
 
-void parse_size(const ByteReader& reader, Field& field, std::string_view token) {
-  if (token != "1" && token != "2" && token != "4" && token != "8") {
-    reader.fail_on_line("expected SIZE 1, 2, 4 or 8 for field " + field.name);
+/// SIZE, TYPE or COUNT of a field.
+void parse_property(const ByteReader& reader, std::string_view keyword, std::string_view token,
+                    Field& field) {
+  const std::string of_field = " for field " + field.name;
+  if (keyword == "COUNT") {
+    const std::string what = "a COUNT from 0 to 65536" + of_field;
+    const std::uint64_t count = reader.whole_number(token, what);
+    if (count > 1U << 16U) reader.fail_on_line("expected " + what);
+    field.count = static_cast<std::size_t>(count);
+    return;
   }
-  field.size = static_cast<std::size_t>(token.front() - '0');
-}
-
-void parse_type(const ByteReader& reader, Field& field, std::string_view token) {
-  if (token != "I" && token != "U" && token != "F") {
-    reader.fail_on_line("expected TYPE I, U or F for field " + field.name);
+  const bool is_size = keyword == "SIZE";
+  const std::string_view known = is_size ? "1248" : "IUF";
+  if (token.size() != 1 || known.find(token.front()) == std::string_view::npos) {
+    reader.fail_on_line((is_size ? "expected SIZE 1, 2, 4 or 8" : "expected TYPE I, U or F") +
+                        of_field);
   }
-  field.type_letter = token.front();
-}
-
-void parse_count(const ByteReader& reader, Field& field, std::string_view token) {
-  const std::string what = "a COUNT from 0 to 65536 for field " + field.name;
-  const std::uint64_t count = reader.whole_number(token, what);
-  if (count > 1U << 16U) reader.fail_on_line("expected " + what);
-  field.count = static_cast<std::size_t>(count);
+  if (is_size) field.size = static_cast<std::size_t>(token.front() - '0');
+  if (!is_size) field.kind = static_cast<char>(token.front() - 'A' + 'a');
 }
 
 /// The line of a property that each field has.
@@ -116,8 +102,9 @@ void parse_properties(const ByteReader& reader, std::string_view keyword, std::s
     reader.fail_on_line("expected " + std::to_string(header.fields.size()) +
                         " values, one for each field");
   }
-  const auto parse = keyword == "SIZE" ? parse_size : keyword == "TYPE" ? parse_type : parse_count;
-  for (std::size_t i = 0; i < tokens.size(); ++i) parse(reader, header.fields[i], tokens[i]);
+  for (std::size_t i = 0; i < tokens.size(); ++i) {
+    parse_property(reader, keyword, tokens[i], header.fields[i]);
+  }
 }
 
 void parse_header_line(const ByteReader& reader, std::string_view keyword, std::string_view line,
@@ -147,8 +134,10 @@ void parse_header_line(const ByteReader& reader, std::string_view keyword, std::
 void finish_header(const ByteReader& reader, PcdHeader& header, PointSink& sink) {
   for (Field& field : header.fields) {
     if (field.size == 0) reader.fail_on_line("expected SIZE before DATA");
-    if (field.type_letter == 0) reader.fail_on_line("expected TYPE before DATA");
-    field.type = scalar_of(reader, field);
+    if (field.kind == 0) reader.fail_on_line("expected TYPE before DATA");
+    const std::optional<Scalar> type = scalar_of(field.kind, field.size);
+    if (!type) reader.fail_on_line("expected SIZE 4 or 8 for field " + field.name);
+    field.type = *type;
     const Role role = field.count == 1 ? role_of(field.name) : Role::kNone;
     if (role != Role::kNone && sink.claim(role)) field.role = role;
   }
@@ -191,13 +180,6 @@ void store(const ByteReader& reader, const Field& field, std::size_t i, const ch
   }
   reader.fail_here("expected a whole number that " + field.name + " can have, at point " +
                    std::to_string(i));
-}
-
-void check_size(const ByteReader& reader, const PcdHeader& header) {
-  std::uint64_t values = 0;
-  for (const Field& field : header.fields) values += field.count;
-  const bool is_text = header.encoding == PcdEncoding::kAscii;
-  reader.check_room(header.points, "points", is_text ? 2 * values : header.record_bytes(), is_text);
 }
 
 struct BlockSizes {
@@ -340,9 +322,11 @@ std::uint64_t read_pcd(const std::filesystem::path& path, PointSink& sink, bool 
     }
     return header.points;
   }
-  check_size(reader, header);
-  if (with_points && header.encoding == PcdEncoding::kAscii) read_ascii(reader, header, sink);
-  if (with_points && header.encoding == PcdEncoding::kBinary) read_binary(reader, header, sink);
+  const bool is_text = header.encoding == PcdEncoding::kAscii;
+  std::uint64_t values = 0;
+  for (const Field& field : header.fields) values += field.count;
+  reader.check_room(header.points, "points", is_text ? 2 * values : header.record_bytes(), is_text);
+  if (with_points) is_text ? read_ascii(reader, header, sink) : read_binary(reader, header, sink);
   return header.points;
 }
 
