@@ -72,8 +72,9 @@ class ChunkedLog : public LogFile {
 
   /// Bytes of the record at `position` of the file; nothing if the file ends before its end.
   virtual std::optional<std::uint64_t> record_size(std::uint64_t position) = 0;
-  /// Reads a record of the file for the index. False at the end of the records.
-  virtual bool take_record(std::uint64_t position, std::uint64_t size) = 0;
+  /// Reads a record of the file for the index. False at the end of the records. `head`: its first
+  /// bytes, at most kMaxHead, which are all fields before its data: names are short.
+  virtual bool take_record(std::uint64_t position, std::uint64_t size, Bytes head) = 0;
   /// Takes the next record out of a block of records. Gives the message, if it is one; adds the
   /// channel, if it defines one.
   virtual std::optional<Message> parse_record(Bytes& records) = 0;
@@ -91,7 +92,8 @@ class ChunkedLog : public LogFile {
     while (goes_on && position < file_.size()) {
       const std::optional<std::uint64_t> size = record_size(position);
       if (!size) break;
-      goes_on = take_record(position, *size);
+      const FilePart head(file_, position, std::min(*size, kMaxHead), "a record");
+      goes_on = take_record(position, *size, head.fields);
       position += *size;
     }
     if (!is_complete() || (goes_on && position < file_.size())) {
@@ -140,8 +142,7 @@ class ChunkedLog : public LogFile {
   }
   void add_channel(std::uint32_t id, LogTopic channel) { channels_[id] = std::move(channel); }
 
-  /// Bytes from which the fields before the data of a record are read: names are short.
-  static constexpr std::uint64_t kMaxHead = 4096;
+  static constexpr std::uint64_t kMaxHead = 4096;  ///< bytes
 
   ByteReader file_;
 

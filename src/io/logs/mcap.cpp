@@ -76,45 +76,37 @@ class McapFile final : public ChunkedLog {
     return kRecordHead + size;
   }
 
-  bool take_record(std::uint64_t position, std::uint64_t size) override {
-    FilePart head(file_, position, std::min(size, kMaxHead), "a record");
-    Bytes& fields = head.fields;
-    const auto opcode = fields.number<std::uint8_t>("an opcode");
+  bool take_record(std::uint64_t position, std::uint64_t size, Bytes head) override {
+    const auto opcode = head.number<std::uint8_t>("an opcode");
+    head.skip(kRecordHead - 1, "a length");
+    const bool is_definition = opcode == mcap::kSchema || opcode == mcap::kChannel;
+    const bool is_whole = is_definition || opcode == mcap::kMessageIndex || opcode == mcap::kHeader;
+    std::optional<FilePart> record;
+    if (is_whole) record.emplace(file_, position, size, "a record");
+    if (is_whole) record->fields.skip(kRecordHead, "a record");
     if (opcode == mcap::kMessageIndex) {
-      take_message_index(position, size);
+      take_message_index(record->fields);
       return true;
     }
     finish_chunk();
-    if (opcode == mcap::kChunk) take_chunk(position, size);
+    if (opcode == mcap::kChunk) take_chunk(position, head);
     if (opcode == mcap::kMessage) {
-      fields.skip(8, "a length");
-      const auto channel = fields.number<std::uint16_t>("a channel id");
-      fields.skip(4, "a sequence number");
-      add_message(channel, fields.number<std::uint64_t>("a log time"), position);
+      const auto channel = head.number<std::uint16_t>("a channel id");
+      head.skip(4, "a sequence number");
+      add_message(channel, head.number<std::uint64_t>("a log time"), position);
     }
-    if (opcode == mcap::kSchema || opcode == mcap::kChannel) {
-      FilePart record(file_, position, size, "a record");
-      parse_record(record.fields);
-    }
+    if (is_definition) take_definition(opcode, record->fields);
     if (opcode == mcap::kAttachment || opcode == mcap::kMetadata || opcode >= 0x80) {
       others_.push_back(position);
     }
-    if (opcode == mcap::kHeader) take_header(position, size);
+    if (opcode == mcap::kHeader) profile_ = record->fields.string("a profile");
     has_footer_ = opcode == mcap::kFooter;
     return !has_footer_;
   }
 
-  void take_header(std::uint64_t position, std::uint64_t size) {
-    FilePart record(file_, position, size, "a header");
-    record.fields.skip(kRecordHead, "a record");
-    profile_ = record.fields.string("a profile");
-  }
-
-  void take_chunk(std::uint64_t position, std::uint64_t size) {
-    FilePart head(file_, position, std::min(size, kMaxHead), "a chunk");
-    Bytes& fields = head.fields;
+  void take_chunk(std::uint64_t position, Bytes& fields) {
     Chunk chunk;
-    fields.skip(kRecordHead + 16, "the times of a chunk");
+    fields.skip(16, "the times of a chunk");
     chunk.uncompressed_size = fields.number<std::uint64_t>("the size of a chunk");
     chunk.uncompressed_crc = fields.number<std::uint32_t>("the checksum of a chunk");
     chunk.compression = fields.string("the compression of a chunk");
@@ -123,10 +115,7 @@ class McapFile final : public ChunkedLog {
     add_chunk(position, std::move(chunk));
   }
 
-  void take_message_index(std::uint64_t position, std::uint64_t size) {
-    FilePart record(file_, position, size, "a message index");
-    Bytes& fields = record.fields;
-    fields.skip(kRecordHead, "a record");
+  void take_message_index(Bytes& fields) {
     const auto channel = fields.number<std::uint16_t>("a channel id");
     Bytes pairs =
         fields.block(fields.number<std::uint32_t>("the length of an index"), "a message index");

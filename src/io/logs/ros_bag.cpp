@@ -83,11 +83,8 @@ class RosBag final : public ChunkedLog {
     return size;
   }
 
-  bool take_record(std::uint64_t position, std::uint64_t size) override {
-    // The data of a chunk are not read here.
-    FilePart head(file_, position, std::min(size, kMaxHead), "a record");
-    Bytes& rest = head.fields;
-    const Bytes header = next_header(rest);
+  bool take_record(std::uint64_t position, std::uint64_t size, Bytes head) override {
+    const Bytes header = next_header(head);
     const auto opcode = number_in<std::uint8_t>(header, "op");
     if (opcode == bag::kIndexData) {
       take_index(position, size);
@@ -95,7 +92,7 @@ class RosBag final : public ChunkedLog {
     }
     finish_chunk();
     if (opcode == bag::kBagHeader) take_bag_header(position, header);
-    if (opcode == bag::kChunk) take_chunk(position, header, rest);
+    if (opcode == bag::kChunk) take_chunk(position, header, head);
     if (opcode == bag::kChunkInfo) ++chunk_infos_;
     if (opcode == bag::kMessageData) {
       Bytes time = field_of(header, "time");

@@ -1,5 +1,6 @@
 #include "dynains/io/point_file.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -7,9 +8,11 @@
 #include <type_traits>
 #include <utility>
 
+#include "../byte_reader.hpp"
 #include "../failure.hpp"
 #include "../scalar.hpp"
 #include "../text.hpp"
+#include "point_file_copy.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {
@@ -201,6 +204,45 @@ PointFileHeader read_point_file_header(const fs::path& path) {
   PointSink sink;
   const std::uint64_t count = format_to_read(path).read(path, sink, false);
   return {sink.file().viewpoint, sink.columns(), count};
+}
+
+void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+                 std::ostream& target) {
+  const std::string extension = extension_in_lower_case(path);
+  if (extension == ".ply") return copy_ply(path, keep, target);
+  if (extension == ".pcd") return copy_pcd(path, keep, target);
+  if (extension != ".bin") fail(path, "expected a name that ends in .ply, .pcd or .bin");
+  ByteReader reader(path);
+  const std::uint64_t points = std::max<std::uint64_t>(keep.size(), 1);
+  copy_records(reader, static_cast<std::size_t>(reader.remaining() / points), "a point", keep,
+               target);
+}
+
+void copy_lines(const std::filesystem::path& path, std::uint64_t size, std::ostream& target,
+                const std::function<std::string(const std::string&)>& edit) {
+  ByteReader reader(path);
+  std::string line;
+  while (reader.position() < size && reader.read_line(line)) target << edit(line) << '\n';
+}
+
+void copy_records(ByteReader& reader, std::size_t size, const char* record,
+                  Span<const std::uint8_t> keep, std::ostream& target) {
+  std::string bytes(size, '\0');
+  for (const std::uint8_t is_kept : keep) {
+    if (size > 0) {
+      reader.read(bytes.data(), size, record);
+    } else if (!reader.read_line(bytes)) {
+      reader.fail_on_line(std::string("file ends, expected ") + record);
+    }
+    if (is_kept == 0) continue;
+    target << bytes;
+    if (size == 0) target << '\n';
+  }
+}
+
+std::size_t kept_count(Span<const std::uint8_t> keep) {
+  return static_cast<std::size_t>(
+      std::count_if(keep.begin(), keep.end(), [](auto value) { return value != 0; }));
 }
 
 }  // namespace dynains
