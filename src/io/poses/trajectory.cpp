@@ -22,21 +22,22 @@ constexpr const char* kExpectedColumns =
     "expected 12 numbers (KITTI), 8 (TUM: time x y z qx qy qz qw), 7, 13 or 16 numbers, or a first "
     "line that names the columns time x y z qx qy qz qw";
 
+/// What a column holds; axes follow each other. kMatrix is the first of 12 or 16 numbers.
+enum Meaning : std::size_t { kTime, kNanoseconds, kMatrix, kX, kQx = kX + 3, kMeanings = kQx + 4 };
+
 /// Positions of the values in a row.
 struct Columns {
-  std::size_t count = 0;
-  std::size_t time = kNoColumn;
-  std::size_t nanoseconds = kNoColumn;  ///< beside seconds
-  std::size_t matrix = kNoColumn;       ///< first of 12 or 16 numbers
-  std::array<std::size_t, 3> position{kNoColumn, kNoColumn, kNoColumn};
-  std::array<std::size_t, 4> rotation{kNoColumn, kNoColumn, kNoColumn, kNoColumn};  ///< x y z w
-  QuaternionOrder order = QuaternionOrder::kNone;
+  Columns() { of.fill(kNoColumn); }
 
-  bool complete() const {
-    const auto known = [](std::size_t column) { return column != kNoColumn; };
-    return std::all_of(position.begin(), position.end(), known) &&
-           std::all_of(rotation.begin(), rotation.end(), known);
+  /// The first of two columns with one meaning counts.
+  void claim(std::size_t meaning, std::size_t column) {
+    if (of[meaning] == kNoColumn) of[meaning] = column;
   }
+  bool complete() const { return std::find(of.begin() + kX, of.end(), kNoColumn) == of.end(); }
+
+  std::size_t count = 0;
+  std::array<std::size_t, kMeanings> of{};  ///< by meaning; nanoseconds are beside seconds
+  QuaternionOrder order = QuaternionOrder::kNone;
 };
 
 /// Cells of a line; empty cells count if commas or semicolons separate them.
@@ -60,18 +61,16 @@ bool contains(const std::string& text, const char* part) {
   return text.find(part) != std::string::npos;
 }
 
-/// Sets the meaning of a named column; the first of two columns with one meaning counts.
+/// Sets the meaning of a named column.
 void add_column(const std::string& cell, std::size_t index, Columns& columns) {
   const std::string name = text::lower_case(cell);
   if (name.empty()) return;
-  const auto claim = [index](std::size_t& column) {
-    if (column == kNoColumn) column = index;
-  };
-  if (name == "nsec" || name == "nanosec" || name == "nsecs") return claim(columns.nanoseconds);
+  if (name == "nsec" || name == "nanosec" || name == "nsecs") {
+    return columns.claim(kNanoseconds, index);
+  }
   if (name == "t" || contains(name, "time") || contains(name, "stamp") || name == "sec" ||
       name == "secs") {
-    claim(columns.time);
-    return;
+    return columns.claim(kTime, index);
   }
   const std::size_t axis = std::string_view("xyzw").find(name.back());
   if (axis == std::string_view::npos) return;
@@ -81,9 +80,9 @@ void add_column(const std::string& cell, std::size_t index, Columns& columns) {
   const bool is_position =
       stem.empty() || stem == "t" || stem.front() == 'p' || contains(stem, "trans") || stem == "t_";
   if (is_rotation) {
-    claim(columns.rotation[axis]);
+    columns.claim(kQx + axis, index);
   } else if (is_position && axis < 3) {
-    claim(columns.position[axis]);
+    columns.claim(kX + axis, index);
   }
 }
 
@@ -94,23 +93,18 @@ Columns columns_of_header(std::string_view line) {
   for (std::size_t i = 0; i < cells.size(); ++i) add_column(cells[i], i, columns);
   columns.count = cells.size();
   columns.order =
-      columns.rotation[3] < columns.rotation[0] ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+      columns.of[kQx + 3] < columns.of[kQx] ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
   return columns;
 }
 
 Columns columns_of_count(const ByteReader& reader, std::size_t count) {
   Columns columns;
   columns.count = count;
-  if (count == 12 || count == 16) {
-    columns.matrix = 0;
-  } else if (count == 13) {
-    columns.time = 0;
-    columns.matrix = 1;
+  if (count == 8 || count == 13) columns.of[kTime] = 0;
+  if (count == 12 || count == 13 || count == 16) {
+    columns.of[kMatrix] = count == 13 ? 1 : 0;
   } else if (count == 7 || count == 8) {
-    const std::size_t first = count - 7;
-    if (first == 1) columns.time = 0;
-    for (std::size_t i = 0; i < 3; ++i) columns.position[i] = first + i;
-    for (std::size_t i = 0; i < 4; ++i) columns.rotation[i] = first + 3 + i;
+    for (std::size_t i = 0; i < 7; ++i) columns.of[kX + i] = count - 7 + i;
     columns.order = QuaternionOrder::kXyzw;
   } else {
     reader.fail_on_line(std::string(kExpectedColumns) + "; found " + std::to_string(count) +
@@ -129,53 +123,41 @@ double number_in(const ByteReader& reader, const std::vector<std::string>& cells
   return *value;
 }
 
-Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
-             const Columns& columns) {
-  if (columns.matrix != kNoColumn) {
-    std::array<double, 12> rows{};
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      rows[i] = number_in(reader, cells, columns.matrix + i);
-    }
-    const std::optional<Pose> pose = nearest_rigid(rows.data());
-    if (!pose) {
-      reader.fail_on_line(
-          "expected a rigid transform (columns 1-3 of the matrix are a rotation that does not "
-          "mirror)");
-    }
-    return *pose;
-  }
-  std::array<double, 4> q{};
-  for (std::size_t i = 0; i < 4; ++i) q[i] = number_in(reader, cells, columns.rotation[i]);
-  const detail::Quaternion rotation(q[3], q[0], q[1], q[2]);
-  Eigen::Vector3d position;
-  for (std::size_t i = 0; i < 3; ++i) {
-    position[static_cast<Eigen::Index>(i)] = number_in(reader, cells, columns.position[i]);
-  }
-  const auto pose = rigid_pose(position, rotation);
-  if (!pose) {
-    reader.fail_on_line("expected a quaternion of length 1, found one of length " +
-                        std::to_string(rotation.norm()));
-  }
-  return *pose;
+/// `count` numbers from a column on.
+std::vector<double> numbers_in(const ByteReader& reader, const std::vector<std::string>& cells,
+                               std::size_t first, std::size_t count) {
+  std::vector<double> numbers(count);
+  for (std::size_t i = 0; i < count; ++i) numbers[i] = number_in(reader, cells, first + i);
+  return numbers;
 }
 
-/// The numbers of the last line, all finite, exactly as many as `kCount`.
-template <std::size_t kCount>
-std::array<double, kCount> parse_row(const ByteReader& reader, std::string_view line) {
-  const std::string expected = "expected " + std::to_string(kCount) +
-                               (kCount == 1 ? " finite number" : " finite numbers") + ", ";
-  std::array<double, kCount> values{};
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const std::string_view token = text::next_token(line);
-    if (token.empty()) reader.fail_on_line(expected + "found " + std::to_string(i));
-    const std::optional<double> value = text::parse_number(token);
-    if (!value || !std::isfinite(*value)) {
-      reader.fail_on_line(expected + "found \"" + std::string(token.substr(0, 40)) + "\"");
-    }
-    values[i] = *value;
+/// The numbers of the last line, exactly `count`.
+std::vector<double> parse_row(const ByteReader& reader, std::string_view line, std::size_t count) {
+  const std::vector<std::string_view> tokens = text::tokens(line);
+  if (tokens.size() != count) {
+    reader.fail_on_line("expected " + std::to_string(count) +
+                        (count == 1 ? " finite number" : " finite numbers") + ", found " +
+                        std::to_string(tokens.size()));
   }
-  if (!text::next_token(line).empty()) reader.fail_on_line(expected + "found more");
-  return values;
+  return numbers_in(reader, {tokens.begin(), tokens.end()}, 0, count);
+}
+
+Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
+             const Columns& columns) {
+  if (columns.of[kMatrix] != kNoColumn) {
+    const auto pose = nearest_rigid(numbers_in(reader, cells, columns.of[kMatrix], 12).data());
+    if (pose) return *pose;
+    reader.fail_on_line(
+        "expected a rigid transform (columns 1-3 of the matrix are a rotation that does not "
+        "mirror)");
+  }
+  std::array<double, 7> v{};
+  for (std::size_t i = 0; i < 7; ++i) v[i] = number_in(reader, cells, columns.of[kX + i]);
+  const detail::Quaternion rotation(v[6], v[3], v[4], v[5]);
+  const auto pose = rigid_pose({v[0], v[1], v[2]}, rotation);
+  if (pose) return *pose;
+  reader.fail_on_line("expected a quaternion of length 1, found one of length " +
+                      std::to_string(rotation.norm()));
 }
 
 }  // namespace
@@ -213,7 +195,7 @@ std::vector<double> read_kitti_times(const std::filesystem::path& path) {
     if (has_blank && !is_blank) reader.fail_on_line("expected no row behind a blank line");
     has_blank = is_blank;
     if (is_blank) continue;
-    const double time = parse_row<1>(reader, line)[0];
+    const double time = parse_row(reader, line, 1)[0];
     if (!times.empty() && !(time > times.back())) {
       reader.fail_on_line("expected a time after that of the row before");
     }
@@ -227,7 +209,7 @@ Pose read_kitti_calib(const std::filesystem::path& path) {
   for (std::string text; reader.read_line(text);) {
     std::string_view line = text;
     if (text::next_token(line) != "Tr:") continue;
-    const std::optional<Pose> pose = nearest_rigid(parse_row<12>(reader, line).data());
+    const std::optional<Pose> pose = nearest_rigid(parse_row(reader, line, 12).data());
     if (pose) return *pose;
     reader.fail_on_line(
         "expected a rigid transform (columns 1-3 of the 3x4 matrix are a rotation)");
@@ -272,10 +254,10 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
                           " columns as before, found " + std::to_string(cells.size()));
     }
     trajectory.poses.push_back(pose_of(reader, cells, columns));
-    if (columns.time == kNoColumn) continue;
-    double time = to_seconds(number_in(reader, cells, columns.time));
-    if (columns.nanoseconds != kNoColumn) {
-      time += 1e-9 * number_in(reader, cells, columns.nanoseconds);
+    if (columns.of[kTime] == kNoColumn) continue;
+    double time = to_seconds(number_in(reader, cells, columns.of[kTime]));
+    if (columns.of[kNanoseconds] != kNoColumn) {
+      time += 1e-9 * number_in(reader, cells, columns.of[kNanoseconds]);
     }
     if (!trajectory.times.empty() && !(time > trajectory.times.back())) {
       reader.fail_on_line("expected a time after that of the row before");
