@@ -39,7 +39,7 @@ Folder::Folder(const Folder& parent, const std::string& name)
                            O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)) {
   if (descriptor_ >= 0) return;
   if (errno == ELOOP || errno == ENOTDIR) {
-    throw IoError(path_.string() + ": is a link or a file; expected a folder or nothing there");
+    fail(path_, "is a link or a file; expected a folder or nothing there");
   }
   fail_by_system(path_, "cannot be opened", errno);
 }
@@ -118,8 +118,7 @@ void Folder::check_replaceable(const std::string& name) const {
       (status.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0;
   if (is_of_others || is_protected) fail_by_system(path_ / name, "cannot be replaced", EPERM);
   if ((status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0) {
-    throw IoError((path_ / name).string() +
-                  ": is mounted and cannot be replaced; choose a folder in it");
+    fail(path_ / name, "is mounted and cannot be replaced; choose a folder in it");
   }
 }
 

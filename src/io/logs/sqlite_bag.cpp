@@ -12,6 +12,7 @@
 
 #include "../byte_reader.hpp"
 #include "../failure.hpp"
+#include "../scalar.hpp"
 #include "log_file.hpp"
 #include "message_writer.hpp"
 
@@ -65,14 +66,10 @@ bool is_shorter_than_announced(const std::filesystem::path& path) {
   constexpr std::uint64_t kHeader = 100;  // bytes
   ByteReader file(path);
   if (file.size() < kHeader) return false;
-  const auto header = file.read_at(0, kHeader, "a header");
-  const auto big_endian = [&](std::size_t at, std::size_t size) {
-    std::uint64_t value = 0;
-    for (std::size_t i = at; i < at + size; ++i) value = value << 8U | header[i];
-    return value;
-  };
-  const std::uint64_t page_size = big_endian(16, 2);
-  const std::uint64_t pages = big_endian(28, 4);
+  const std::string header = file.read_block(kHeader, "a header");
+  const auto page_size =
+      static_cast<std::uint64_t>(load_scalar(Scalar::kUint16, &header[16], true));
+  const auto pages = static_cast<std::uint64_t>(load_scalar(Scalar::kUint32, &header[28], true));
   return pages * (page_size == 1 ? 65536 : page_size) > file.size();
 }
 

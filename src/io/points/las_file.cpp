@@ -68,25 +68,8 @@ struct LasHeader {
   std::vector<LasColumn> columns;
 };
 
-std::uint64_t read_count(ByteReader& file, std::uint8_t minor, std::uint32_t legacy_count) {
-  if (minor < 4) return legacy_count;
-  return FilePart(file, las::kSizes.before_count, 8, "the number of points")
-      .fields.number<std::uint64_t>("the number of points");
-}
-
 void add_column(PointSink& sink, LasHeader& header, LasColumn column) {
   if (sink.claim(column.role)) header.columns.push_back(column);
-}
-
-/// Columns of a point format, without those of extra bytes.
-void add_fixed_columns(PointSink& sink, LasHeader& header, const las::PointFormat& format) {
-  add_column(sink, header, {Role::kX, 0, Scalar::kInt32});
-  add_column(sink, header, {Role::kY, 4, Scalar::kInt32});
-  add_column(sink, header, {Role::kZ, 8, Scalar::kInt32});
-  add_column(sink, header, {Role::kIntensity, 12, Scalar::kUint16});
-  if (format.gps_offset != 0) {
-    add_column(sink, header, {Role::kTime, format.gps_offset, Scalar::kDouble});
-  }
 }
 
 /// Columns of extra bytes whose names are those of a ring or a label.
@@ -117,7 +100,16 @@ void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
   }
 }
 
-void read_vlrs(ByteReader& file, PointSink& sink, LasHeader& header) {
+/// Columns of a point format and of extra bytes.
+void read_columns(ByteReader& file, PointSink& sink, LasHeader& header,
+                  const las::PointFormat& format) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    add_column(sink, header, {kUsualRoles[axis], 4 * axis, Scalar::kInt32});
+  }
+  add_column(sink, header, {Role::kIntensity, 12, Scalar::kUint16});
+  if (format.gps_offset != 0) {
+    add_column(sink, header, {Role::kTime, format.gps_offset, Scalar::kDouble});
+  }
   std::uint64_t position = header.vlr_begin;
   for (std::uint32_t i = 0; i < header.vlr_count; ++i) {
     FilePart head(file, position, las::kSizes.record_header, "a variable length record");
@@ -176,19 +168,13 @@ LasHeader read_header(ByteReader& file, PointSink& sink) {
   fields.skip(20, "the numbers of points by return");
   for (double& scale : header.scale) scale = fields.number<double>("a scale");
   for (double& offset : header.offset) offset = fields.number<double>("an offset");
-  header.point_count = read_count(file, minor, legacy_count);
-  add_fixed_columns(sink, header, las::kPointFormats[format]);
-  read_vlrs(file, sink, header);
+  header.point_count = legacy_count;
+  if (minor >= 4) {
+    FilePart count(file, las::kSizes.before_count, 8, "the number of points");
+    header.point_count = count.fields.number<std::uint64_t>("the number of points");
+  }
+  read_columns(file, sink, header, las::kPointFormats[format]);
   return header;
-}
-
-void check_size(const ByteReader& file, const LasHeader& header) {
-  const std::uint64_t available = file.size() - std::min(file.size(), header.points_begin);
-  if (header.point_count <= available / header.point_size) return;
-  fail_at_byte(file.path(), header.points_begin,
-               "expected " + std::to_string(header.point_count) + " points of " +
-                   std::to_string(header.point_size) + " bytes, the file has " +
-                   std::to_string(available) + " bytes left");
 }
 
 std::string extra_description(const char* name, Scalar type, const char* description) {
@@ -232,7 +218,13 @@ std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool 
   constexpr std::uint64_t kBlock = 1U << 14U;  // points
   ByteReader file(path);
   const LasHeader header = read_header(file, sink);
-  check_size(file, header);
+  const std::uint64_t available = file.size() - std::min(file.size(), header.points_begin);
+  if (header.point_count > available / header.point_size) {
+    fail_at_byte(path, header.points_begin,
+                 "expected " + std::to_string(header.point_count) + " points of " +
+                     std::to_string(header.point_size) + " bytes, the file has " +
+                     std::to_string(available) + " bytes left");
+  }
   if (!with_points) return header.point_count;
   sink.resize(static_cast<std::size_t>(header.point_count));
   std::vector<std::uint8_t> block;

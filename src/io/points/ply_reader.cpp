@@ -94,14 +94,6 @@ Element parse_element(const ByteReader& reader, std::string_view line) {
   return element;
 }
 
-void add_property(Property property, Element& element, PointSink& sink) {
-  if (element.is_vertex && !property.is_list) {
-    const Role role = role_of(property.name);
-    if (role != Role::kNone && sink.claim(role)) property.role = role;
-  }
-  element.properties.push_back(std::move(property));
-}
-
 PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::string line;
   if (!reader.read_line(line) || line != "ply") {
@@ -125,7 +117,12 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
     } else if (keyword == "property") {
       if (header.elements.empty()) reader.fail_on_line("expected an element before a property");
       Property property = parse_property(reader, rest);
-      if (!is_past) add_property(std::move(property), header.elements.back(), sink);
+      Element& element = header.elements.back();
+      if (is_past) continue;
+      const bool is_value = element.is_vertex && !property.is_list;
+      const Role role = is_value ? role_of(property.name) : Role::kNone;
+      if (role != Role::kNone && sink.claim(role)) property.role = role;
+      element.properties.push_back(std::move(property));
     } else {
       reader.fail_on_line("expected element, property, comment or end_header, found \"" +
                           std::string(keyword.substr(0, 40)) + "\"");

@@ -29,45 +29,29 @@ std::vector<double> times_with_return(const RecordedScan& scan) {
   return times;
 }
 
-/// Ratio of neighbours in `times` that are more than a tenth of `span` apart: 0.8 if times are
-/// random.
-double share_of_leaps(const std::vector<double>& times, double span) {
-  std::size_t leaps = 0;
-  for (std::size_t k = 1; k < times.size(); ++k) {
-    leaps += std::abs(times[k] - times[k - 1]) > 0.1 * span ? 1 : 0;
-  }
-  return times.size() < 2 ? 0.0
-                          : static_cast<double>(leaps) / static_cast<double>(times.size() - 1);
-}
-
 struct DirectedTime {
   float azimuth;  // rad
   double time;
 };
 
-/// The points with a return, by azimuth.
-std::vector<DirectedTime> times_by_direction(const RecordedScan& scan) {
+/// The finite times of the points with a return, in the order of the points.
+std::vector<DirectedTime> directed_times(const RecordedScan& scan) {
   std::vector<DirectedTime> times;
   for (std::size_t k = 0; k < scan.time.size(); ++k) {
     const float* const xyz = scan.xyzi.data() + 4 * k;
     if (!std::isfinite(scan.time[k]) || !is_measured(xyz)) continue;
     times.push_back({std::atan2(xyz[1], xyz[0]), scan.time[k]});
   }
-  std::sort(times.begin(), times.end(),
-            [](const DirectedTime& a, const DirectedTime& b) { return a.azimuth < b.azimuth; });
   return times;
 }
 
-/// Whether times follow neither the order of the points, as in files of drivers, nor their azimuth,
-/// as those of a spinning sensor do in any order.
-bool are_random(const std::vector<double>& times, const std::vector<DirectedTime>& by_direction,
-                double span) {
-  constexpr double kMaxLeaps = 0.5;
-  if (by_direction.size() < 100 || !(share_of_leaps(times, span) > kMaxLeaps)) return false;
-  std::vector<double> directed;
-  directed.reserve(by_direction.size());
-  for (const DirectedTime& one : by_direction) directed.push_back(one.time);
-  return share_of_leaps(directed, span) > kMaxLeaps;
+/// Whether most neighbours are more than a tenth of `span` apart: 0.8 of them if times are random.
+bool do_leap(const std::vector<DirectedTime>& times, double span) {
+  std::size_t leaps = 0;
+  for (std::size_t k = 1; k < times.size(); ++k) {
+    leaps += std::abs(times[k].time - times[k - 1].time) > 0.1 * span ? 1 : 0;
+  }
+  return times.size() >= 100 && 2 * leaps > times.size() - 1;
 }
 
 /// Whether no sector of 30 deg is empty.
@@ -101,12 +85,15 @@ class PointClockSearch {
   void add(const RecordedScan& scan) {
     Sample sample{times_with_return(scan)};
     if (sample.times.empty()) return;
-    const std::vector<double> in_order = sample.times;
     std::sort(sample.times.begin(), sample.times.end());
-    const std::vector<DirectedTime> by_direction = times_by_direction(scan);
-    sample.is_all_around = are_all_around(by_direction);
-    sample.is_random =
-        are_random(in_order, by_direction, sample.quantile(0.95) - sample.quantile(0.05));
+    const double span = sample.quantile(0.95) - sample.quantile(0.05);
+    std::vector<DirectedTime> times = directed_times(scan);
+    const bool do_points_leap = do_leap(times, span);
+    std::sort(times.begin(), times.end(),
+              [](const DirectedTime& a, const DirectedTime& b) { return a.azimuth < b.azimuth; });
+    // Times follow the order of the points in files of drivers, the azimuth for a spinning sensor.
+    sample.is_random = do_points_leap && do_leap(times, span);
+    sample.is_all_around = are_all_around(times);
     points_ += sample.times.size();
     samples_.push_back(std::move(sample));
   }

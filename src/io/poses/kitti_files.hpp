@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -17,9 +16,6 @@ inline constexpr double kKittiPeriod = 0.1;  // s, the 10 Hz of KITTI
 std::vector<double> read_kitti_times(const std::filesystem::path& path);
 /// `Tr`, from the sensor to the frame of the poses.
 Pose read_kitti_calib(const std::filesystem::path& path);
-
-/// Throws IoError if `rows` < `needed`.
-void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed);
 
 /// The rigid transform of a position (m) and a quaternion of length 1, which may be off by 1 %;
 /// nothing unless they are finite.

@@ -139,6 +139,29 @@ void read_calibration(RecordingContents& r, const fs::path& poses_file) {
   }
 }
 
+/// The row of each scan in a file: by order if there are equally many, else by the number of the
+/// scan. `other`: what else is expected.
+std::vector<std::size_t> rows_of_scans(const RecordingContents& r, const fs::path& file,
+                                       std::size_t rows, const std::string& other) {
+  const std::size_t scans = r.scans.size();
+  if (rows != scans && !r.is_numbered) {
+    fail_at_line(file, std::min(rows, scans) + 1,
+                 "expected a row for each of " + std::to_string(scans) + " scans" + other +
+                     " found " + std::to_string(rows));
+  }
+  const std::size_t needed = rows == scans ? 0 : r.scans.back().number + 1;
+  if (rows < needed) {
+    fail_at_line(file, rows + 1,
+                 "expected a row for each scan, at least " + std::to_string(needed) + ", found " +
+                     std::to_string(rows));
+  }
+  std::vector<std::size_t> result;
+  for (const ScanEntry& scan : r.scans) {
+    result.push_back(rows == scans ? result.size() : static_cast<std::size_t>(scan.number));
+  }
+  return result;
+}
+
 std::optional<std::vector<double>> times_of_names(const RecordingContents& r) {
   std::vector<std::string> names;
   for (const ScanEntry& scan : r.scans) names.push_back(scan.name);
@@ -162,14 +185,8 @@ std::optional<std::vector<double>> find_times(RecordingContents& r, const fs::pa
                       " rows for " + std::to_string(r.scans.size()) + " scans");
     return times_of_names(r);
   }
-  if (!r.is_numbered) {
-    fail_at_line(file, std::min(rows.size(), r.scans.size()) + 1,
-                 "expected a row for each of " + std::to_string(r.scans.size()) + " scans, found " +
-                     std::to_string(rows.size()));
-  }
-  check_rows(file, rows.size(), r.scans.back().number + 1);
   std::vector<double> times;
-  for (const ScanEntry& scan : r.scans) times.push_back(rows[scan.number]);
+  for (const std::size_t row : rows_of_scans(r, file, rows.size(), ",")) times.push_back(rows[row]);
   return times;
 }
 
@@ -185,18 +202,9 @@ void take_times(RecordingContents& r, const std::optional<std::vector<double>>& 
   }
 }
 
-/// Matches rows to scans by order if there are equally many, else by the number of the scan.
 void match_rows(RecordingContents& r, const fs::path& file) {
   const std::size_t rows = r.trajectory.poses.size();
-  const bool by_order = rows == r.scans.size();
-  if (!by_order && !r.is_numbered) {
-    fail_at_line(file, std::min(rows, r.scans.size()) + 1,
-                 "expected a row for each of " + std::to_string(r.scans.size()) +
-                     " scans, or rows and scans with times; found " + std::to_string(rows));
-  }
-  if (!by_order) check_rows(file, rows, r.scans.back().number + 1);
-  for (std::size_t i = 0; i < r.scans.size(); ++i) {
-    const std::size_t row = by_order ? i : static_cast<std::size_t>(r.scans[i].number);
+  for (const std::size_t row : rows_of_scans(r, file, rows, ", or rows and scans with times;")) {
     r.matches.push_back(TrajectoryMatch{row, row, 0.0});
   }
 }

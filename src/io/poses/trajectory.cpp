@@ -219,13 +219,6 @@ Pose read_kitti_calib(const std::filesystem::path& path) {
        "are those of the sensor, remove this file");
 }
 
-void check_rows(const std::filesystem::path& path, std::size_t rows, std::size_t needed) {
-  if (rows >= needed) return;
-  fail_at_line(path, rows + 1,
-               "expected a row for each scan, at least " + std::to_string(needed) + ", found " +
-                   std::to_string(rows));
-}
-
 Trajectory read_trajectory(const std::filesystem::path& path) {
   ByteReader reader(path);
   if (path.extension() == ".pcd") {
