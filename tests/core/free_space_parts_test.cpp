@@ -264,24 +264,16 @@ TEST_CASE("instances that are too long, too high or a single sample are not carr
 
 TEST_CASE("samples along a track are summed on both sides, and fade") {
   using Instance = TrackedInstances::Instance;
-  using Counts = std::vector<InstanceBeliefs::Counts>;
-  const std::array<Counts, 3> counts = {Counts{{50, 0, 40}}, {{50, 10, 40}}, {{50, 2, 40}}};
-  std::array<TrackedInstances, 3> scans;
-  for (TrackedInstances& scan : scans) scan.instances.resize(1);
-  for (const auto side : {&Instance::past, &Instance::future}) {
-    (scans[1].instances[0].*side).instance = 0;
-  }
-  sum_along_tracks(&Instance::past, nullptr, counts[0], scans[0]);
-  sum_along_tracks(&Instance::past, &scans[0], counts[1], scans[1]);
-  sum_along_tracks(&Instance::future, nullptr, counts[2], scans[2]);
-  sum_along_tracks(&Instance::future, &scans[2], counts[1], scans[1]);
-  const Instance& middle = scans[1].instances[0];
+  const InstanceBeliefs::Counts before = {50, 0, 40}, own = {50, 10, 40}, after = {50, 2, 40};
+  Instance middle;
+  middle.past.seen = sum_along_track(own, sum_along_track(before, {}));
+  middle.future.seen = sum_along_track(own, sum_along_track(after, {}));
   CHECK(middle.past.seen.moved == Approx(10.0F));
   CHECK(middle.past.seen.stood == Approx(30.0F + 0.8F * 40.0F));
   CHECK(middle.future.seen.moved == Approx(10.0F + 0.95F * 2.0F));
   CHECK(middle.future.seen.stood == Approx(30.0F + 0.8F * 38.0F));
   // Those of the scan itself count once.
-  CHECK(middle.moved_ratio(counts[1][0]) == Approx(11.9F / (11.9F + 92.4F)));
+  CHECK(middle.moved_ratio(own) == Approx(11.9F / (11.9F + 92.4F)));
   CHECK(Instance().moved_ratio({}) == 0.0F);  // nothing is decided
 }
 

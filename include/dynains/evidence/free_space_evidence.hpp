@@ -100,7 +100,7 @@ class FreeSpaceEvidence {
         [&] {
           if (phase != 0) test_older_scans(phase);
         });
-    sum_along_tracks(scan);
+    keep_oldest_sums();
   }
 
   /// Judges the instances of scan number `scan` by the evidence of all observed scans: the newest
@@ -109,6 +109,8 @@ class FreeSpaceEvidence {
     Judged& judged = is_final ? final_ : provisional_;
     judged.scan = scan;
     Record& record = record_of(scan);
+    sum_along_tracks(&Instance::past, scan);
+    sum_along_tracks(&Instance::future, scan);
     // Everything is without evidence in a scan that no earlier one is compared with.
     const bool was_compared =
         record.since_begin >= static_cast<std::uint64_t>(detail::kReferenceLags.front());
@@ -154,7 +156,7 @@ class FreeSpaceEvidence {
                     may_move_);
     if (phase_of(record) != 0 || delay_of(0) != 0) return;
     test_older_scans(0);
-    sum_along_tracks(newest_);
+    keep_oldest_sums();
   }
 
   /// Free and hit samples of the newest scan, by references of earlier scans.
@@ -178,6 +180,8 @@ class FreeSpaceEvidence {
  private:
   using Verdict = EvidenceVerdict::Group;
   using Instance = detail::TrackedInstances::Instance;
+  using Side = detail::TrackedInstances::Side;
+  using Seen = detail::TrackedInstances::Seen;
   struct Record {
     std::uint64_t epoch = detail::ReferenceScan::kNoEpoch;
     Pose T_world_sensor = Pose::Identity();
@@ -285,23 +289,31 @@ class FreeSpaceEvidence {
     }
   }
 
-  // Sums samples along tracks through all scans without a final verdict, forward and backward.
-  void sum_along_tracks(std::uint64_t newest) {
-    const std::uint64_t open = std::min<std::uint64_t>(newest, lookahead_scans());
-    for (std::uint64_t scan = newest - open; scan <= newest; ++scan) {
-      Record& record = record_of(scan);
-      const bool linked = scan > 0 && record_of(scan - 1).epoch == record.epoch;
-      detail::sum_along_tracks(&Instance::past,
-                               linked ? &record_of(scan - 1).evidence.tracked : nullptr,
-                               record.evidence.beliefs.counts, record.evidence.tracked);
+  // The past sums of the oldest scan without a final verdict serve for all later scans.
+  void keep_oldest_sums() {
+    if (newest_ < lookahead_scans()) return;
+    sum_along_tracks(&Instance::past, newest_ - lookahead_scans());
+  }
+
+  // Sums the samples of each instance of a scan along its track, on one side.
+  void sum_along_tracks(Side Instance::*side, std::uint64_t scan) {
+    std::vector<Instance>& instances = record_of(scan).evidence.tracked.instances;
+    for (std::uint32_t i = 0; i < instances.size(); ++i) {
+      (instances[i].*side).seen = seen_along_track(side, scan, i);
     }
-    for (std::uint64_t scan = newest + 1; scan-- > newest - open;) {
-      Record& record = record_of(scan);
-      const bool linked = scan < newest && record_of(scan + 1).epoch == record.epoch;
-      detail::sum_along_tracks(&Instance::future,
-                               linked ? &record_of(scan + 1).evidence.tracked : nullptr,
-                               record.evidence.beliefs.counts, record.evidence.tracked);
+  }
+
+  Seen seen_along_track(Side Instance::*side, std::uint64_t scan, std::uint32_t instance) {
+    const detail::InstanceEvidence& evidence = record_of(scan).evidence;
+    const std::uint32_t linked = (evidence.tracked.instances[instance].*side).instance;
+    Seen beside;
+    if (linked != kNoCluster) {
+      const bool is_known = side == &Instance::past && scan + lookahead_scans() <= newest_;
+      const std::uint64_t adjacent = side == &Instance::past ? scan - 1 : scan + 1;
+      beside = is_known ? record_of(adjacent).evidence.tracked.instances[linked].past.seen
+                        : seen_along_track(side, adjacent, linked);
     }
+    return detail::sum_along_track(evidence.beliefs.counts[instance], beside);
   }
 
   // Whether the instance of a supervoxel is small enough to move, and is not static by the evidence

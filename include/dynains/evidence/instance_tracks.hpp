@@ -42,8 +42,7 @@ struct TrackedInstances {
   };
   std::vector<Instance> instances;
 
-  /// Extent and overlap of an instance. Separate from Instance, which the propagation reads for all
-  /// open scans in each frame.
+  /// Extent and overlap of an instance. Separate from Instance, which sums along tracks read.
   struct Shape {
     float length = 0.0F;            ///< m, horizontal diagonal
     float height = 0.0F;            ///< m
@@ -177,24 +176,15 @@ class InstanceLinker {
   std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
 };
 
-/// Sums samples along linked instances, for a scan `now` and one side of time. `side`:
-/// &Instance::past or &Instance::future. `adjacent`: the adjacent scan on that side, with its sums
-/// already computed, or null. `counts`: by instance of the scan.
-inline void sum_along_tracks(TrackedInstances::Side TrackedInstances::Instance::*side,
-                             const TrackedInstances* adjacent,
-                             const std::vector<InstanceBeliefs::Counts>& counts,
-                             TrackedInstances& now) {
+/// Sum of the samples of an instance and, on one side of time, of its track. `beside`: the sum of
+/// the linked instance of the adjacent scan on that side; zero without one.
+inline TrackedInstances::Seen sum_along_track(const InstanceBeliefs::Counts& own,
+                                              const TrackedInstances::Seen& beside) {
   // Factors per scan, chosen on random worlds. An object that moved remains dynamic for some time
   // after it stopped.
   constexpr float kMovedFade = 0.95F, kStoodFade = 0.8F;
-  for (std::size_t i = 0; i < now.instances.size(); ++i) {
-    TrackedInstances::Side& own = now.instances[i].*side;
-    own.seen = {static_cast<float>(counts[i].moved), static_cast<float>(counts[i].stood())};
-    if (adjacent == nullptr || own.instance == kNoCluster) continue;
-    const TrackedInstances::Seen& parent = (adjacent->instances[own.instance].*side).seen;
-    own.seen.moved += kMovedFade * parent.moved;
-    own.seen.stood += kStoodFade * parent.stood;
-  }
+  return {static_cast<float>(own.moved) + kMovedFade * beside.moved,
+          static_cast<float>(own.stood()) + kStoodFade * beside.stood};
 }
 
 }  // namespace dynains::detail
