@@ -265,7 +265,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
   const InterruptGuard interrupt(listener.second_signal);
   const RunSettings settings = partial_settings(plan, out, outside);
   const RunOutputs& outputs = settings.outputs;
-  std::optional<Page> page;
+  std::optional<viewer::Page> page;
   PointStore labels(outputs.folder);  // final ones, for what reads the recording again
   RunResults results(plan.sequence, plan.range, settings);
   if (session) {
@@ -277,8 +277,8 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
         true);
   }
   if (outputs.write_page) {
-    page.emplace(plan.sequence, plan.range, settings.config.map.map_voxel);
-    results.add([&](const JudgedScan& judged) { page->add(judged); }, true);
+    page.emplace(make_page(plan.sequence, plan.range, settings.config.map.map_voxel));
+    results.add([&](const JudgedScan& judged) { add_to_page(plan.sequence, judged, *page); }, true);
   }
   if (!outside.log.empty() || !outside.grid.empty()) {
     results.add([&](const JudgedScan& judged) { labels.add(judged.arrays.labels); });
@@ -315,7 +315,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
     out.keep_unfinished(outcome.report);
     return outcome;
   }
-  if (page) page->write(outputs.folder / kResultNames.page);
+  if (page) write_page(*page, outputs.folder / kResultNames.page);
   const nlohmann::ordered_json written = outside.contents();
   if (!written.is_null()) outcome.report["written"] = written;
   out.finish(outcome.report, [&] {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/errors.hpp"
+#include "dynains/evaluation/truth.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "run/output/output_folder.hpp"
 #include "run_settings.hpp"
@@ -19,55 +20,12 @@ namespace {
 namespace fs = std::filesystem;
 using namespace viewer;
 
-constexpr double kMinCell = 0.05;  // m
-
-}  // namespace
-
-Page::Page(const Recording& recording, const ScanRange& range, double map_voxel,
-           std::size_t max_points)
-    : recording_(recording),
-      max_points_(max_points),
-      // A third is left for the moving points.
-      static_(max_points - max_points / 3, std::max(map_voxel, kMinCell),
-              std::numeric_limits<ViewPoint::ScanIndex>::max() + 1),
-      moving_(max_points, kMinCell, 1) {
-  if (range.size() > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
-    throw ConfigError("a page shows at most 65535 scans, not " + std::to_string(range.size()));
-  }
-  data_.origin = recording.T_world_sensor(range.first).translation();
-  data_.title = recording.folder().filename().string();
-  data_.has_truth = recording.has_labels();
-}
-
-void Page::add(const JudgedScan& judged) {
-  Pose T_local_sensor = recording_.T_world_sensor(judged.index);
-  T_local_sensor.translation() -= data_.origin;
-  data_.has_beliefs = data_.has_beliefs || !judged.packed.beliefs.empty();
-  data_.scans.push_back({recording_.name(judged.index), recording_.time(judged.index),
-                         T_local_sensor.translation().cast<float>()});
-  for (std::size_t k = 0; k < judged.scan.size(); ++k) {
-    ViewPoint point = describe(judged, k);
-    count(point);
-    if (point.label == ViewLabel::kNotJudged) continue;
-    point.local = (T_local_sensor * judged.scan.point(k).position).cast<float>();
-    (point.label == ViewLabel::kMoving ? moving_ : static_).add(point);
-  }
-}
-
-void Page::write(const fs::path& file) {
-  data_.map = static_.take(max_points_ - max_points_ / 3);
-  data_.moving = moving_.take(max_points_ - data_.map.size());
-  AtomicFile page(file);
-  viewer::write_page(page.stream(), data_);
-  page.commit();
-}
-
 /// Everything but the position.
-ViewPoint Page::describe(const JudgedScan& judged, std::size_t k) const {
+ViewPoint describe(const JudgedScan& judged, std::size_t k) {
+  static const evaluation::TruthClasses truth_of;
   const PackedVerdict& verdict = judged.packed;
   ViewPoint point;
   point.intensity = judged.scan.xyzi[4 * k + 3];
-  point.scan = static_cast<std::uint16_t>(data_.scans.size() - 1);
   point.instance = static_cast<std::uint16_t>(instance_of(verdict.labels[k]));
   const std::uint32_t label = class_of(verdict.labels[k]);
   if (label == kRunStatic) point.label = ViewLabel::kStatic;
@@ -75,7 +33,7 @@ ViewPoint Page::describe(const JudgedScan& judged, std::size_t k) const {
   if (!verdict.beliefs.empty()) point.belief = verdict.beliefs[k];
   if (!verdict.causes.empty() && verdict.causes[k] < kCauseCount) point.cause = verdict.causes[k];
   if (judged.truth.empty()) return point;
-  const evaluation::Truth truth = truth_(judged.truth[k]);
+  const evaluation::Truth truth = truth_of(judged.truth[k]);
   const bool is_ground = evaluation::is_ground_class(evaluation::semantic_class(judged.truth[k]));
   if (truth == evaluation::Truth::kStatic) {
     point.truth = is_ground ? ViewTruth::kStatic : ViewTruth::kStaticObject;
@@ -84,15 +42,35 @@ ViewPoint Page::describe(const JudgedScan& judged, std::size_t k) const {
   return point;
 }
 
-void Page::count(const ViewPoint& point) {
-  ViewCounts& counts = data_.counts;
-  ++counts.points;
-  ++counts.by_cause[point.cause];
-  const bool is_moving = point.label == ViewLabel::kMoving;
-  counts.moving += is_moving ? 1U : 0U;
-  const bool stands = point.truth == ViewTruth::kStatic || point.truth == ViewTruth::kStaticObject;
-  counts.lost += is_moving && stands ? 1U : 0U;
-  counts.missed += point.label == ViewLabel::kStatic && point.truth == ViewTruth::kMoving ? 1U : 0U;
+}  // namespace
+
+Page make_page(const Recording& recording, const ScanRange& range, double map_voxel,
+               std::size_t max_points) {
+  if (range.size() > std::numeric_limits<ViewPoint::ScanIndex>::max()) {
+    throw ConfigError("a page shows at most 65535 scans, not " + std::to_string(range.size()));
+  }
+  return {recording.folder().filename().string(),
+          recording.T_world_sensor(range.first).translation(), recording.has_labels(), map_voxel,
+          max_points};
+}
+
+void add_to_page(const Recording& recording, const JudgedScan& judged, Page& page) {
+  Pose T_local_sensor = recording.T_world_sensor(judged.index);
+  T_local_sensor.translation() -= page.origin();
+  if (!judged.packed.beliefs.empty()) page.set_has_beliefs();
+  page.begin_scan(recording.name(judged.index), recording.time(judged.index),
+                  T_local_sensor.translation().cast<float>());
+  for (std::size_t k = 0; k < judged.scan.size(); ++k) {
+    ViewPoint point = describe(judged, k);
+    point.local = (T_local_sensor * judged.scan.point(k).position).cast<float>();
+    page.add(point);
+  }
+}
+
+void write_page(Page& page, const fs::path& file) {
+  AtomicFile output(file);
+  page.write(output.stream());
+  output.commit();
 }
 
 void check_run_is_finished(const fs::path& folder) {
@@ -139,17 +117,17 @@ fs::path add_page(const fs::path& folder, const OpenRecording& open, std::size_t
   OutputFile page(out, kResultNames.page);
   const Recording recording = open(out);
   const std::vector<std::size_t> scans = scans_of_run(out, recording);
-  Page content(recording, {scans.front(), scans.back()},
-               out.field<double>("/configuration/map_voxel"), max_points);
+  Page content = make_page(recording, {scans.front(), scans.back()},
+                           out.field<double>("/configuration/map_voxel"), max_points);
   const VerdictFiles files(out.path(), "labels", true);
   JudgedScan judged;
   for (judged.index = scans.front(); judged.index <= scans.back(); ++judged.index) {
     recording.read_scan(judged.index, judged.scan);
     judged.packed = files.read(recording.name(judged.index), judged.scan.size());
     if (recording.has_labels()) judged.truth = recording.read_labels(judged.index);
-    content.add(judged);
+    add_to_page(recording, judged, content);
   }
-  content.write(page.path());
+  write_page(content, page.path());
   page.put_in_place([&] { out.mark_with(out.marker(), page.path()); });
   return out.path() / kResultNames.page;
 }

@@ -6,7 +6,6 @@
 #include <functional>
 #include <vector>
 
-#include "dynains/evaluation/truth.hpp"
 #include "dynains/io/recording.hpp"
 #include "run/output/output_folder.hpp"
 #include "scan_range.hpp"
@@ -29,29 +28,13 @@ ResultFolder open_finished_run(const std::filesystem::path& folder);
 /// The scans of a run. Throws IoError if its recording lacks one.
 std::vector<std::size_t> scans_of_run(const ResultFolder& out, const Recording& recording);
 
-/// Collects at most `max_points` points of the scans of a run for its page: the first static point
-/// of each voxel, up to two thirds, and moving points.
-class Page {
- public:
-  /// `range`: of the run. `map_voxel`: m. Throws ConfigError if there are too many scans.
-  Page(const Recording& recording, const ScanRange& range, double map_voxel,
-       std::size_t max_points = kDefaultViewPoints);
-
-  /// A scan with `packed` and `truth`.
-  void add(const JudgedScan& judged);
-  /// After the last scan. Throws IoError.
-  void write(const std::filesystem::path& file);
-
- private:
-  viewer::ViewPoint describe(const JudgedScan& judged, std::size_t k) const;
-  void count(const viewer::ViewPoint& point);
-
-  const Recording& recording_;
-  std::size_t max_points_;
-  viewer::ThinnedPoints static_, moving_;
-  const evaluation::TruthClasses truth_;
-  viewer::ViewData data_;
-};
+/// An empty page of the scans of a run. `map_voxel`: m. Throws ConfigError if there are too many.
+viewer::Page make_page(const Recording& recording, const ScanRange& range, double map_voxel,
+                       std::size_t max_points = kDefaultViewPoints);
+/// Adds a scan with `packed` and `truth`.
+void add_to_page(const Recording& recording, const JudgedScan& judged, viewer::Page& page);
+/// Throws IoError.
+void write_page(viewer::Page& page, const std::filesystem::path& file);
 
 /// Opens the recording of a run by its report.
 using OpenRecording = std::function<Recording(const ResultFolder& out)>;

@@ -32,9 +32,7 @@ async function testCounts(page, out) {
   const summary = await page.$eval('#summary', (node) => node.textContent);
   const shown = await page.evaluate(async () => {
     const {points} = await window.dynainsViewer;
-    const total = (layer) => points.chunks.filter((chunk) => chunk.layer === layer)
-      .reduce((sum, chunk) => sum + chunk.count, 0);
-    return [total(0), total(1)];
+    return points.counts;
   });
   const all = shown[0] + shown[1];
   assert.ok(shown[1] <= moving && all <= kPoints && all > 0.5 * kPoints, `${shown} points`);

@@ -2,16 +2,6 @@
 
 const FIELD_OF_VIEW = 0.9;  // rad, vertical
 
-function product(a, b) {
-  const c = new Float32Array(16);
-  for (let column = 0; column < 4; ++column) {
-    for (let row = 0; row < 4; ++row) {
-      for (let k = 0; k < 4; ++k) c[4 * column + row] += a[4 * k + row] * b[4 * column + k];
-    }
-  }
-  return c;
-}
-
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const sum = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
 
@@ -35,21 +25,19 @@ class Camera {
   matrix(aspect) {
     const {forward, right, up} = this.axes();
     const eye = sum(this.target, forward, -this.distance);
-    const view = new Float32Array([
+    const view = new DOMMatrix([
       right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0,
       right[2], up[2], -forward[2], 0, -dot(right, eye), -dot(up, eye), dot(forward, eye), 1]);
     const near = Math.max(0.2, this.distance / 200);
     const far = this.distance + this.reach;
     const f = 1 / Math.tan(FIELD_OF_VIEW / 2);
-    const projection = new Float32Array(16);
-    if (this.mode === 'top') {
-      projection.set([f / (aspect * this.distance), 0, 0, 0, 0, f / this.distance, 0, 0,
-        0, 0, 2 / (near - far), 0, 0, 0, (near + far) / (near - far), 1]);
-    } else {
-      projection.set([f / aspect, 0, 0, 0, 0, f, 0, 0,
+    const isFlat = this.mode === 'top';
+    const projection = new DOMMatrix(isFlat
+      ? [f / (aspect * this.distance), 0, 0, 0, 0, f / this.distance, 0, 0,
+        0, 0, 2 / (near - far), 0, 0, 0, (near + far) / (near - far), 1]
+      : [f / aspect, 0, 0, 0, 0, f, 0, 0,
         0, 0, (near + far) / (near - far), -1, 0, 0, 2 * near * far / (near - far), 0]);
-    }
-    return {matrix: product(projection, view), eye, near, far, isFlat: this.mode === 'top'};
+    return {matrix: projection.multiply(view).toFloat32Array(), near, far, isFlat};
   }
 
   turn(dx, dy) {

@@ -9,8 +9,7 @@ class Viewer {
     const yaw = Math.atan2(last[1] - first[1], last[0] - first[0]);
     this.state = {
       camera: new Camera(sum(first, [Math.cos(yaw), Math.sin(yaw), 0], 20), yaw, 40),
-      split: 0.5, colour: 0, size: 1.5, shading: 0.7, scan: 0, allScans: true,
-      causes: 0xffffffff, heights: heightRange(points),
+      scan: 0, allScans: true, heights: heightRange(points),
     };
     this.renderer = new Renderer(element('canvas'), points);
     this.isPlaying = false;
@@ -19,7 +18,7 @@ class Viewer {
     this.connectMouse();
     this.connectTime();
     new ResizeObserver(() => this.request()).observe(element('canvas'));
-    this.update();
+    this.readPanel();
   }
 
   fillTexts() {
@@ -28,46 +27,35 @@ class Viewer {
     element('summary').textContent = summaryOf(this.description, this.points);
     this.description.causes.forEach((cause, number) => {
       if (cause.points === 0) return;
-      const label = document.createElement('label');
-      const box = document.createElement('input');
-      box.type = 'checkbox';
-      box.checked = true;
-      box.value = number;
-      label.append(box, swatch(CAUSE_COLOURS[number]), `${cause.name} (${count(cause.points)})`);
-      element('causes').append(label);
+      const box = made('input', {type: 'checkbox', name: 'cause', checked: true, value: number});
+      element('causes').append(made('label', {}, box, swatch(CAUSE_COLOURS[number]),
+        `${cause.name} (${count(cause.points)})`));
     });
   }
 
   connectPanel() {
-    const number = (id, name, scale = 1) => element(id).addEventListener('input', (event) => {
-      this.state[name] = Number(event.target.value) * scale;
-      this.update();
+    element('panel').addEventListener('input', (event) => {
+      if (event.target.value === 'follow') this.state.allScans = false;
+      this.readPanel();
     });
-    number('split', 'split', 0.01);
-    number('colour', 'colour');
-    number('size', 'size');
-    number('shading', 'shading');
-    for (const box of document.querySelectorAll('input[name=camera]')) {
-      box.addEventListener('input', () => {
-        this.state.camera.mode = box.value;
-        if (box.value === 'follow') this.state.allScans = false;
-        this.update();
-      });
-    }
-    const causeBoxes = [...document.querySelectorAll('#causes input')];
-    const readCauses = () => {
-      this.state.causes = causeBoxes.reduce(
-        (bits, box) => box.checked ? bits : bits & ~(1 << Number(box.value)), ~0) >>> 0;
-      this.update();
-    };
-    element('causes').addEventListener('input', readCauses);
     for (const [id, checked] of [['all-causes', true], ['no-causes', false]]) {
       element(id).addEventListener('click', () => {
-        for (const box of causeBoxes) box.checked = checked;
-        readCauses();
+        for (const box of document.querySelectorAll('#causes input')) box.checked = checked;
+        this.readPanel();
       });
     }
     element('close').addEventListener('click', () => { element('card').hidden = true; });
+  }
+
+  // Takes what the controls of the panel say.
+  readPanel() {
+    const {state} = this;
+    const panel = new FormData(element('panel'));
+    for (const name of ['colour', 'size', 'shading']) state[name] = Number(panel.get(name));
+    state.split = panel.get('split') / 100;
+    state.camera.mode = panel.get('camera');
+    state.causes = panel.getAll('cause').reduce((bits, cause) => bits | 1 << cause, 0) >>> 0;
+    this.update();
   }
 
   connectMouse() {
@@ -116,17 +104,12 @@ class Viewer {
     }, 1000 * Math.min(0.5, Math.max(0.02, pause)));
   }
 
-  // Name and text of everything that is known of a point.
-  factsOf(index) {
-    return factsOf(this.description, this.points, index);
-  }
-
   pick(x, y) {
     const index = this.renderer.pick(this.state, x, y);
     if (index < 0) {
       element('card').hidden = true;
     } else {
-      showCard(this.factsOf(index));
+      showCard(factsOf(this.description, this.points, index));
     }
     this.request();
     return index;

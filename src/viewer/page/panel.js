@@ -13,20 +13,20 @@ const CAUSE_COLOURS = [
 const LABELS = ['not judged', 'static', 'moving'];
 const css = (colour) => `rgb(${colour.map((value) => Math.round(255 * value)).join(' ')})`;
 
-function swatch(colour) {
-  const box = document.createElement('i');
-  box.style.background = css(colour);
-  return box;
+// A new element.
+function made(tag, properties, ...content) {
+  const node = Object.assign(document.createElement(tag), properties);
+  node.append(...content);
+  return node;
 }
 
-function summaryOf(description, points) {
-  const shown = [0, 1].map((layer) => points.chunks.filter((chunk) => chunk.layer === layer)
-    .reduce((sum, chunk) => sum + chunk.count, 0));
-  const {counts} = description;
-  let text = `${count(description.scans.length)} scans, ${count(counts.points)} points. ` +
+const swatch = (colour) => made('i', {style: `background: ${css(colour)}`});
+
+function summaryOf({scans, counts, has_truth}, {counts: shown}) {
+  let text = `${count(scans.length)} scans, ${count(counts.points)} points. ` +
     `This page has ${count(shown[0])} static points and ${count(shown[1])} of ` +
     `${count(counts.moving)} removed points.`;
-  if (description.has_truth) {
+  if (has_truth) {
     text += ` By ground truth, ${count(counts.missed)} moving points were missed and ` +
       `${count(counts.lost)} static points were lost.`;
   }
@@ -59,15 +59,8 @@ function factsOf(description, points, index) {
 }
 
 function showCard(facts) {
-  const list = document.createElement('dl');
-  for (const [name, text] of facts) {
-    const term = document.createElement('dt');
-    const value = document.createElement('dd');
-    term.textContent = name;
-    value.textContent = text;
-    list.append(term, value);
-  }
-  element('facts').replaceChildren(list);
+  const rows = facts.flatMap(([name, text]) => [made('dt', {}, name), made('dd', {}, text)]);
+  element('facts').replaceChildren(made('dl', {}, ...rows));
   element('card').hidden = false;
 }
 

@@ -1,6 +1,4 @@
-// Decodes the points of the page. Columns: see PackedPoints in page.cpp.
-
-const VERTEX_BYTES = 16;
+// Decodes the points of the page. Columns: see columns_of() in page.cpp.
 
 async function inflated(base64) {
   const text = atob(base64);
@@ -10,58 +8,39 @@ async function inflated(base64) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Vertices: uint16 x y z, instance; uint16 scan; uint8 intensity, belief, cause, flags; 2 unused.
-async function decodePoints(base64, packing) {
+// counts: of the points of the map, and of moving ones, which follow. columns: x, y, z (in steps
+// of `unit` m), scan, instance; intensity, belief, cause, flags.
+async function decodePoints(base64, {counts, unit}) {
   const bytes = await inflated(base64);
-  const total = packing.chunks.reduce((sum, chunk) => sum + chunk.count, 0);
-  if (bytes.length !== 14 * total) throw new Error('the points of this page are damaged');
-  const vertices = new ArrayBuffer(VERTEX_BYTES * total);
-  const words = new Uint16Array(vertices);
-  const octets = new Uint8Array(vertices);
-  const wordOf = [0, 1, 2, 4, 3];  // columns x, y, z, scan, instance
-  for (let column = 0; column < 5; ++column) {
-    const low = 2 * column * total;
-    let i = 0;
-    for (const chunk of packing.chunks) {
-      let value = 0;
-      for (const end = i + chunk.count; i < end; ++i) {
-        value = (value + bytes[low + i] + 256 * bytes[low + total + i]) & 0xffff;
-        words[8 * i + wordOf[column]] = value;
-      }
+  const total = counts[0] + counts[1];
+  if (bytes.length !== 24 * total) throw new Error('the points of this page are damaged');
+  const columns = [];
+  for (let begin = 0; begin < 20 * total; begin += 4 * total) {
+    const column = new Int32Array(total);
+    const byte = (i, k) => bytes[begin + k * total + i] << 8 * k;
+    let value = 0;
+    for (let i = 0; i < total; ++i) {
+      const code = byte(i, 0) | byte(i, 1) | byte(i, 2) | byte(i, 3);
+      value += code >>> 1 ^ -(code & 1);
+      column[i] = value;
     }
+    columns.push(column);
   }
-  for (let column = 0; column < 4; ++column) {
-    const begin = (10 + column) * total;
-    for (let i = 0; i < total; ++i) octets[VERTEX_BYTES * i + 10 + column] = bytes[begin + i];
-  }
-  let first = 0;
-  const chunks = packing.chunks.map((chunk) => {
-    const placed = {...chunk, first};
-    first += chunk.count;
-    return placed;
-  });
-  return {total, vertices, words, octets, chunks, unit: packing.unit};
+  for (let k = 20; k < 24; ++k) columns.push(bytes.slice(k * total, (k + 1) * total));
+  return {total, counts, columns, unit};
 }
 
 // The values of point i.
-function pointAt(points, i) {
-  const chunk = points.chunks.find((c) => i < c.first + c.count);
-  const word = (k) => points.words[8 * i + k];
-  const octet = (k) => points.octets[VERTEX_BYTES * i + k];
-  return {
-    layer: chunk.layer,
-    local: [0, 1, 2].map((axis) => chunk.origin[axis] + points.unit * word(axis)),
-    instance: word(3), scan: word(4), intensity: octet(10) / 255, belief: octet(11) / 255,
-    cause: octet(12), label: octet(13) & 3, truth: octet(13) >> 2,
-  };
+function pointAt({columns, unit}, i) {
+  const [x, y, z, scan, instance, , belief, cause, flags] = columns.map((column) => column[i]);
+  return {local: [x * unit, y * unit, z * unit], scan, instance, belief: belief / 255, cause,
+    label: flags & 3, truth: flags >> 2};
 }
 
 // What most heights lie between; at least 1 m apart.
-function heightRange(points) {
-  const heights = [];
-  const step = Math.max(1, Math.floor(points.total / 20000));
-  for (let i = 0; i < points.total; i += step) heights.push(pointAt(points, i).local[2]);
-  heights.sort((a, b) => a - b);
-  const at = (share) => heights[Math.floor(share * (heights.length - 1))] ?? 0;
+function heightRange({columns, unit}) {
+  const step = Math.max(1, Math.floor(columns[2].length / 20000));
+  const heights = columns[2].filter((_, i) => i % step === 0).sort();
+  const at = (share) => unit * (heights[Math.floor(share * (heights.length - 1))] ?? 0);
   return [at(0.02), Math.max(at(0.98), at(0.02) + 1)];
 }

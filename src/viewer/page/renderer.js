@@ -10,15 +10,13 @@ class Renderer {
     this.program = compiled(gl, POINT_VERTEX, POINT_FRAGMENT);
     this.array = gl.createVertexArray();
     gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, points.vertices, gl.STATIC_DRAW);
-    const attribute = (location, size, type, offset) => {
+    points.columns.forEach((column, location) => {
+      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bufferData(gl.ARRAY_BUFFER, column, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribIPointer(location, size, type, VERTEX_BYTES, offset);
-    };
-    attribute(0, 4, gl.UNSIGNED_SHORT, 0);
-    attribute(1, 1, gl.UNSIGNED_SHORT, 8);
-    attribute(2, 4, gl.UNSIGNED_BYTE, 10);
+      const type = column instanceof Int32Array ? gl.INT : gl.UNSIGNED_BYTE;
+      gl.vertexAttribIPointer(location, 1, type, 0, 0);
+    });
     gl.bindVertexArray(null);
   }
 
@@ -43,11 +41,8 @@ class Renderer {
     gl.uniform1ui(u.causes, state.causes);
     gl.uniform3fv(u.cause_colours, CAUSE_COLOURS.flat());
     gl.uniform1i(u.is_picking, isPicking);
-    for (const chunk of points.chunks) {
-      gl.uniform3fv(u.origin, chunk.origin);
-      gl.uniform1i(u.is_moving_layer, chunk.layer);
-      gl.drawArrays(gl.POINTS, chunk.first, chunk.count);
-    }
+    gl.uniform1i(u.map_points, points.counts[0]);
+    gl.drawArrays(gl.POINTS, 0, points.total);
     return view;
   }
 

@@ -3,18 +3,23 @@
 const POINT_VERTEX = `#version 300 es
 precision highp float;
 precision highp int;
-layout(location = 0) in uvec4 position_instance;
-layout(location = 1) in uint scan;
-layout(location = 2) in uvec4 bytes;  // intensity, belief, cause, label + 4 * truth
+layout(location = 0) in int x;
+layout(location = 1) in int y;
+layout(location = 2) in int z;
+layout(location = 3) in int scan;
+layout(location = 4) in int instance;
+layout(location = 5) in uint intensity;
+layout(location = 6) in uint belief;
+layout(location = 7) in uint cause;
+layout(location = 8) in uint flags;  // label + 4 * truth
 uniform mat4 matrix;
-uniform vec3 origin;
 uniform float point_size;  // m, about
 uniform float pixels;      // per metre at distance 1
 uniform float least_size;  // pixels
 uniform bool is_flat;
 uniform float unit;
 uniform float split;         // border between before and after, from -1 to 1
-uniform bool is_moving_layer;
+uniform int map_points;      // moving ones follow
 uniform int current_scan;    // -1: all scans
 uniform uint causes;         // bit set
 uniform int colour_mode;
@@ -44,20 +49,19 @@ vec3 hue(float h) {
 }
 
 vec3 colour_of(float height) {
-  uint instance = position_instance.w;
-  uint label = bytes.w & 3u;
-  uint truth = bytes.w >> 2;
+  uint label = flags & 3u;
+  uint truth = flags >> 2;
   float t = (height - heights.x) / (heights.y - heights.x);
   vec3 grey = vec3(0.40 + 0.35 * clamp(t, 0.0, 1.0));
-  vec3 by_instance = instance == 0u ? vec3(0.95, 0.45, 0.35) : hue(fract(float(instance) * 0.618034));
+  vec3 by_instance = instance == 0 ? vec3(0.95, 0.45, 0.35) : hue(fract(float(instance) * 0.618034));
   if (colour_mode == 1) return ramp(t);
-  if (colour_mode == 2) return vec3(0.1 + 0.9 * sqrt(float(bytes.x) / 255.0));
+  if (colour_mode == 2) return vec3(0.1 + 0.9 * sqrt(float(intensity) / 255.0));
   if (colour_mode == 3) {
     if (label == 2u) return vec3(0.95, 0.25, 0.20);
-    return bytes.z == 1u ? vec3(0.55, 0.47, 0.38) : vec3(0.45, 0.62, 0.80);
+    return cause == 1u ? vec3(0.55, 0.47, 0.38) : vec3(0.45, 0.62, 0.80);
   }
-  if (colour_mode == 4) return ramp(float(bytes.y) / 255.0);
-  if (colour_mode == 5) return cause_colours[min(bytes.z, 18u)];
+  if (colour_mode == 4) return ramp(float(belief) / 255.0);
+  if (colour_mode == 5) return cause_colours[min(cause, 18u)];
   if (colour_mode == 6) {
     if (truth == 0u) return vec3(0.25, 0.27, 0.32);
     if (label == 2u) {
@@ -70,18 +74,19 @@ vec3 colour_of(float height) {
   return label == 2u ? by_instance : grey;
 }
 
-bool is_hidden() {
-  if ((causes >> min(bytes.z, 31u) & 1u) == 0u) return true;
+bool is_hidden(bool is_moving) {
+  if ((causes >> min(cause, 31u) & 1u) == 0u) return true;
   if (current_scan < 0) return false;
   // The map grows; moving points are shown at their scan.
-  return is_moving_layer ? int(scan) != current_scan : int(scan) > current_scan;
+  return is_moving ? scan != current_scan : scan > current_scan;
 }
 
 void main() {
-  vec3 local = origin + unit * vec3(position_instance.xyz);
+  vec3 local = unit * vec3(x, y, z);
   place(local);
   bool is_after = gl_Position.x > split * gl_Position.w;
-  if (is_hidden() || (is_moving_layer && is_after)) {
+  bool is_moving = gl_VertexID >= map_points;
+  if (is_hidden(is_moving) || (is_moving && is_after)) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     gl_PointSize = 0.0;
     return;
