@@ -38,11 +38,6 @@ struct Crossing {
 
 inline constexpr double kLaneHalf = 1.75;  // m, from the centre line of a side street to its lanes
 
-inline std::uint64_t seed_of(const Config& config) {
-  const std::uint64_t seed = mix(config.seed, 1000 + static_cast<std::uint64_t>(config.scene));
-  return config.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config.day));
-}
-
 /// From the edge of the carriageway to the middle of a place, m.
 inline double depth_of_place(double angle) {
   return angle > 0 ? 2.4 * std::sin(angle) + 0.9 * std::cos(angle) : 1.12;
@@ -58,11 +53,10 @@ class Builder {
  public:
   Builder(const Config& config, const TerrainConfig& ground, std::vector<Street> streets)
       : config_(config),
-        random_(seed_of(config)),
+        random_(seed_of_day(config, 1000 + static_cast<std::uint64_t>(config.scene))),
         world_{Terrain(ground, std::move(streets), random_.fork(1)), Traffic(random_.fork(2))} {}
 
   Traffic& traffic() { return world_.traffic; }
-  Terrain& terrain() { return world_.terrain; }
   const Street& street(std::size_t i = 0) const { return world_.terrain.streets()[i]; }
   bool lively() const { return config_.scene != Scene::kStatic && config_.traffic > 0; }
   /// As many as the configuration asks for.
@@ -297,11 +291,7 @@ class Builder {
         }
         if (!is_clear) continue;
         // Some stand all the time, some start, and some stop.
-        walker(std::move(goals), pace,
-               mood < 0.13   ? 1e9
-               : mood < 0.27 ? when
-                             : 0,
-               mood > 0.9 ? when : 1e9);
+        walker(goals, pace, mood < 0.13 ? 1e9 : mood < 0.27 ? when : 0, mood > 0.9 ? when : 1e9);
       }
     }
   }
@@ -458,7 +448,7 @@ class Builder {
     for (double d = -run; d < -1; d += 1.5) {
       points.push_back(before.position + d * direction(before.heading));
     }
-    for (const Vec2 p : curve(before, after)) points.push_back(p);
+    add_curve(before, after, points);
     for (double d = 1.5; d < 70; d += 1.5) {
       const double s = s_exit + forward * d;
       if (s < 1 || s > main.centre.length() - 1) break;
@@ -488,17 +478,11 @@ class Builder {
     std::vector<Vec2> points;
     if (leaving) {
       for (const double d : {0.0, 0.7, 1.4}) points.push_back(spot.position + d * ahead);
-      for (const Vec2 p :
-           curve({spot.position + 2.1 * ahead, spot.heading}, lane.route.at(joint))) {
-        points.push_back(p);
-      }
+      add_curve({spot.position + 2.1 * ahead, spot.heading}, lane.route.at(joint), points);
       for (double d = joint + 1; d < end; ++d) points.push_back(lane.route.at(d).position);
     } else {
       for (double d = begin; d < joint - 0.5; ++d) points.push_back(lane.route.at(d).position);
-      for (const Vec2 p :
-           curve(lane.route.at(joint), {spot.position - 2.1 * ahead, spot.heading})) {
-        points.push_back(p);
-      }
+      add_curve(lane.route.at(joint), {spot.position - 2.1 * ahead, spot.heading}, points);
       for (const double d : {1.4, 0.7, 0.0}) points.push_back(spot.position - d * ahead);
     }
     Route route(std::move(points));
@@ -522,25 +506,17 @@ class Builder {
     driver.schedule = {{0, 0}, {start, speed}};
   }
 
-  bool walker(std::vector<Vec2> goals, double pace, double start, double stop) {
+  void walker(const std::vector<Vec2>& goals, double pace, double start, double stop) {
     Traffic& t = world_.traffic;
     // Nobody starts inside something, or at the sensor.
-    if (norm(goals[0] - t.place_of(t.drivers[0]).position) < 1) return false;
-    if (!t.fixed.is_free({goals[0], 0, 0.5, 0.5}, 0)) return false;
-    Traffic::Walker walker;
-    walker.object = t.add_object(Kind::kPedestrian);
-    walker.position = goals[0];
+    if (norm(goals[0] - t.place_of(t.drivers[0]).position) < 1) return;
+    if (!t.fixed.is_free({goals[0], 0, 0.5, 0.5}, 0)) return;
+    const std::size_t object = t.add_object(Kind::kPedestrian);
     const Vec2 towards = goals[1] - goals[0];
-    walker.heading = std::atan2(towards.y, towards.x);
-    walker.goals = std::move(goals);
-    walker.goal = 1;
-    walker.pace = pace;
-    walker.start = start;
-    walker.stop = stop;
-    walker.phase = 0.01 * static_cast<double>(t.objects[walker.object].seed % 628);
-    if (start <= 0) walker.velocity = (pace / std::max(norm(towards), 0.1)) * towards;
-    t.walkers.push_back(std::move(walker));
-    return true;
+    const double speed = start <= 0 ? pace / std::max(norm(towards), 0.1) : 0;
+    const double phase = 0.01 * static_cast<double>(t.objects[object].seed % 628);
+    t.walkers.push_back({object, goals[0], std::atan2(towards.y, towards.x), goals, pace, start,
+                         stop, speed * towards, 1, phase});
   }
 
   void add_thing(double s, int side) {

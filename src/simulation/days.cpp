@@ -36,11 +36,7 @@ void add_changes(const World& layout, const Config& config, Traffic& traffic) {
   Random random(mix(config.seed, 4242));
   std::uint32_t instance = kFirstChange;
   for (const Change& change : kChanges) {
-    Object object;
-    object.label = change.label;
-    object.size = change.size;
-    object.instance = instance++;
-    object.model = model_of(change, random);
+    Object object{{}, change.size, 0, model_of(change, random), change.label, instance++};
     for (int attempt = 0; attempt < 200; ++attempt) {
       const double s = ego.s + random.uniform(0.1, 0.9) * ego.cruise * config.scans / config.rate;
       const double side = random.chance(0.5) ? 1 : -1;

@@ -101,20 +101,18 @@ class Route {
   std::vector<double> arc_;
 };
 
-/// A cubic curve from one waypoint into the direction of another, as a vehicle turns or changes its
-/// lane.
-inline std::vector<Vec2> curve(const Waypoint& from, const Waypoint& to) {
+/// Adds a cubic curve from one waypoint into the direction of another, as a vehicle turns or
+/// changes its lane.
+inline void add_curve(const Waypoint& from, const Waypoint& to, std::vector<Vec2>& points) {
   const Vec2 between = to.position - from.position;
   const double size = norm(between);
   const auto count = static_cast<int>(std::max(6.0, size / 0.8));
-  std::vector<Vec2> result;
   for (int i = 0; i <= count; ++i) {
     const double u = static_cast<double>(i) / count, u2 = u * u, u3 = u2 * u;
-    result.push_back(from.position + (3 * u2 - 2 * u3) * between +
+    points.push_back(from.position + (3 * u2 - 2 * u3) * between +
                      (size * (u3 - 2 * u2 + u)) * direction(from.heading) +
                      (size * (u3 - u2)) * direction(to.heading));
   }
-  return result;
 }
 
 /// Constant curvature (1/m) over a length (m).

@@ -90,16 +90,14 @@ struct Primitive {
 /// sides of a box have moved inwards at the top.
 inline Primitive make_primitive(Shape shape, const Material& material, Vec3 centre, Vec3 half,
                                 const Mat3& rotation = {}, float taper_x = 0, float taper_y = 0) {
-  Primitive result;
-  result.shape = shape;
-  result.material = &material;
-  result.centre = centre;
-  const Mat3 inverse = transposed(rotation);
-  result.to_unit = {(1 / half.x) * inverse.x, (1 / half.y) * inverse.y, (1 / half.z) * inverse.z};
-  result.from_unit = transposed({half.x * inverse.x, half.y * inverse.y, half.z * inverse.z});
-  result.taper_x = taper_x / half.x;
-  result.taper_y = taper_y / half.y;
-  return result;
+  const Mat3 axes = transposed(rotation);
+  return {shape,
+          &material,
+          centre,
+          {(1 / half.x) * axes.x, (1 / half.y) * axes.y, (1 / half.z) * axes.z},
+          transposed({half.x * axes.x, half.y * axes.y, half.z * axes.z}),
+          taper_x / half.x,
+          taper_y / half.y};
 }
 
 /// The primitive in another frame.

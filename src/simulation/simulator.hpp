@@ -163,7 +163,7 @@ class Simulator {
     result.T_world_sensor = moment.T_world_sensor;
     result.T_world_sensor_noisy = with_noise(moment.T_world_sensor, index);
 
-    const std::uint64_t scan_seed = mix(seed_of_day(500), index);
+    const std::uint64_t scan_seed = mix(seed_of_day(config_, 500), index);
     if (!takes_time()) {
       measure_part(index, moment, {0, model_.columns}, scan_seed, result);
       return result;
@@ -233,12 +233,6 @@ class Simulator {
            pose_of(model_.yaw, 0, 0);
   }
 
-  /// Seed for a purpose, which differs from day to day.
-  std::uint64_t seed_of_day(std::uint64_t purpose) const {
-    const std::uint64_t seed = mix(config_.seed, purpose);
-    return config_.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config_.day));
-  }
-
   /// Moves everybody through the whole sequence.
   void play() {
     const double interval = 1 / config_.rate;
@@ -249,11 +243,9 @@ class Simulator {
     const int moments = config_.scans + (takes_time() ? 1 : 0);
     for (int i = 0; i < moments; ++i) {
       const EgoPose ego = world_.traffic.ego();
-      Moment moment;
-      moment.time = i * interval;
-      moment.ego = ego;
-      moment.T_world_sensor = sensor_pose(ego, moment.time);
-      moment.objects = world_.traffic.around(ego.at.position, model_.max_range + 8);
+      const double time = i * interval;
+      Moment moment{time, ego, sensor_pose(ego, time),
+                    world_.traffic.around(ego.at.position, model_.max_range + 8)};
       moment.objects.erase(moment.objects.begin());  // the vehicle of the sensor
       ever_moved_.resize(world_.traffic.objects.size(), false);
       for (const ObjectPose& pose : moment.objects) {
@@ -357,7 +349,7 @@ class Simulator {
   }
 
   Pose with_noise(const Pose& pose, std::size_t index) const {
-    Random random(mix(seed_of_day(600), index));
+    Random random(mix(seed_of_day(config_, 600), index));
     const Eigen::Vector3d offset = draw_normal(config_.pose_noise_translation, random);
     const Eigen::Vector3d turn = draw_normal(config_.pose_noise_rotation * kPi / 180, random);
     Pose result = pose * pose_of(turn.x(), turn.y(), turn.z());
@@ -367,7 +359,7 @@ class Simulator {
 
   /// A random walk of the written poses with the way.
   void draw_drift() {
-    Random random(seed_of_day(700));
+    Random random(seed_of_day(config_, 700));
     drift_.assign(moments_.size(), Eigen::Vector3d::Zero());
     for (std::size_t i = 1; i < moments_.size(); ++i) {
       const double way = norm(moments_[i].ego.at.position - moments_[i - 1].ego.at.position);
@@ -439,17 +431,13 @@ class Simulator {
   std::optional<Surface> ground_surface(Vec3 origin, Vec3 world_direction, float reach) {
     const float range = world_.terrain.cast(origin, world_direction, reach);
     if (range <= 0) return std::nullopt;
-    Surface surface;
-    surface.range = range;
     const Vec3 p = origin + range * world_direction;
-    surface.cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
-    surface.label = world_.terrain.label_near(p.x, p.y);
-    surface.loss = 0.01F;
-    const bool grass = surface.label == kClasses.terrain;
-    const bool sidewalk = surface.label == kClasses.sidewalk;
-    surface.reflectivity = grass ? 0.3F : sidewalk ? 0.28F : 0.18F;
-    surface.roughness = grass ? 0.015F : 0.003F;
-    return surface;
+    const float cosine = std::abs(dot(world_.terrain.normal_near(p.x, p.y), world_direction));
+    const std::uint16_t label = world_.terrain.label_near(p.x, p.y);
+    const bool grass = label == kClasses.terrain, sidewalk = label == kClasses.sidewalk;
+    return Surface{
+        range, cosine, 0.01F, grass ? 0.3F : sidewalk ? 0.28F : 0.18F, grass ? 0.015F : 0.003F,
+        label};
   }
 
   /// The object that the renderer found along a beam.
@@ -457,18 +445,16 @@ class Simulator {
     if (hit.drawn == nullptr) return std::nullopt;
     const Renderer::Drawn& drawn = *hit.drawn;
     const Material& material = *drawn.primitive.material;
-    Surface surface;
-    surface.range = hit.range;
-    surface.label = drawn.label;
-    if ((drawn.label & 0xFFFF) == 0) surface.label |= material.label;
-    surface.reflectivity = material.reflectivity;
-    surface.roughness = material.roughness;
-    surface.loss = hit.extra_loss + material.loss;
-    surface.cosine =
+    const float cosine =
         material.density == 0
             ? std::abs(dot(surface_normal(drawn.primitive, hit.range * direction), direction))
             : 0.7F;
-    return surface;
+    return Surface{hit.range,
+                   cosine,
+                   hit.extra_loss + material.loss,
+                   material.reflectivity,
+                   material.roughness,
+                   drawn.label | ((drawn.label & 0xFFFF) == 0 ? material.label : 0U)};
   }
 
   /// Adds the points of some columns of a scan, measured at one moment.

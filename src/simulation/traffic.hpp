@@ -20,7 +20,7 @@ struct Object {
   Kind kind = Kind::kCar;
   Size size;
   std::uint64_t seed = 0;
-  Model model;                 ///< empty for people, whose shape changes
+  Model model = {};            ///< empty for people, whose shape changes
   std::uint16_t label = 0;     ///< SemanticKITTI class; 0: that of its kind
   std::uint32_t instance = 0;  ///< 0: by its number
 };
@@ -76,7 +76,7 @@ class Traffic {
     double rest_gap = 2.0;      ///< m, gap to the vehicle in front at rest
     double foresight = 1.2;     ///< s, how early people are given way to
     /// From `first` seconds on, `second` replaces `cruise`.
-    std::vector<std::pair<double, double>> schedule;
+    std::vector<std::pair<double, double>> schedule = {};
     double acceleration = 0;
     bool active = true;
   };
@@ -119,13 +119,10 @@ class Traffic {
   std::size_t add_object(Kind kind) { return add_object(kind, random_size(kind, random_)); }
 
   std::size_t add_object(Kind kind, const Size& size) {
-    Object& object = objects.emplace_back();
-    object.kind = kind;
-    object.size = size;
-    object.seed = random_.bits();
+    objects.push_back({kind, size, random_.bits()});
     if (kind != Kind::kPedestrian && kind != Kind::kCyclist) {
-      Random random(object.seed);
-      object.model = vehicle_model(kind, size, random);
+      Random random(objects.back().seed);
+      objects.back().model = vehicle_model(kind, size, random);
     }
     return objects.size() - 1;
   }
@@ -136,25 +133,19 @@ class Traffic {
   }
 
   Driver& add_driver(std::size_t object, std::size_t lane, double s, double cruise) {
-    Driver& driver = drivers.emplace_back();
-    driver.object = object;
-    driver.lane = lane;
-    driver.s = s;
-    driver.speed = cruise;
-    driver.cruise = cruise;
-    return driver;
+    drivers.push_back({object, lane, s, cruise, cruise});
+    return drivers.back();
   }
 
   /// Vehicles all along the lane at random gaps, except near drivers that are already there.
-  void fill(const Flow& flow) {
-    Flow mine = flow;
+  void fill(Flow flow) {
     double s = random_.uniform(2, flow.spacing);
     while (s < lanes[flow.lane].route.length() - 2) {
-      enter(mine, s);
+      enter(flow, s);
       s += std::max(14.0, flow.spacing * random_.uniform(0.4, 1.6));
     }
-    mine.next_gap = flow.spacing;
-    flows.push_back(mine);
+    flow.next_gap = flow.spacing;
+    flows.push_back(flow);
   }
 
   Waypoint place_of(const Driver& driver) const { return lanes[driver.lane].route.at(driver.s); }

@@ -23,6 +23,12 @@ struct World {
   std::uint32_t models = 0;  ///< of `statics`
 };
 
+/// Seed for a purpose, which differs from day to day.
+inline std::uint64_t seed_of_day(const Config& config, std::uint64_t purpose) {
+  const std::uint64_t seed = mix(config.seed, purpose);
+  return config.day == 0 ? seed : mix(seed, static_cast<std::uint64_t>(config.day));
+}
+
 /// The scene at its start time.
 World build_scene(const Config& config);
 /// The scene with the changes up to the day of the configuration.
