@@ -125,6 +125,11 @@ class Bytes {
     const std::uint64_t origin = origin_ + position_;
     return Bytes(path_, origin, take(size, purpose), static_cast<std::size_t>(size));
   }
+  /// A block behind its length, uint32.
+  Bytes block(const char* purpose) {
+    const auto size = number<std::uint32_t>(purpose);
+    return block(size, purpose);
+  }
   void skip(std::uint64_t size, const char* purpose) { take(size, purpose); }
   /// The next `size` bytes.
   const std::uint8_t* take(std::uint64_t size, const char* purpose) {

@@ -14,7 +14,6 @@
 #include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
 #include "failure.hpp"
-#include "io/poses/recording_poses.hpp"
 #include "logs/log_scans.hpp"
 #include "points/bin_layout.hpp"
 #include "scan_files.hpp"

@@ -94,7 +94,7 @@ void append_number(Number value, std::string& bytes) {
 }
 
 /// The number at `bytes`; `swap` reverses its byte order. 64-bit integers are rounded to 53 bits.
-inline double load_scalar(Scalar type, const char* bytes, bool swap) {
+inline double load_scalar(Scalar type, const void* bytes, bool swap) {
   return with_type(type, [&](auto number) {
     char copy[sizeof(number)];
     std::memcpy(copy, bytes, sizeof(number));
@@ -127,6 +127,11 @@ class ByteWriter {
   template <class Number>
   ByteWriter& number(Number value) {
     append_number(value, bytes_);
+    return *this;
+  }
+  template <class... Numbers>
+  ByteWriter& numbers(Numbers... values) {
+    (number(values), ...);
     return *this;
   }
   ByteWriter& raw(const std::string& bytes) {

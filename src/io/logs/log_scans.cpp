@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "../failure.hpp"
-#include "../poses/recording_poses.hpp"
 #include "../text.hpp"
 #include "decompress.hpp"
 #include "dynains/errors.hpp"

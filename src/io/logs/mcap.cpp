@@ -117,8 +117,7 @@ class McapFile final : public ChunkedLog {
 
   void take_message_index(Bytes& fields) {
     const auto channel = fields.number<std::uint16_t>("a channel id");
-    Bytes pairs =
-        fields.block(fields.number<std::uint32_t>("the length of an index"), "a message index");
+    Bytes pairs = fields.block("a message index");
     while (pairs.remaining() > 0) {
       const auto time = pairs.number<std::uint64_t>("a log time");
       add_indexed(channel, time, pairs.number<std::uint64_t>("an offset"));
@@ -159,8 +158,7 @@ class McapFile final : public ChunkedLog {
     topic.name = fields.string("a topic");
     topic.message_encoding = fields.string("a message encoding");
     topic.encoding = encoding_of(topic.message_encoding);
-    Bytes metadata = fields.block(fields.number<std::uint32_t>("the length of metadata"),
-                                  "metadata of a channel");
+    Bytes metadata = fields.block("metadata of a channel");
     while (metadata.remaining() > 0) {
       const std::string name = metadata.string("a name");
       topic.metadata[name] = metadata.string("a value");
@@ -178,8 +176,7 @@ class McapFile final : public ChunkedLog {
 using Fields = ByteWriter;  // content of a record
 
 std::string record(mcap::Opcode opcode, const Fields& content) {
-  return Fields().number(opcode).number(std::uint64_t{content.bytes().size()}).bytes() +
-         content.bytes();
+  return Fields().numbers(opcode, std::uint64_t{content.bytes().size()}).bytes() + content.bytes();
 }
 
 /// Compresses `bytes` if this build has zstd. Returns the name of the compression, empty for none.
@@ -201,7 +198,7 @@ std::string compress([[maybe_unused]] std::string& bytes) {
 template <class Pairs>
 Fields list(const Pairs& pairs) {
   Fields content;
-  for (const auto& [first, second] : pairs) content.number(first).number(second);
+  for (const auto& [first, second] : pairs) content.numbers(first, second);
   return Fields().string(content.bytes());
 }
 
@@ -223,8 +220,7 @@ std::uint16_t McapWriter::add_channel(const LogTopic& topic) {
   Fields metadata;
   for (const auto& [name, value] : topic.metadata) metadata.string(name).string(value);
   define(record(mcap::kChannel, Fields()
-                                    .number(channel)
-                                    .number(schema)
+                                    .numbers(channel, schema)
                                     .string(topic.name)
                                     .string(topic.message_encoding)
                                     .string(metadata.bytes())));
@@ -253,11 +249,9 @@ void McapWriter::write(std::uint16_t channel, std::uint64_t time, const MessageS
   last_time_ = is_first ? time : std::max(last_time_, time);
   index_[channel].push_back({time, records_.size()});
   ++counts_[channel];
-  const Fields fields =
-      Fields().number(channel).number(stamp.sequence).number(time).number(stamp.publish_time);
+  const Fields fields = Fields().numbers(channel, stamp.sequence, time, stamp.publish_time);
   records_ += Fields()
-                  .number(mcap::kMessage)
-                  .number(std::uint64_t{fields.bytes().size() + message.size()})
+                  .numbers(mcap::kMessage, std::uint64_t{fields.bytes().size() + message.size()})
                   .raw(fields.bytes())
                   .bytes();
   records_.append(message.data(), message.size());
@@ -271,23 +265,28 @@ void McapWriter::finish_chunk() {
       crc32(reinterpret_cast<const std::uint8_t*>(records_.data()), records_.size());
   const std::string compression =
       compression_ == Compression::kZstd ? compress(records_) : std::string();
-  ChunkPlace chunk{first_time_,  last_time_,  position_, 0, records_.size(),
-                   records_size, compression, {},        0};
+  const std::uint64_t begin = position_;
   append(record(mcap::kChunk, Fields()
-                                  .number(first_time_)
-                                  .number(last_time_)
-                                  .number(records_size)
-                                  .number(checksum)
+                                  .numbers(first_time_, last_time_, records_size, checksum)
                                   .string(compression)
                                   .number(std::uint64_t{records_.size()})
                                   .raw(records_)));
-  chunk.size = position_ - chunk.position;
+  const std::uint64_t size = position_ - begin;
+  std::map<std::uint16_t, std::uint64_t> places;  // of the indexes, by channel
   for (const auto& [channel, entries] : index_) {
-    chunk.indexes[channel] = position_;
+    places[channel] = position_;
     append(record(mcap::kMessageIndex, Fields().number(channel).raw(list(entries).bytes())));
   }
-  chunk.indexes_size = position_ - chunk.position - chunk.size;
-  chunks_.push_back(std::move(chunk));
+  chunk_indexes_ +=
+      record(mcap::kChunkIndex, Fields()
+                                    .numbers(first_time_, last_time_, begin, size)
+                                    .raw(list(places).bytes())
+                                    .number(position_ - begin - size)
+                                    .string(compression)
+                                    .numbers(std::uint64_t{records_.size()}, records_size));
+  begin_time_ = chunk_count_ == 0 ? first_time_ : std::min(begin_time_, first_time_);
+  end_time_ = std::max(end_time_, last_time_);
+  ++chunk_count_;
   records_.clear();
   index_.clear();
 }
@@ -297,7 +296,7 @@ void McapWriter::copy_record(ByteReader& source, std::uint64_t position, std::ui
   finish_chunk();
   if (index_opcode) {
     (*index_opcode == mcap::kAttachmentIndex ? attachments_ : metadata_) += 1;
-    other_indexes_ += record(*index_opcode, Fields().number(position_).number(size).raw(index));
+    other_indexes_ += record(*index_opcode, Fields().numbers(position_, size).raw(index));
   }
   constexpr std::uint64_t kPart = std::uint64_t{1} << 20;  // bytes
   for (std::uint64_t done = 0; done < size; done += kPart) {
@@ -308,38 +307,14 @@ void McapWriter::copy_record(ByteReader& source, std::uint64_t position, std::ui
 }
 
 std::string McapWriter::summary() const {
-  std::string bytes = definitions_;
   std::uint64_t messages = 0;
   for (const auto& [channel, count] : counts_) messages += count;
-  std::uint64_t begin = chunks_.empty() ? 0 : chunks_.front().begin_time;
-  std::uint64_t end = 0;
-  for (const ChunkPlace& chunk : chunks_) {
-    begin = std::min(begin, chunk.begin_time);
-    end = std::max(end, chunk.end_time);
-  }
-  bytes += record(mcap::kStatistics, Fields()
-                                         .number(messages)
-                                         .number(static_cast<std::uint16_t>(schemas_.size()))
-                                         .number(static_cast<std::uint32_t>(counts_.size()))
-                                         .number(attachments_)
-                                         .number(metadata_)
-                                         .number(static_cast<std::uint32_t>(chunks_.size()))
-                                         .number(begin)
-                                         .number(end)
-                                         .raw(list(counts_).bytes()));
-  for (const ChunkPlace& chunk : chunks_) {
-    bytes += record(mcap::kChunkIndex, Fields()
-                                           .number(chunk.begin_time)
-                                           .number(chunk.end_time)
-                                           .number(chunk.position)
-                                           .number(chunk.size)
-                                           .raw(list(chunk.indexes).bytes())
-                                           .number(chunk.indexes_size)
-                                           .string(chunk.compression)
-                                           .number(chunk.compressed_size)
-                                           .number(chunk.records_size));
-  }
-  return bytes + other_indexes_;
+  const Fields statistics = Fields()
+                                .numbers(messages, static_cast<std::uint16_t>(schemas_.size()),
+                                         static_cast<std::uint32_t>(counts_.size()), attachments_,
+                                         metadata_, chunk_count_, begin_time_, end_time_)
+                                .raw(list(counts_).bytes());
+  return definitions_ + record(mcap::kStatistics, statistics) + chunk_indexes_ + other_indexes_;
 }
 
 void McapWriter::commit() {
@@ -347,11 +322,10 @@ void McapWriter::commit() {
   append(record(mcap::kDataEnd, Fields().number(std::uint32_t{0})));
   const std::uint64_t summary_begin = position_;
   append(summary());
-  append(record(mcap::kFooter, Fields()
-                                   .number(summary_begin)
-                                   .number(std::uint64_t{0})     // no offsets of the summary
-                                   .number(std::uint32_t{0})) +  // no checksum of the summary
-         mcap::kMagic);
+  // Without offsets and checksum of the summary.
+  append(
+      record(mcap::kFooter, Fields().numbers(summary_begin, std::uint64_t{0}, std::uint32_t{0})) +
+      mcap::kMagic);
   file_.commit();
 }
 

@@ -73,14 +73,6 @@ class McapWriter {
     std::uint64_t time;
     std::uint64_t offset;
   };
-  struct ChunkPlace {
-    std::uint64_t begin_time, end_time;
-    std::uint64_t position, size, compressed_size, records_size;
-    std::string compression;
-    std::map<std::uint16_t, std::uint64_t> indexes;  ///< position by channel
-    std::uint64_t indexes_size;
-  };
-
   std::uint16_t add_schema(const LogSchema& schema);
   void define(const std::string& record);
   void finish_chunk();
@@ -96,7 +88,10 @@ class McapWriter {
   std::map<std::uint16_t, std::vector<Entry>> index_;
   std::uint64_t first_time_ = 0;  ///< of the chunk at work
   std::uint64_t last_time_ = 0;   ///< of the chunk at work
-  std::vector<ChunkPlace> chunks_;
+  std::uint64_t begin_time_ = 0;  ///< of the chunks before
+  std::uint64_t end_time_ = 0;    ///< of the chunks before
+  std::uint32_t chunk_count_ = 0;
+  std::string chunk_indexes_;                      ///< records
   std::map<std::uint16_t, std::uint64_t> counts_;  ///< messages by channel
   std::string other_indexes_;                      ///< records, of attachments and metadata
   std::uint32_t attachments_ = 0;

@@ -27,7 +27,7 @@ class PointCloud2 {
     bool is_big_endian = false;
 
     double value(const std::uint8_t* point) const {
-      return load_scalar(type, reinterpret_cast<const char*>(point) + offset, is_big_endian);
+      return load_scalar(type, point + offset, is_big_endian);
     }
     bool is_integer() const { return type != Scalar::kFloat && type != Scalar::kDouble; }
   };

@@ -24,15 +24,10 @@ enum Opcode : std::uint8_t {
 
 }  // namespace bag
 
-/// The header at the begin of a record.
-Bytes next_header(Bytes& record) {
-  return record.block(record.number<std::uint32_t>("a header length"), "a header");
-}
-
 /// The value of a header field `name`; nothing if the header lacks it.
 std::optional<Bytes> find_field(Bytes header, const std::string& name) {
   while (header.remaining() > 0) {
-    Bytes field = header.block(header.number<std::uint32_t>("a field length"), "a header field");
+    Bytes field = header.block("a header field");
     if (field.remaining() <= name.size()) continue;
     const char* const text = reinterpret_cast<const char*>(field.here());
     if (text[name.size()] != '=' || !std::equal(name.begin(), name.end(), text)) continue;
@@ -84,7 +79,7 @@ class RosBag final : public ChunkedLog {
   }
 
   bool take_record(std::uint64_t position, std::uint64_t size, Bytes head) override {
-    const Bytes header = next_header(head);
+    const Bytes header = head.block("a header");
     const auto opcode = number_in<std::uint8_t>(header, "op");
     if (opcode == bag::kIndexData) {
       take_index(position, size);
@@ -127,10 +122,10 @@ class RosBag final : public ChunkedLog {
   void take_index(std::uint64_t position, std::uint64_t size) {
     FilePart record(file_, position, size, "an index");
     Bytes& rest = record.fields;
-    const Bytes header = next_header(rest);
+    const Bytes header = rest.block("a header");
     if (number_in<std::uint32_t>(header, "ver") != 1) header.fail("expected an index of version 1");
     const auto connection = number_in<std::uint32_t>(header, "conn");
-    Bytes entries = rest.block(rest.number<std::uint32_t>("the length of data"), "an index");
+    Bytes entries = rest.block("an index");
     while (entries.remaining() > 0) {
       const std::uint64_t time = read_time(entries);
       add_indexed(connection, time, entries.number<std::uint32_t>("an offset"));
@@ -138,8 +133,8 @@ class RosBag final : public ChunkedLog {
   }
 
   std::optional<ChunkedLog::Message> parse_record(Bytes& records) override {
-    const Bytes header = next_header(records);
-    const Bytes content = records.block(records.number<std::uint32_t>("a data length"), "data");
+    const Bytes header = records.block("a header");
+    const Bytes content = records.block("data");
     const auto opcode = number_in<std::uint8_t>(header, "op");
     if (opcode == bag::kConnection) take_connection(header, content);
     if (opcode != bag::kMessageData) return std::nullopt;

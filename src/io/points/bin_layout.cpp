@@ -27,8 +27,7 @@ constexpr BinLayout kOthers[] = {{3, false}, {5, false}, {6, false}, {8, false}}
 double value_at(const std::vector<std::uint8_t>& bytes, const BinLayout& layout, std::size_t point,
                 std::size_t column) {
   const std::size_t at = point * point_size(layout) + column * value_size(layout);
-  return load_scalar(layout.is_double ? Scalar::kDouble : Scalar::kFloat,
-                     reinterpret_cast<const char*>(bytes.data()) + at, false);
+  return load_scalar(layout.is_double ? Scalar::kDouble : Scalar::kFloat, &bytes[at], false);
 }
 
 /// Ratio of points whose coordinates, and the next column of mixed ones, are as those of a sensor,

@@ -182,8 +182,7 @@ std::string extra_description(const char* name, Scalar type, const char* descrip
   const auto* const number = std::find(types + 1, std::end(las::kExtraTypes), type);
   return ByteWriter()
       .zeros(2)
-      .number(static_cast<std::uint8_t>(number - types))
-      .number(std::uint8_t{0})
+      .numbers(static_cast<std::uint8_t>(number - types), std::uint8_t{0})
       .text(name, 32)
       .zeros(124)  // no-data, least, most, scale and offset
       .text(description, 32)
@@ -195,8 +194,7 @@ std::string vlr(std::string_view user, std::uint16_t record, const std::string& 
   return ByteWriter()
              .zeros(2)
              .text(user, 16)
-             .number(record)
-             .number(static_cast<std::uint16_t>(content.size()))
+             .numbers(record, static_cast<std::uint16_t>(content.size()))
              .text(description, 32)
              .bytes() +
          content;
@@ -233,8 +231,7 @@ std::uint64_t read_las(const std::filesystem::path& path, PointSink& sink, bool 
     const std::uint64_t position = header.points_begin + first * header.point_size;
     file.read_at(position, count * header.point_size, "points", block);
     for (std::size_t i = 0; i < count; ++i) {
-      const auto* const record =
-          reinterpret_cast<const char*>(block.data()) + i * header.point_size;
+      const std::uint8_t* const record = block.data() + i * header.point_size;
       for (const LasColumn& column : header.columns) {
         double value = load_scalar(column.type, record + column.offset, false);
         const auto axis = static_cast<std::size_t>(column.role);
@@ -264,18 +261,18 @@ std::string las_header(const std::filesystem::path& path, const LasOptions& opti
       .zeros(2)
       .number(std::uint16_t{1U << 4U})
       .zeros(16);
-  out.number(std::uint8_t{1}).number(std::uint8_t{4});
+  out.numbers(std::uint8_t{1}, std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files
-  out.number(static_cast<std::uint16_t>(las::kSizes.header_1_4));
-  out.number(static_cast<std::uint32_t>(las::kSizes.header_1_4 + records.size()));
-  out.number(std::uint32_t{options.wkt.empty() ? 1U : 2U});
+  out.numbers(static_cast<std::uint16_t>(las::kSizes.header_1_4),
+              static_cast<std::uint32_t>(las::kSizes.header_1_4 + records.size()),
+              std::uint32_t{options.wkt.empty() ? 1U : 2U});
   const std::size_t extra =
       sizeof(FilePoint::belief) + sizeof(FilePoint::cause) + sizeof(FilePoint::instance);
-  out.number(kLasPointFormat);
-  out.number(static_cast<std::uint16_t>(las::kPointFormats[kLasPointFormat].size + extra));
+  out.numbers(kLasPointFormat,
+              static_cast<std::uint16_t>(las::kPointFormats[kLasPointFormat].size + extra));
   out.zeros(24);  // numbers of points as in older versions
-  for (int axis = 0; axis < 3; ++axis) out.number(kLasStep);
+  out.numbers(kLasStep, kLasStep, kLasStep);
   for (const double offset : options.offset) out.number(offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (const LasSteps* limit : {&most, &least}) {
@@ -284,7 +281,7 @@ std::string las_header(const std::filesystem::path& path, const LasOptions& opti
     }
   }
   out.zeros(20);  // no records behind the points
-  out.number(std::uint64_t{count}).number(std::uint64_t{count}).zeros(14 * 8);  // all first returns
+  out.numbers(std::uint64_t{count}, std::uint64_t{count}).zeros(14 * 8);  // all first returns
   return out.bytes() + records;
 }
 
@@ -307,11 +304,11 @@ std::string las_record(const std::filesystem::path& path, const LasOptions& opti
   const double intensity = std::round(options.intensity_scale * point.intensity);
   // NaN is not >= 0 and becomes 0.
   record.number(static_cast<std::uint16_t>(intensity >= 0.0 ? std::min(intensity, 65535.0) : 0.0));
-  // Return 1 of 1.
-  record.number(std::uint8_t{1U << 4U | 1U}).number(std::uint8_t{0});
-  record.number(static_cast<std::uint8_t>(point.is_ground ? 2 : 1)).number(std::uint8_t{0});
-  record.number(std::int16_t{0}).number(std::uint16_t{0}).number(point.scan_time);
-  return record.number(point.belief).number(point.cause).number(point.instance).bytes();
+  constexpr std::uint8_t kReturn = 1U << 4U | 1U;  // 1 of 1
+  const auto point_class = static_cast<std::uint8_t>(point.is_ground ? 2 : 1);
+  record.numbers(kReturn, std::uint8_t{0}, point_class, std::uint8_t{0}, std::int16_t{0},
+                 std::uint16_t{0}, point.scan_time);
+  return record.numbers(point.belief, point.cause, point.instance).bytes();
 }
 
 }  // namespace dynains

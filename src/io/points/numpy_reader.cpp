@@ -254,8 +254,7 @@ std::uint64_t read_npy(const std::filesystem::path& path, PointSink& sink, bool 
   sink.resize(static_cast<std::size_t>(count));
   for (const NpyColumn& column : array.columns) {
     if (column.role == Role::kNone) continue;
-    const auto* value =
-        reinterpret_cast<const char*>(content.bytes.data()) + array.data_begin + column.begin;
+    const std::uint8_t* value = content.bytes.data() + array.data_begin + column.begin;
     for (std::size_t i = 0; i < count; ++i, value += stride) {
       if (sink.set(i, column.role, load_scalar(*column.type, value, column.swap))) continue;
       place.fail("expected whole numbers of at least 0 for rings and labels");

@@ -1,5 +1,4 @@
-#include "recording_poses.hpp"
-
+// Poses and times of a recording, and how they belong to its scans.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -376,7 +375,6 @@ std::optional<Pose> pose_at(const RecordingContents& r, double time) {
   return pose_of(r, r.options.convention, *match);
 }
 
-/// Scans without poses: they have times, and count as matched when they get poses.
 void leave_unplaced(RecordingContents& r) {
   if (r.format == ScanFormat::kPcd) read_viewpoints(r);
   const bool has_stamps = r.format == ScanFormat::kLog || r.format == ScanFormat::kNuScenes;
@@ -433,7 +431,6 @@ std::optional<PointClock> found_clock(RecordingContents& r, const std::string& t
   return finding.clock;
 }
 
-/// The trajectory if it has times of its own, else the poses of the scans.
 void prepare_deskewing(RecordingContents& r, const ScanReader& reader) {
   if (!r.columns.time && !r.clock)
     fail(r.folder, "de-skewing needs a time for each point, a column time");
