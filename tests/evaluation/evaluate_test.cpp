@@ -5,6 +5,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/report.hpp"
 #include "evaluation/point_protocol.hpp"
+#include "reference.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
 
@@ -34,10 +35,7 @@ TEST_CASE("Point-wise accuracies are shares of the static and of the dynamic poi
   PointProtocol protocol(EvaluationConfig(), 1);
   for (const OwnedScan& scan : street()) protocol.add(scan.view());
   const Score score = protocol.points(kFirstEstimate);
-  CHECK(score.static_total == 30);
-  CHECK(score.static_kept == 25);
-  CHECK(score.dynamic_total == 12);
-  CHECK(score.dynamic_removed == 8);
+  CHECK(same(score, {30, 25, 12, 8}));
   CHECK(score.kept() == Approx(83.3333333));
   CHECK(score.removed() == Approx(66.6666667));
   CHECK(score.associated() == Approx(74.5355992));  // sqrt(83.33 * 66.67)

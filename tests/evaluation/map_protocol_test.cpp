@@ -53,10 +53,7 @@ TEST_CASE("A measured point is in the map up to the radius, inclusive") {
   const std::vector<Eigen::Vector3d> map = {
       {0.75, 0.5, 0.5}, {4.7578125, 0.5, 0.5}, {12.5, 0.5, 0.5}};
   const Score score = run({scan}, map, map_settings(1.0, 0.25)).points;
-  CHECK(score.static_total == 2);
-  CHECK(score.static_kept == 1);
-  CHECK(score.dynamic_total == 2);
-  CHECK(score.dynamic_removed == 1);
+  CHECK(same(score, {2, 1, 2, 1}));
   CHECK(score.kept() == Approx(50.0));
   CHECK(score.associated() == Approx(50.0));
   CHECK(score.harmonic() == Approx(50.0));
@@ -119,10 +116,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
     const auto raw =
         reference_map(scans, with, [](const OwnedScan&, std::size_t, Truth) { return true; });
     CHECK(same(result.voxels, reference_score(raw, voxelise(labelled, with.voxel), with.voxel)));
-    CHECK(result.points.static_total == points.static_total);
-    CHECK(result.points.static_kept == points.static_kept);
-    CHECK(result.points.dynamic_total == points.dynamic_total);
-    CHECK(result.points.dynamic_removed == points.dynamic_removed);
+    CHECK(same(result.points, points));
     CHECK(points.static_kept < points.static_total);
     CHECK(points.dynamic_removed < points.dynamic_total);
   }

@@ -122,7 +122,6 @@ TEST_CASE("Coordinates far from the origin do not change the score") {
     scan.T_world_sensor.pretranslate(Eigen::Vector3d(500000.0, 5400000.0, 256.0));
   }
   const Score there = run(scans, settings(0.25), 2).score(2);
-  CHECK(here.static_total == there.static_total);
   CHECK(same(here, there));
 }
 
