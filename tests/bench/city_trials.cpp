@@ -6,6 +6,7 @@
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "simulation/simulator.hpp"
+#include "support/points.hpp"
 #include "support/standard.hpp"
 
 using namespace dynains;
@@ -13,17 +14,6 @@ using namespace dynains;
 namespace {
 
 std::uint32_t instance_of(std::uint32_t label) { return label >> 16U; }
-
-PointBuffer points_of(const simulation::SimulatedScan& scan) {
-  PointBuffer points;
-  points.resize(scan.labels.size());
-  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    points.x[i] = scan.xyzi[4 * i];
-    points.y[i] = scan.xyzi[4 * i + 1];
-    points.z[i] = scan.xyzi[4 * i + 2];
-  }
-  return points;
-}
 
 /// Where the objects were whose points a day measured, up to the range of contributions. Labels do
 /// not tell this: they call a car moving that drove off out of sight.
@@ -81,7 +71,7 @@ void add_day(City& city, const simulation::Config& config, Day& day) {
     const simulation::SimulatedScan scan = std::move(open.front());
     open.pop_front();
     const auto number = static_cast<std::uint32_t>(verdict.scan);
-    const PointBuffer points = points_of(scan);
+    const PointBuffer points = test::buffer_of(scan.xyzi);
     writer.add(points, verdict.labels, scan.labels, scan.T_world_sensor, number);
     std::vector<PointLabel> all(verdict.labels.begin(), verdict.labels.end());
     for (PointLabel& label : all) {

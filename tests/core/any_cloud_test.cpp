@@ -2,6 +2,7 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/runs.hpp"
 #include "support/scene.hpp"
 
@@ -98,8 +99,7 @@ TEST_CASE("labels do not depend on the type of the cloud") {
   });
   PointBuffer buffer;
   check([&](const Points& points) {
-    buffer.clear();
-    for (const auto& p : points) buffer.push_back(p.x(), p.y(), p.z());
+    buffer = buffer_of(points);
     return PointsView(buffer);
   });
   check([](const Points& points) {

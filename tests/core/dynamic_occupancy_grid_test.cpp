@@ -2,6 +2,7 @@
 #include "dynains/evidence/dynamic_occupancy_grid.hpp"
 
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 
 namespace dynains::test {
@@ -19,11 +20,9 @@ struct SparseScan {
   std::vector<Verdict> verdicts;
 
   explicit SparseScan(const std::vector<Eigen::Vector3f>& points) {
-    PointBuffer buffer;
-    for (const Eigen::Vector3f& p : points) buffer.push_back(p.x(), p.y(), p.z());
     std::vector<std::uint32_t> instance_of(points.size());
     for (std::uint32_t i = 0; i < instance_of.size(); ++i) instance_of[i] = i;
-    InstanceSampler(0.9, 80.0, 4).sample(buffer, instance_of, points.size(), samples);
+    InstanceSampler(0.9, 80.0, 4).sample(buffer_of(points), instance_of, points.size(), samples);
     counted.assign(samples.supervoxel_count(), Count::kNone);
   }
 

@@ -2,6 +2,7 @@
 #include "dynains/evidence/free_space_evidence.hpp"
 
 #include "support/catch.hpp"
+#include "support/points.hpp"
 
 namespace dynains::test {
 namespace {
@@ -35,15 +36,8 @@ class Watch {
 
   Watch& see(const PointBuffer& instance, const PointBuffer& background = wall(),
              std::uint64_t epoch = 0) {
-    const PointBuffer points = both(instance, background);
-    GroundSplit split;
-    split.resize(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      split.points.x[i] = points.x[i];
-      split.points.y[i] = points.y[i];
-      split.points.z[i] = points.z[i];
-    }
-    std::vector<std::uint32_t> instance_of(points.size(), kNoCluster);
+    const GroundSplit split = split_of(both(instance, background));
+    std::vector<std::uint32_t> instance_of(split.count, kNoCluster);
     std::fill_n(instance_of.begin(), instance.size(), 0U);
     evidence_.observe(splits_.size(), epoch, Eigen::Isometry3d::Identity(), split, instance_of,
                       instance.size() > 0 ? 1 : 0);

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 #include "support/scene.hpp"
 
@@ -213,12 +214,6 @@ std::vector<bool> ground_of(GroundSegmenter& segmenter, PointsView scan) {
 std::vector<bool> ground_of(const GroundConfig& config, PointsView scan) {
   GroundSegmenter segmenter(config);
   return ground_of(segmenter, scan);
-}
-
-PointBuffer buffer_of(const std::vector<Eigen::Vector3f>& points) {
-  PointBuffer result;
-  for (const Eigen::Vector3f& p : points) result.push_back(p.x(), p.y(), p.z());
-  return result;
 }
 
 // Ground with waves, noise and bushes.

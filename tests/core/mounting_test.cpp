@@ -5,24 +5,14 @@
 #include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 #include "support/recordings.hpp"
 
+namespace dynains::test {
 namespace {
 
-using dynains::estimate_mounting;
-using dynains::Mounting;
-using dynains::PointBuffer;
-
 constexpr double kRadians = M_PI / 180.0;
-
-PointBuffer points_of(const std::vector<float>& xyzi) {
-  PointBuffer points;
-  for (std::size_t i = 0; i + 3 < xyzi.size(); i += 4) {
-    points.push_back(xyzi[i], xyzi[i + 1], xyzi[i + 2]);
-  }
-  return points;
-}
 
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) / kRadians;
@@ -44,26 +34,26 @@ PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
 }
 
 TEST_CASE("a heading turns with the points and runs along the scene, to its end with more points") {
-  dynains::test::Random random(11);
+  Random random(11);
   PointBuffer scan;
   for (int i = 0; i < 2000; ++i) {
     scan.push_back(static_cast<float>(random.uniform(-30.0, 50.0)),
                    static_cast<float>(random.uniform(-9.0, 9.0)), 0.0F);
   }
-  CHECK(std::abs(dynains::estimate_heading(scan)) < 0.05);
-  const double plain = dynains::estimate_heading(scan);
+  CHECK(std::abs(estimate_heading(scan)) < 0.05);
+  const double plain = estimate_heading(scan);
   for (const double angle : {0.5, 1.6, 3.1, -2.0, -0.01}) {
     INFO("turned by " << angle);
-    const Eigen::Matrix3f R = dynains::R_headed(-angle).cast<float>();
+    const Eigen::Matrix3f R = R_headed(-angle).cast<float>();
     PointBuffer turned;
     for (std::size_t i = 0; i < scan.size(); ++i) {
       const Eigen::Vector3f p = R * Eigen::Vector3f(scan.x[i], scan.y[i], scan.z[i]);
       turned.push_back(p.x(), p.y(), p.z());
     }
-    const double off = dynains::estimate_heading(turned) - plain - angle;
+    const double off = estimate_heading(turned) - plain - angle;
     CHECK(std::abs(std::remainder(off, 2.0 * M_PI)) < 1e-5);
   }
-  CHECK(dynains::estimate_heading(PointBuffer()) == 0.0);
+  CHECK(estimate_heading(PointBuffer()) == 0.0);
 }
 
 TEST_CASE("A plane and a wall give exact height and tilt") {
@@ -140,7 +130,7 @@ TEST_CASE("Without ground, the mounting is not known") {
   }
   CHECK_FALSE(estimate_mounting(wall).known);
 
-  dynains::test::Random random(5);
+  Random random(5);
   PointBuffer cloud;
   for (int i = 0; i < 20000; ++i) {
     const auto coordinate = [&] { return static_cast<float>(random.uniform(-15.0, 15.0)); };
@@ -182,7 +172,7 @@ TEST_CASE("A plane is no ground if more points are below it than on it, or if it
     for (float a = -2.5F; a < 2.5F; a += 0.23F) {  // a platform of a hundred cells
       for (float b = -2.5F; b < 2.5F; b += 0.23F) points.push_back(a, b, -1.0F);
     }
-    dynains::test::Random random(7);
+    Random random(7);
     const auto scatter = [&](std::size_t count, float low, float high) {
       for (std::size_t i = 0; i < count; ++i) {
         const float x = random.uniform_float(-9.0, 9.0), y = random.uniform_float(-9.0, 9.0);
@@ -201,7 +191,7 @@ TEST_CASE("A plane is no ground if more points are below it than on it, or if it
 }
 
 TEST_CASE("Height and tilt of every sensor in every simulated scene") {
-  namespace sim = dynains::simulation;
+  namespace sim = simulation;
   struct Mount {
     double height, pitch, roll;
   };
@@ -210,14 +200,14 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
   int unknown_in_rooms = 0;
   for (std::size_t i = 0; i < 2 * value_names(sim::Scene()).size(); ++i) {
     const Mount& mount = mounts[(3 * i) % std::size(mounts)];
-    sim::Config config = dynains::test::drive_of(
-        static_cast<sim::Scene>(i % value_names(sim::Scene()).size()),
-        static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size()), 1, 12 + i);
+    sim::Config config =
+        drive_of(static_cast<sim::Scene>(i % value_names(sim::Scene()).size()),
+                 static_cast<sim::Sensor>(i % value_names(sim::Sensor()).size()), 1, 12 + i);
     config.sensor_height = mount.height;
     config.mounting_pitch = mount.pitch;
     config.mounting_roll = mount.roll;
     config.ego_points = i % 2 == 0;
-    const Mounting mounting = estimate_mounting(points_of(sim::Simulator(config).scan(0).xyzi));
+    const Mounting mounting = estimate_mounting(buffer_of(sim::Simulator(config).scan(0).xyzi));
 
     Eigen::Matrix3d R_body_sensor =
         (Eigen::AngleAxisd(mount.pitch * kRadians, Eigen::Vector3d::UnitY()) *
@@ -226,8 +216,8 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     if (config.sensor == sim::Sensor::kPandar64) {
       R_body_sensor = R_body_sensor * Eigen::AngleAxisd(90 * kRadians, Eigen::Vector3d::UnitZ());
     }
-    CAPTURE(dynains::plain_value(config.scene), dynains::plain_value(config.sensor), mount.height,
-            mount.pitch, mount.roll, mounting.height, mounting.up_sensor.transpose());
+    CAPTURE(plain_value(config.scene), plain_value(config.sensor), mount.height, mount.pitch,
+            mount.roll, mounting.height, mounting.up_sensor.transpose());
     // A tilted sensor sees little floor in a small room: its mounting is unknown, not wrong.
     if (!mounting.known && config.scene == sim::Scene::kRoom) {
       ++unknown_in_rooms;
@@ -244,11 +234,11 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
 
 // `height` was measured by hand on ground points around the vehicle.
 void check_mounting(const std::string& name, double height, double tilt) {
-  const auto folder = dynains::test::recording_or_skip(name);
+  const auto folder = recording_or_skip(name);
   if (!folder) return;
-  const dynains::Recording recording(*folder);
+  const Recording recording(*folder);
   for (const std::size_t i : {std::size_t{0}, recording.size() / 2, recording.size() - 1}) {
-    const Mounting mounting = estimate_mounting(points_of(recording.read_scan(i).xyzi));
+    const Mounting mounting = estimate_mounting(buffer_of(recording.read_scan(i).xyzi));
     CAPTURE(i);
     REQUIRE(mounting.known);
     CHECK(std::abs(mounting.height - height) < 0.1);
@@ -263,3 +253,4 @@ TEST_CASE("Height and tilt on a recorded busy street") {
 }
 
 }  // namespace
+}  // namespace dynains::test

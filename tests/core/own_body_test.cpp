@@ -2,6 +2,7 @@
 #include "dynains/sensor/own_body.hpp"
 
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/scene.hpp"
 
 namespace dynains::test {
@@ -12,10 +13,7 @@ std::vector<PointBuffer> drive_past(double step, std::size_t count = 16) {
   std::vector<PointBuffer> scans;
   for (std::size_t i = 0; i < count; ++i) {
     const double x = step * static_cast<double>(i);
-    scans.emplace_back();
-    for (const Eigen::Vector3f& p : yard().scan(sensor_at(x, 0.0, 0.02 * x), 0.0).points) {
-      scans.back().push_back(p.x(), p.y(), p.z());
-    }
+    scans.push_back(buffer_of(yard().scan(sensor_at(x, 0.0, 0.02 * x), 0.0).points));
   }
   return scans;
 }

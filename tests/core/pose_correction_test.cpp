@@ -5,6 +5,7 @@
 #include "dynains/median.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 #include "support/simulated_runs.hpp"
 
@@ -27,17 +28,7 @@ std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
   return simulate(config);
 }
 
-// All points of a scan, as non-ground points.
-GroundSplit split_of(const SimulatedScan& scan) {
-  GroundSplit split;
-  split.resize(scan.labels.size());
-  for (std::size_t i = 0; i < split.count; ++i) {
-    split.points.x[i] = scan.xyzi[4 * i];
-    split.points.y[i] = scan.xyzi[4 * i + 1];
-    split.points.z[i] = scan.xyzi[4 * i + 2];
-  }
-  return split;
-}
+GroundSplit split_of(const SimulatedScan& scan) { return test::split_of(buffer_of(scan.xyzi)); }
 
 // A correction that knows all scans but the last, under their exact poses.
 PoseCorrection after_all_but_last(const std::vector<SimulatedScan>& scans) {
@@ -270,20 +261,19 @@ TEST_CASE("a lasting offset is one residual, and later poses are corrected by it
 // 2,000 more are the rear of a vehicle that is 8 m ahead of the sensor.
 GroundSplit corridor(std::uint64_t seed, float x, bool vehicle) {
   Random random(seed);
-  GroundSplit split;
-  split.resize(vehicle ? 22000 : 20000);
+  PointBuffer points;
   for (std::size_t i = 0; i < 20000; ++i) {
     const int side = static_cast<int>(random.index(3));
-    split.points.x[i] = random.uniform_float(-30.0, 30.0) - x;
-    split.points.y[i] = side == 0 ? random.uniform_float(-4.0, 4.0) : side == 1 ? -4.0F : 4.0F;
-    split.points.z[i] = side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0);
+    const float ahead = random.uniform_float(-30.0, 30.0) - x;
+    const float left = side == 0 ? random.uniform_float(-4.0, 4.0) : side == 1 ? -4.0F : 4.0F;
+    points.push_back(ahead, left, side == 0 ? -1.7F : random.uniform_float(-1.7, 2.0));
   }
-  for (std::size_t i = 20000; i < split.count; ++i) {
-    split.points.x[i] = 8.0F + 0.01F * static_cast<float>(random.normal());
-    split.points.y[i] = random.uniform_float(-0.9, 0.9);
-    split.points.z[i] = random.uniform_float(-1.5, 0.0);
+  for (std::size_t i = 0; vehicle && i < 2000; ++i) {
+    const float ahead = 8.0F + 0.01F * static_cast<float>(random.normal());
+    const float left = random.uniform_float(-0.9, 0.9);
+    points.push_back(ahead, left, random.uniform_float(-1.5, 0.0));
   }
-  return split;
+  return test::split_of(points);
 }
 
 // The observable part of the error grows from scan to scan, and so does the other.

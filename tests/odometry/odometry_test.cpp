@@ -5,9 +5,9 @@
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
 #include "simulation/simulator.hpp"
-#include "support/box_room.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

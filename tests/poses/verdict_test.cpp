@@ -7,9 +7,9 @@
 #include "dynains/threads/in_two_threads.hpp"
 #include "poses/pose_fit.hpp"
 #include "simulation/config.hpp"
-#include "support/box_room.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
+#include "support/scene.hpp"
 #include "support/written_drive.hpp"
 
 namespace dynains::test {

@@ -29,10 +29,7 @@ inline BoxScan scan_boxes(std::vector<StreetBox> boxes, double x, double y) {
   const Eigen::Vector3d origin = scan.T_world_sensor.translation();
   for (double elevation = -20.0; elevation <= 8.0; elevation += 0.8) {
     for (double azimuth = 0.05; azimuth < 360.0; azimuth += 0.5) {
-      const double up = elevation * kRadians;
-      const double around = azimuth * kRadians;
-      const Eigen::Vector3d direction(std::cos(up) * std::cos(around),
-                                      std::cos(up) * std::sin(around), std::sin(up));
+      const Eigen::Vector3d direction = ray_of(elevation * kRadians, azimuth * kRadians);
       double range = direction.z() < 0.0 ? -origin.z() / direction.z() : 1e9;
       std::uint32_t label = 40;
       for (const StreetBox& box : boxes) {
