@@ -136,32 +136,19 @@ TEST_CASE("clusters are those of a breadth-first search over all 26 neighbours")
   };
   const auto c = GENERATE(values<Case>({
       {"a whole scan, sparse", with_voxels(0.5, 0.5, 3.0), {3, 80, -180, 180, -25, 15}, 3000},
-      {"many clusters that nearly touch",
-       with_voxels(1.0, 4.0, 6.0),
-       {3, 40, -180, 180, -25, 15},
-       2000},
+      {"clusters nearly touch", with_voxels(1.0, 4.0, 6.0), {3, 40, -180, 180, -25, 15}, 2000},
       {"one dense lump", with_voxels(0.5, 0.5, 3.0), {10, 14, 20, 30, -5, 5}, 2000},
       {"across the azimuth seam", with_voxels(0.5, 2.0, 3.0), {5, 15, 160, 200, -10, 10}, 500},
       {"straight up and down", with_voxels(0.5, 10.0, 3.0), {3, 10, -180, 180, -90, 90}, 1500},
       {"the zenith alone", with_voxels(0.5, 30.0, 5.0), {3, 6, -180, 180, 80, 90}, 100},
       {"tiny voxels", with_voxels(0.05, 0.1, 0.5, 10.0), {5, 7, -5, 5, -5, 5}, 2000},
       {"huge voxels", with_voxels(20.0, 30.0, 45.0), {3, 90, -180, 180, -90, 90}, 40},
-      {"an azimuth size that does not divide the circle",
-       with_voxels(1.0, 7.0, 3.0),
-       {3, 40, -180, 180, -25, 15},
-       700},
-      {"an elevation size that does not divide the half circle",
-       with_voxels(1.0, 5.0, 7.0),
-       {3, 40, -180, 180, -90, 90},
-       700},
-      {"beyond the horizon of clustering",
-       with_voxels(0.5, 2.0, 3.0, 30.0),
-       {25, 35, -180, 180, -10, 10},
-       1500},
-      {"a horizon in the middle of a voxel",
-       with_voxels(0.5, 2.0, 3.0, 30.3),
-       {25, 35, -180, 180, -10, 10},
-       1500},
+      // Sizes that do not divide the circle and the half circle.
+      {"azimuth of 7 deg", with_voxels(1.0, 7.0, 3.0), {3, 40, -180, 180, -25, 15}, 700},
+      {"elevation of 7 deg", with_voxels(1.0, 5.0, 7.0), {3, 40, -180, 180, -90, 90}, 700},
+      // The range of clustering at a border of voxels and within them.
+      {"range 30 m", with_voxels(0.5, 2.0, 3.0, 30.0), {25, 35, -180, 180, -10, 10}, 1500},
+      {"range 30.3 m", with_voxels(0.5, 2.0, 3.0, 30.3), {25, 35, -180, 180, -10, 10}, 1500},
   }));
   INFO(c.why);
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {

@@ -130,29 +130,28 @@ Epochs epochs_of(const std::vector<SimulatedScan>& scans) {
 }
 
 TEST_CASE("a pose that jumps begins an epoch, or is corrected") {
-  const auto [metres, degrees] = GENERATE(table<double, double>({{0.3, 0.0},
-                                                                 {1.0, 0.3},
-                                                                 {3.0, 2.0},
-                                                                 {9.0, 0.0},
-                                                                 {20.0, 90.0},
-                                                                 {0.0, 1.0},
-                                                                 {0.0, 5.0},
-                                                                 {0.0, 20.0},
-                                                                 {0.0, 90.0}}));
   const Eigen::Isometry3d T_sensor = street()[kJump].T_world_sensor;
-  const Eigen::Isometry3d T_jump =
-      T_sensor * Eigen::Translation3d(0.6 * metres, 0.8 * metres, 0.0) *
-      Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()) * T_sensor.inverse();
-  static const double without = epochs_of(street()).static_share;
-  const Epochs epochs = epochs_of(with_poses(
-      [&](std::size_t i, const Eigen::Isometry3d& T) { return i < kJump ? T : T_jump * T; }));
-  INFO(metres << " m, " << degrees << " deg");
-  const bool is_small = metres < 2.0 && degrees < 2.0;
-  if (!is_small) {
+  const double without = epochs_of(street()).static_share;
+  for (const auto& [metres, degrees] : {std::pair(0.3, 0.0),
+                                        {1.0, 0.3},
+                                        {3.0, 2.0},
+                                        {9.0, 0.0},
+                                        {20.0, 90.0},
+                                        {0.0, 1.0},
+                                        {0.0, 5.0},
+                                        {0.0, 20.0},
+                                        {0.0, 90.0}}) {
+    const Eigen::Isometry3d T_jump =
+        T_sensor * Eigen::Translation3d(0.6 * metres, 0.8 * metres, 0.0) *
+        Eigen::AngleAxisd(degrees * M_PI / 180.0, Eigen::Vector3d::UnitZ()) * T_sensor.inverse();
+    const Epochs epochs = epochs_of(with_poses(
+        [&](std::size_t i, const Eigen::Isometry3d& T) { return i < kJump ? T : T_jump * T; }));
+    INFO(metres << " m, " << degrees << " deg");
+    CHECK(epochs.static_share > without - 0.005);
+    if (metres < 2.0 && degrees < 2.0) continue;  // may be corrected
     REQUIRE(epochs.scans == std::vector<std::size_t>{kJump});
     CHECK(epochs.reasons.front() == EpochReason::kJump);
   }
-  CHECK(epochs.static_share > without - 0.005);
 }
 
 // An odometry without a motion at first takes the second scan for the place of the first one.

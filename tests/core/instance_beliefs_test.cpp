@@ -351,6 +351,14 @@ GroundSplit wall(float range) {
   return split;
 }
 
+// Points straight ahead at these ranges (m), padded for packs.
+PointBuffer points_ahead(const std::vector<float>& ranges) {
+  PointBuffer points;
+  for (const float range : ranges) points.push_back(range, 0.0F, 0.0F);
+  points.grow(ranges.size() + detail::kPackWidth);
+  return points;
+}
+
 // Each reference takes six scans.
 ReferenceScans references_of_sparse_sensor() {
   SensorModel sensor = SensorModel::typical();
@@ -364,10 +372,7 @@ ReferenceScans references_of_sparse_sensor() {
 TEST_CASE("a scan is not tested against its own beams in a reference of several scans") {
   ReferenceScans views = references_of_sparse_sensor();
   views.add(0, 0, 0, Eigen::Isometry3d::Identity(), wall(10.0F), {});
-  PointBuffer points;
-  points.push_back(5.0F, 0.0F, 0.0F);
-  points.push_back(10.0F, 0.0F, 0.0F);
-  points.grow(2 + detail::kPackWidth);
+  const PointBuffer points = points_ahead({5.0F, 10.0F});
   Visibility memory;
   for (const std::uint64_t scan : {0U, 1U, 2U}) {
     const Visibility& visibility =
@@ -398,10 +403,7 @@ TEST_CASE("scans of a reference share an image while the sensor stays near") {
   CHECK(view.T_world_beams(0, 3) == Approx(1.06));  // of scan 10
   CHECK(view.image.grid().columns > 450);
   // The walls of all scans lie at x = 10 m.
-  PointBuffer points;
-  points.push_back(6.0F, 0.0F, 0.0F);
-  points.push_back(10.0F, 0.0F, 0.0F);
-  points.grow(2 + detail::kPackWidth);
+  const PointBuffer points = points_ahead({6.0F, 10.0F});
   Visibility memory;
   const Visibility& visibility =
       views.test(points, 2, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);
@@ -461,12 +463,8 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
       REQUIRE(views.find(scan, epoch_of(scan) + 1) == nullptr);
     }
     // A beam of the last reference passes points nearer than its walls, and hits the nearest one.
-    PointBuffer points;
     const auto nearest = 5.0F + 0.1F * static_cast<float>(views.newest().views.front().first);
-    points.push_back(nearest - 2.0F, 0.0F, 0.0F);
-    points.push_back(nearest, 0.0F, 0.0F);
-    points.push_back(nearest + 2.0F, 0.0F, 0.0F);
-    points.grow(3 + detail::kPackWidth);
+    const PointBuffer points = points_ahead({nearest - 2.0F, nearest, nearest + 2.0F});
     detail::Visibility memory;
     const detail::Visibility& visibility =
         views.test(points, 3, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);

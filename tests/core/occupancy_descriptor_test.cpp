@@ -97,17 +97,20 @@ std::optional<ReferenceDescriptor> describe(const OccupancyDescriptor::Config& c
 // and so on up to 19, with points of another cluster in between.
 class Cluster {
  public:
-  Cluster& point(double range, double azimuth_degrees, double z) {
-    if (left_ == 0) begin_range();
-    add(window_, range, azimuth_degrees, z);
-    ++ranges_.back().end;
-    --left_;
-    return *this;
+  using Scan = std::vector<std::array<double, 3>>;  // range (m), azimuth (deg), z (m)
+
+  Cluster(std::initializer_list<Scan> scans) {
+    for (const Scan& scan : scans) add_scan(scan);
   }
-  Cluster& end_of_scan() {
+  void add_scan(const Scan& scan) {
+    for (const auto& [range, azimuth, z] : scan) {
+      if (left_ == 0) begin_range();
+      add(window_, range, azimuth, z);
+      ++ranges_.back().end;
+      --left_;
+    }
     first_range_.push_back(static_cast<std::uint32_t>(ranges_.size()));
     left_ = 0;
-    return *this;
   }
   ClusterView view() const { return {window_.view(), ranges_, first_range_}; }
 
@@ -157,13 +160,8 @@ TEST_CASE("Eq. 5-12 of a cluster worked by hand") {
   // Newest: (10.0,  0) z =  0.0 -> cell (1,1), h = 1.0    (10.6, 12) z = 1.0 -> (2,2), h = 2.0
   //   h_old = (0, 0, 0, 1.5), h_new = (1, 0, 0, 2)                                  (Eq. 8-10)
   //   d = 1.5 * 2 / (1.5 * sqrt(1 + 4)) = 2 / sqrt(5) = 0.894427                    (Eq. 11)
-  const Cluster cluster = Cluster()
-                              .point(10.0, 0.0, -1.0)
-                              .point(10.6, 12.0, 0.5)
-                              .end_of_scan()
-                              .point(10.0, 0.0, 0.0)
-                              .point(10.6, 12.0, 1.0)
-                              .end_of_scan();
+  const Cluster cluster = {{{10.0, 0.0, -1.0}, {10.6, 12.0, 0.5}},
+                           {{10.0, 0.0, 0.0}, {10.6, 12.0, 1.0}}};
   const OccupancyDescriptor descriptor = described(make(0.5, 10.0), cluster);
   CHECK(descriptor.radial_cells() == 2);
   CHECK(descriptor.azimuth_cells() == 2);
@@ -183,13 +181,7 @@ TEST_CASE("a similarity of exactly tau_s is no proposal") {
   // h_old = (3, 0, 4), h_new = (3, 0, 0) over a lowest point of its own cell: d = 9 / (5 * 3) =
   // 0.6.
   const auto make_cluster = [](double z) {
-    return Cluster()
-        .point(10.0, 0.0, 3.0)
-        .point(10.6, 0.0, 0.0)
-        .point(11.2, 0.0, z)
-        .end_of_scan()
-        .point(10.0, 0.0, 3.0)
-        .end_of_scan();
+    return Cluster({{{10.0, 0.0, 3.0}, {10.6, 0.0, 0.0}, {11.2, 0.0, z}}, {{10.0, 0.0, 3.0}}});
   };
   CHECK(described(make(0.5, 10.0), make_cluster(4.0)).similarity() == 0.6);
   CHECK_FALSE(described(make(0.5, 10.0), make_cluster(4.0)).proposes_dynamic());
@@ -199,13 +191,8 @@ TEST_CASE("a similarity of exactly tau_s is no proposal") {
 TEST_CASE("the low share of tall objects has no height") {
   // z from -1 to `top`: over 1 m, the lowest 20 % do not count.
   const auto cluster = [](double top) {
-    return Cluster()
-        .point(10.0, 0.0, -1.0)
-        .point(10.6, 0.0, -1.0 + 0.19 * (top + 1.0))
-        .point(11.2, 0.0, -1.0 + 0.21 * (top + 1.0))
-        .end_of_scan()
-        .point(11.7, 0.0, top)
-        .end_of_scan();
+    const double low = -1.0 + 0.19 * (top + 1.0), high = -1.0 + 0.21 * (top + 1.0);
+    return Cluster({{{10.0, 0.0, -1.0}, {10.6, 0.0, low}, {11.2, 0.0, high}}, {{11.7, 0.0, top}}});
   };
   OccupancyDescriptor::Config config = make(0.5, 10.0);
   config.ignored_low = 0.2;
@@ -217,15 +204,9 @@ TEST_CASE("the low share of tall objects has no height") {
 
 TEST_CASE(
     "bounds of the ends leave out observations between them, and the belief has its own grid") {
-  const Cluster cluster = Cluster()
-                              .end_of_scan()  // no observation
-                              .point(10.0, 0.0, 0.0)
-                              .point(10.9, 0.0, 1.0)
-                              .end_of_scan()
-                              .point(5.0, 90.0, -3.0)
-                              .end_of_scan()
-                              .point(10.2, 4.0, 2.0)
-                              .end_of_scan();
+  // No observation in the oldest scan.
+  const Cluster cluster = {
+      {}, {{10.0, 0.0, 0.0}, {10.9, 0.0, 1.0}}, {{5.0, 90.0, -3.0}}, {{10.2, 4.0, 2.0}}};
   OccupancyDescriptor::Config config = make(0.5, 10.0);
   CHECK_FALSE(config.of_belief());
   config.bounds_of_ends = true;
@@ -271,16 +252,15 @@ TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     Random random(seed);
     const int scans = 2 + static_cast<int>(seed % 4);
-    Cluster cluster;
+    Cluster cluster{};
     for (int k = 0; k < scans; ++k) {
+      Cluster::Scan scan;
       for (std::size_t i = 0; i < c.points / static_cast<std::size_t>(scans); ++i) {
         const Eigen::Vector3d p =
             random.vector({10.0, c.azimuth_min, -1.7}, {c.range_max, c.azimuth_max, 2.0});
-        double azimuth = p.y();
-        if (azimuth > 180.0) azimuth -= 360.0;
-        cluster.point(p.x(), azimuth, p.z());
+        scan.push_back({p.x(), p.y() > 180.0 ? p.y() - 360.0 : p.y(), p.z()});
       }
-      cluster.end_of_scan();
+      cluster.add_scan(scan);
     }
     const auto expected = describe(config, cluster.view());
     if (!expected) continue;
@@ -305,33 +285,18 @@ TEST_CASE("descriptors are those of Eq. 5-11 in double on random clusters") {
 
 TEST_CASE("a point on the outer border belongs to the last cell") {
   // Extent 1.0 m of 0.5 m cells: N_r = 2, and r_max would be in a third cell by Eq. 8.
-  const Cluster cluster = Cluster()
-                              .point(10.0, 0.0, 0.0)
-                              .point(11.0, 0.0, 2.0)
-                              .end_of_scan()
-                              .point(10.0, 0.0, 1.0)
-                              .end_of_scan();
+  const Cluster cluster = {{{10.0, 0.0, 0.0}, {11.0, 0.0, 2.0}}, {{10.0, 0.0, 1.0}}};
   const OccupancyDescriptor descriptor = described(make(0.5, 10.0), cluster);
   CHECK(descriptor.radial_cells() == 2);
   check_heights(descriptor.heights(0), {0.0, 2.0});
 }
 
 TEST_CASE("observations without any height are equal to each other and unlike all others") {
-  SECTION("both flat: static") {
-    const Cluster flat =
-        Cluster().point(10.0, 0.0, 1.0).end_of_scan().point(12.0, 0.0, 1.0).end_of_scan();
-    CHECK(described(make(0.25, 1.5), flat).similarity() == 1.0);
-  }
-  SECTION("one flat: proposed") {
-    const Cluster half = Cluster()
-                             .point(10.0, 0.0, 0.0)
-                             .end_of_scan()
-                             .point(10.0, 0.0, 0.0)
-                             .point(12.0, 0.0, 1.0)
-                             .end_of_scan();
-    CHECK(described(make(0.25, 1.5), half).similarity() == 0.0);
-    CHECK(described(make(0.25, 1.5), half).proposes_dynamic());
-  }
+  const Cluster flat = {{{10.0, 0.0, 1.0}}, {{12.0, 0.0, 1.0}}};
+  CHECK(described(make(0.25, 1.5), flat).similarity() == 1.0);
+  const Cluster half = {{{10.0, 0.0, 0.0}}, {{10.0, 0.0, 0.0}, {12.0, 0.0, 1.0}}};
+  CHECK(described(make(0.25, 1.5), half).similarity() == 0.0);
+  CHECK(described(make(0.25, 1.5), half).proposes_dynamic());
 }
 
 }  // namespace

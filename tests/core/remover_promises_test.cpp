@@ -82,21 +82,19 @@ TEST_CASE("the map is exactly the points with a static final label, each once") 
   DynaInsRemover remover(config);
   const Run result = run(remover, scans);
   std::array<std::vector<double>, 3> expected, found;  // coordinates
+  const auto add = [](const Eigen::Vector3d& p, auto& axes) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      axes[axis].push_back(p[static_cast<Eigen::Index>(axis)]);
+    }
+  };
   for (const Verdict& verdict : result.final) {
     const Scan& scan = scans[verdict.scan];
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
       if (!is_static(verdict.labels[i])) continue;
-      const Eigen::Vector3d p = scan.T_world_sensor * scan.points[i].cast<double>();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        expected[axis].push_back(p[static_cast<Eigen::Index>(axis)]);
-      }
+      add(scan.T_world_sensor * scan.points[i].cast<double>(), expected);
     }
   }
-  remover.map().for_each([&](const Eigen::Vector3d& p) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      found[axis].push_back(p[static_cast<Eigen::Index>(axis)]);
-    }
-  });
+  remover.map().for_each([&](const Eigen::Vector3d& p) { add(p, found); });
   for (std::size_t axis = 0; axis < 3; ++axis) {
     REQUIRE(found[axis].size() == expected[axis].size());
     std::sort(found[axis].begin(), found[axis].end());
@@ -311,12 +309,14 @@ Scene street_corner() {
            {{6.0, 16.0, 0.0}, {15.0, 16.5, 4.0}}}};
 }
 
+std::size_t removed_of(int object, const Config& config, const std::vector<Scan>& scans) {
+  return share(scans, run(config, scans).final, PointLabel::kDynamic, object).labelled;
+}
+
 TEST_CASE("belief reverts a wall that comes into view, and no van") {
   const std::vector<Scan> scans = drive(street_corner(), 16, 4.0);
   Config config = Config::paper();
-  const auto removed = [&](int object) {
-    return share(scans, run(config, scans).final, PointLabel::kDynamic, object).labelled;
-  };
+  const auto removed = [&](int object) { return removed_of(object, config, scans); };
   config.use_belief = false;
   const std::size_t wall_without_belief = removed(kWall);
   const std::size_t van_without_belief = removed(kVan);
@@ -337,9 +337,7 @@ TEST_CASE("rules of the public implementation: big instances, and those that com
   constexpr int kHighVan = 3;
   const std::vector<Scan> scans = drive(scene, 16, 4.0);
   Config config = Config::paper();
-  const auto removed = [&](int object) {
-    return share(scans, run(config, scans).final, PointLabel::kDynamic, object).labelled;
-  };
+  const auto removed = [&](int object) { return removed_of(object, config, scans); };
   const std::size_t van = removed(kVan), high_van = removed(kHighVan);
   REQUIRE(van > 2000);
   REQUIRE(high_van > 500);

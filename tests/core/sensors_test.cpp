@@ -52,6 +52,12 @@ RawPoints<float> cloud_of(const MergedScan& scan) {
   return {scan.points.front().data(), scan.points.size(), 3, scan.sensors.data()};
 }
 
+/// Points of the first sensor, which come first.
+std::size_t points_of_first(const MergedScan& scan) {
+  const auto& sensors = scan.sensors;
+  return static_cast<std::size_t>(std::count(sensors.begin(), sensors.end(), std::uint8_t{0}));
+}
+
 /// Shares of the removed points of the van, and of the removed points of everything else.
 struct Removed {
   double van = 0.0, rest = 0.0;
@@ -92,8 +98,7 @@ TEST_CASE("points of two sensors are judged by the rays of both") {
 
   // The sensors as ranges of the cloud instead of an accessor.
   const Removed by_ranges = removed(config, scans, [](auto& remover, const MergedScan& scan) {
-    const auto first = static_cast<std::size_t>(
-        std::count(scan.sensors.begin(), scan.sensors.end(), std::uint8_t{0}));
+    const std::size_t first = points_of_first(scan);
     const std::vector<SensorRange> ranges = {{first, scan.points.size() - first, 1}};
     return remover.push(scan.points, scan.T_world_sensor, scan.time, ranges);
   });
@@ -109,8 +114,7 @@ TEST_CASE("a sensor that is missing at first, or in between, is no fault") {
   std::vector<MergedScan> scans = merged(oncoming(), 12, corners());
   for (const std::size_t i : {0, 1, 7}) {
     MergedScan& scan = scans[i];
-    const auto first = static_cast<std::size_t>(
-        std::count(scan.sensors.begin(), scan.sensors.end(), std::uint8_t{0}));
+    const std::size_t first = points_of_first(scan);
     scan.points.resize(first);
     scan.object.resize(first);
     scan.sensors.resize(first);

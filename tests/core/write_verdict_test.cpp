@@ -74,6 +74,15 @@ Cause static_cause(DecisionStage stage) {
                                                 : Cause::kReverted;
 }
 
+// The answer for one point; an instance has the number of its cluster and 100.
+void require_answer(const ScanVerdict& verdict, std::size_t point, PointLabel label, Cause cause,
+                    float belief, std::uint32_t cluster) {
+  REQUIRE(verdict.labels[point] == label);
+  REQUIRE(verdict.causes[point] == cause);
+  REQUIRE(verdict.beliefs[point] == belief);
+  REQUIRE(verdict.instances[point] == (cluster == kNoCluster ? kNoInstance : 100 + cluster));
+}
+
 TEST_CASE("verdicts by point run equal those by point, at once and after more windows") {
   // One set of objects for all scans, as in the pipeline.
   detail::ScanSlot scan;
@@ -119,26 +128,18 @@ TEST_CASE("verdicts by point run equal those by point, at once and after more wi
       for (std::size_t i = 0; i < points; ++i) {
         const std::uint32_t to = order[ground + i];
         const bool dynamic = expected[i].votes >= votes;
-        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
-        REQUIRE(verdict.causes[to] ==
-                (dynamic ? Cause::kProposed : static_cause(expected[i].stage)));
-        REQUIRE(verdict.beliefs[to] == expected[i].belief);
+        require_answer(verdict, to, dynamic ? PointLabel::kDynamic : PointLabel::kStatic,
+                       dynamic ? Cause::kProposed : static_cause(expected[i].stage),
+                       expected[i].belief, cluster_of[i]);
         REQUIRE(writer.is_kept()[ground + i] == (dynamic ? 0 : 1));
-        REQUIRE(verdict.instances[to] ==
-                (cluster_of[i] == kNoCluster ? kNoInstance : 100 + cluster_of[i]));
       }
       for (std::size_t i = 0; i < ground; ++i) {
-        const std::uint32_t to = order[i];
-        REQUIRE(verdict.labels[to] == PointLabel::kGround);
-        REQUIRE(verdict.causes[to] == Cause::kGround);
-        REQUIRE(verdict.beliefs[to] == 0.0F);
-        REQUIRE(verdict.instances[to] == kNoInstance);
+        require_answer(verdict, order[i], PointLabel::kGround, Cause::kGround, 0.0F, kNoCluster);
         REQUIRE(writer.is_kept()[i] == 1);
       }
       for (std::size_t i = ground + points; i < order.size(); ++i) {
-        REQUIRE(verdict.labels[order[i]] == PointLabel::kInvalid);
-        REQUIRE(verdict.causes[order[i]] == Cause::kNotJudged);
-        REQUIRE(verdict.instances[order[i]] == kNoInstance);
+        require_answer(verdict, order[i], PointLabel::kInvalid, Cause::kNotJudged, 0.0F,
+                       kNoCluster);
       }
     };
 
@@ -225,29 +226,23 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
         const std::uint32_t cluster = group == 0 ? kNoCluster : scan.cluster_of[group - 1];
         const EvidenceVerdict::Group& expected = groups[group];
         const bool dynamic = is_dynamic(expected.cause);
-        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kStatic));
-        REQUIRE(verdict.causes[to] == expected.cause);
-        REQUIRE(verdict.beliefs[to] == expected.belief);
-        REQUIRE(verdict.instances[to] == (cluster == kNoCluster ? kNoInstance : 100 + cluster));
+        require_answer(verdict, to, dynamic ? PointLabel::kDynamic : PointLabel::kStatic,
+                       expected.cause, expected.belief, cluster);
         REQUIRE(writer.is_kept()[scan.ground + i] == (dynamic ? 0 : 1));
       }
       for (std::uint32_t i = 0; i < scan.ground; ++i) {
-        const std::uint32_t to = scan.order[i];
         const bool dynamic = std::any_of(moved.begin(), moved.end(),
                                          [i](const auto& point) { return point.point == i; });
-        REQUIRE(verdict.labels[to] == (dynamic ? PointLabel::kDynamic : PointLabel::kGround));
-        REQUIRE(verdict.causes[to] == (dynamic ? Cause::kUnderInstance : Cause::kGround));
-        REQUIRE(verdict.beliefs[to] == (dynamic ? 0.75F : 0.0F));
-        REQUIRE(verdict.instances[to] == kNoInstance);
+        require_answer(verdict, scan.order[i], dynamic ? PointLabel::kDynamic : PointLabel::kGround,
+                       dynamic ? Cause::kUnderInstance : Cause::kGround, dynamic ? 0.75F : 0.0F,
+                       kNoCluster);
         REQUIRE(writer.is_kept()[i] == (dynamic ? 0 : 1));
       }
       std::size_t outside = 0;
       for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
         if (verdict.labels[i] != PointLabel::kOutOfRange) continue;
         ++outside;
-        REQUIRE(verdict.causes[i] == Cause::kNotJudged);
-        REQUIRE(verdict.beliefs[i] == 0.0F);
-        REQUIRE(verdict.instances[i] == kNoInstance);
+        require_answer(verdict, i, PointLabel::kOutOfRange, Cause::kNotJudged, 0.0F, kNoCluster);
       }
       REQUIRE(outside == verdict.labels.size() - slot.split.count);
     };
