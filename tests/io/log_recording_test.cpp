@@ -20,9 +20,10 @@ const LogChannel kPoints = {"/points", "sensor_msgs/msg/PointCloud2"};
 const LogChannel kTf = {"/tf", "tf2_msgs/msg/TFMessage"};
 const LogChannel kStaticTf = {"/tf_static", "tf2_msgs/msg/TFMessage"};
 const LogChannel kOdometry = {"/odom", "nav_msgs/msg/Odometry"};
+const std::vector<LogChannel> kDrive = {kPoints, kTf, kStaticTf};  // of drive_by_transforms()
 
 /// Four clouds in frame `frame`, one metre apart along x.
-std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding,
+std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding = MessageEncoding::kCdr,
                                                 const std::string& frame = "lidar") {
   std::vector<WrittenMessage> messages = {
       {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar, encoding)}};
@@ -33,10 +34,6 @@ std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding,
     messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, frame, encoding)});
   }
   return messages;
-}
-
-std::string drive_mcap() {
-  return mcap_file({kPoints, kTf, kStaticTf}, drive_by_transforms(MessageEncoding::kCdr), {});
 }
 
 /// Three clouds in frame `frame` on channel 0, and `poses` on channel 1.
@@ -63,6 +60,18 @@ std::string log_error(const fs::path& log, const RecordingOptions& options = {})
   return message_of<IoError>([&] { Recording(log, options); });
 }
 
+/// A log in a folder of its own.
+struct Log {
+  void write(const std::vector<LogChannel>& channels,
+             const std::vector<WrittenMessage>& messages) const {
+    write_text(path, mcap_file(channels, messages, {}));
+  }
+  std::string error(const RecordingOptions& options = {}) const { return log_error(path, options); }
+
+  TemporaryFolder folder;
+  fs::path path = folder / "drive.mcap";
+};
+
 bool has_note(const Recording& recording, const std::string& part) {
   return std::any_of(recording.notes().begin(), recording.notes().end(),
                      [&](const auto& note) { return note.find(part) != std::string::npos; });
@@ -88,13 +97,11 @@ void check_drive(const fs::path& log) {
 }  // namespace
 
 TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "base.mcap";
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf},
-                            drive_by_transforms(MessageEncoding::kCdr, "base"), {}));
+  const Log log;
+  log.write({kPoints, kTf, kStaticTf}, drive_by_transforms(MessageEncoding::kCdr, "base"));
   RecordingOptions options;
   options.sensor_frame = "lidar";
-  const Recording recording(log, options);
+  const Recording recording(log.path, options);
   CHECK(recording.sensor_origin().isApprox(kT_base_lidar.translation()));
   const Eigen::Vector3d origin = kT_base_lidar.translation();
   const Eigen::Vector3d expected = Eigen::Vector3d(2, 0, 0) + origin;
@@ -104,21 +111,20 @@ TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
   CHECK(recording.read_scan(1).xyzi ==
         std::vector<float>{1 - x, 2 - y, 3 - z, 0, 4 - x, 5 - y, 6 - z, 0});
 
-  write_text(folder / "poses.txt", "1 0 0 0 0 0 0 1\n1.4 4 0 0 0 0 0 1\n");
-  options.poses = folder / "poses.txt";
-  CHECK(Recording(log, options).T_world_sensor(2).translation().isApprox(expected));
+  write_text(log.folder / "poses.txt", "1 0 0 0 0 0 0 1\n1.4 4 0 0 0 0 0 1\n");
+  options.poses = log.folder / "poses.txt";
+  CHECK(Recording(log.path, options).T_world_sensor(2).translation().isApprox(expected));
 
   options.sensor_frame = "radar";
-  CHECK_THAT(log_error(log, options),
+  CHECK_THAT(log.error(options),
              ContainsSubstring("to frame radar; found transforms of base, lidar"));
 }
 
 TEST_CASE("Clouds of several topics within half a period are one scan, at one time") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "rig.mcap";
+  const Log log;
   const Eigen::Isometry3d T_base_rear = pose_at(-2, 0);
   const LogChannel rear = {"/rear", "sensor_msgs/msg/PointCloud2"};
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "rear", T_base_rear)});
   for (const double time : {0.98, 1.04, 1.13, 1.38}) {  // twice, once, never, and too late
     messages.push_back({3, nanoseconds(time), small_cloud(time, "rear")});
@@ -127,10 +133,10 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
     messages.push_back(
         {1, nanoseconds(time), transform(time, "odom", "base", pose_at(10 * time - 10, 0))});
   }
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf, rear}, messages, {}));
+  log.write({kPoints, kTf, kStaticTf, rear}, messages);
   RecordingOptions options;
   options.cloud_topic = "/points, /rear";
-  const Recording recording(log, options);
+  const Recording recording(log.path, options);
   REQUIRE(recording.size() == 5);
   REQUIRE(recording.sensors().size() == 2);
   CHECK(recording.sensors()[0].isApprox(Pose::Identity()));
@@ -154,25 +160,24 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
   CHECK(scan.time[3] == Approx(0.03));
 
   options.without_poses = true;  // the odometry gets the times instead
-  const Recording unplaced(log, options);
+  const Recording unplaced(log.path, options);
   const RecordedScan raw = unplaced.read_scan(1);
   const Eigen::Vector3d at_its_time = unplaced.sensors()[1] * measured;
   CHECK(Eigen::Vector3f(raw.xyzi.data() + 8).isApprox(at_its_time.cast<float>(), 1e-5F));
   CHECK(unplaced.point_offsets(1, raw).back() == Approx(0.03));
 
   options.cloud_topic = "/points,/points";
-  CHECK_THAT(log_error(log, options), ContainsSubstring("each topic once, found /points twice"));
+  CHECK_THAT(log.error(options), ContainsSubstring("each topic once, found /points twice"));
   messages.erase(messages.begin());
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf, rear}, messages, {}));
+  log.write({kPoints, kTf, kStaticTf, rear}, messages);
   options.cloud_topic = "/points,/rear";
   CHECK_THAT(
-      log_error(log, options),
+      log.error(options),
       ContainsSubstring("expected a transform from frame lidar of the clouds to frame rear"));
 }
 
 TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "rig.mcap";
+  const Log log;
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr, "base");
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "left", pose_at(1, 0))});
   MessageWriter info(MessageEncoding::kCdr);
@@ -186,8 +191,8 @@ TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") 
   add("left", 0);
   messages.push_back({3, nanoseconds(1.1), info.bytes()});
   const LogChannel infos = {"/info", "autoware_sensing_msgs/msg/ConcatenatedPointCloudInfo"};
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf, infos}, messages, {}));
-  const Recording recording(log);
+  log.write({kPoints, kTf, kStaticTf, infos}, messages);
+  const Recording recording(log.path);
   REQUIRE(recording.sensors().size() == 2);
   const RecordedScan scan = recording.read_scan(1);
   REQUIRE(scan.sensor.size() == 2);
@@ -198,7 +203,7 @@ TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") 
 
 TEST_CASE("A log of each format is a recording with clouds and with poses from transforms") {
   const TemporaryFolder folder;
-  write_text(folder / "drive.mcap", drive_mcap());
+  write_text(folder / "drive.mcap", mcap_file(kDrive, drive_by_transforms(), {}));
   check_drive(folder / "drive.mcap");
   for (const char* name : {"drive.bag", "drive.bag.active"}) {  // of a recorder that still runs
     write_text(folder / name, bag_file({{"/points", "sensor_msgs/PointCloud2"},
@@ -208,40 +213,39 @@ TEST_CASE("A log of each format is a recording with clouds and with poses from t
     check_drive(folder / name);
   }
 #if defined(DYNAINS_HAS_SQLITE3)
-  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf},
-            drive_by_transforms(MessageEncoding::kCdr));
+  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf}, drive_by_transforms());
   check_drive(folder / "drive.db3");
 #endif
 }
 
 TEST_CASE("Poses of a file belong to the clouds of a log by time") {
-  const TemporaryFolder folder;
-  write_text(folder / "drive.mcap", drive_mcap());
-  write_text(folder / "poses.tum",
+  const Log log;
+  log.write(kDrive, drive_by_transforms());
+  write_text(log.folder / "poses.tum",
              "1.0 5 0 0 0 0 0 1\n1.1 6 0 0 0 0 0 1\n1.2 7 0 0 0 0 0 1\n1.3 8 0 0 0 0 0 1\n");
   RecordingOptions options;
-  options.poses = folder / "poses.tum";
-  const Recording recording(folder / "drive.mcap", options);
+  options.poses = log.folder / "poses.tum";
+  const Recording recording(log.path, options);
   CHECK(recording.T_world_sensor(2).translation().x() == Approx(7.0));
-  CHECK(recording.files() == std::vector<fs::path>{folder / "drive.mcap", folder / "poses.tum"});
-  options.times = folder / "times.txt";
-  CHECK_THAT(log_error(folder / "drive.mcap", options),
-             StartsWith((folder / "times.txt").string() + ": expected no file of times"));
+  CHECK(recording.files() == std::vector<fs::path>{log.path, log.folder / "poses.tum"});
+  options.times = log.folder / "times.txt";
+  CHECK_THAT(log.error(options),
+             StartsWith((log.folder / "times.txt").string() + ": expected no file of times"));
 }
 
 TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
+  const Log log;
   std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)});
-  write_text(log, mcap_file({kPoints, kOdometry, kStaticTf}, messages, {}));
-  CHECK(Recording(log).T_world_sensor(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
-  CHECK(has_note(Recording(log), "the transform from lidar to base is from the log"));
+  log.write({kPoints, kOdometry, kStaticTf}, messages);
+  CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
+  CHECK(has_note(Recording(log.path), "the transform from lidar to base is from the log"));
 
   messages.pop_back();
-  write_text(log, mcap_file({kPoints, kOdometry}, messages, {}));
-  CHECK(Recording(log).T_world_sensor(2).isApprox(pose_at(2, 0.1), 1e-9));
-  CHECK(has_note(Recording(log), "no transform from lidar to base: poses count as those of lidar"));
+  log.write({kPoints, kOdometry}, messages);
+  CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1), 1e-9));
+  CHECK(has_note(Recording(log.path),
+                 "no transform from lidar to base: poses count as those of lidar"));
 
   std::vector<std::string> poses;
   for (int i = 0; i < 3; ++i) {
@@ -250,16 +254,14 @@ TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
                         .pose(pose_at(i, 0.1))
                         .bytes());
   }
-  write_text(log, mcap_file({kPoints, {"/pose", "geometry_msgs/msg/PoseStamped"}},
-                            clouds_with("lidar", poses), {}));
-  CHECK(Recording(log).T_world_sensor(1).isApprox(pose_at(1, 0.1), 1e-9));
+  log.write({kPoints, {"/pose", "geometry_msgs/msg/PoseStamped"}}, clouds_with("lidar", poses));
+  CHECK(Recording(log.path).T_world_sensor(1).isApprox(pose_at(1, 0.1), 1e-9));
 }
 
 TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the sensor") {
-  const TemporaryFolder folder;
-  write_text(folder / "drive.mcap",
-             mcap_file({kPoints, kOdometry}, clouds_with("odom", three_odometries("body")), {}));
-  const Recording recording(folder / "drive.mcap");
+  const Log log;
+  log.write({kPoints, kOdometry}, clouds_with("odom", three_odometries("body")));
+  const Recording recording(log.path);
   CHECK(recording.frame() == PointFrame::kWorld);
   const RecordedScan scan = recording.read_scan(2);
   const Eigen::Vector3d expected = pose_at(2, 0.1).inverse() * Eigen::Vector3d(1, 2, 3);
@@ -267,101 +269,97 @@ TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the 
 }
 
 TEST_CASE("Topics are found if there is only one, and listed otherwise") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
+  const Log log;
   std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
   for (const WrittenMessage& message : clouds_with("rear", three_odometries("wheels"))) {
     messages.push_back(
         {static_cast<std::uint16_t>(message.channel + 2), message.time, message.data});
   }
-  write_text(log, mcap_file({kPoints,
-                             kOdometry,
-                             {"/rear", "sensor_msgs/msg/PointCloud2"},
-                             {"/wheels", "nav_msgs/msg/Odometry"}},
-                            messages, {}));
+  log.write({kPoints,
+             kOdometry,
+             {"/rear", "sensor_msgs/msg/PointCloud2"},
+             {"/wheels", "nav_msgs/msg/Odometry"}},
+            messages);
   RecordingOptions options;
-  CHECK(log_error(log) == log.string() +
-                              ": expected one topic with clouds, or --cloud-topic; found /points "
-                              "(sensor_msgs/PointCloud2, 3 messages), /rear "
-                              "(sensor_msgs/PointCloud2, 3 messages)");
+  CHECK(log.error() == log.path.string() +
+                           ": expected one topic with clouds, or --cloud-topic; found /points "
+                           "(sensor_msgs/PointCloud2, 3 messages), /rear "
+                           "(sensor_msgs/PointCloud2, 3 messages)");
   options.cloud_topic = "/none";
-  CHECK_THAT(log_error(log, options),
-             ContainsSubstring("expected clouds on topic /none; found /p"));
+  CHECK_THAT(log.error(options), ContainsSubstring("expected clouds on topic /none; found /p"));
   options.cloud_topic = "/points";
-  CHECK_THAT(log_error(log, options),
+  CHECK_THAT(log.error(options),
              ContainsSubstring("expected one topic with poses, or --pose-topic; found /odom"));
   options.pose_topic = "/points";
-  CHECK_THAT(log_error(log, options), ContainsSubstring("expected poses on topic /points; found"));
+  CHECK_THAT(log.error(options), ContainsSubstring("expected poses on topic /points; found"));
   options.pose_topic = "/odom";
-  CHECK(Recording(log, options).size() == 3);
+  CHECK(Recording(log.path, options).size() == 3);
 
-  write_text(log, mcap_file({kPoints}, clouds_with("lidar", {}), {}));
-  CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with poses, or a file of poses"));
-  write_text(log, mcap_file({kOdometry}, {{0, 1, three_odometries("base")[0]}}, {}));
-  CHECK_THAT(log_error(log), ContainsSubstring("expected a topic with clouds; found /odom"));
+  log.write({kPoints}, clouds_with("lidar", {}));
+  CHECK_THAT(log.error(), ContainsSubstring("expected a topic with poses, or a file of poses"));
+  log.write({kOdometry}, {{0, 1, three_odometries("base")[0]}});
+  CHECK_THAT(log.error(), ContainsSubstring("expected a topic with clouds; found /odom"));
   const LogChannel packets = {"/packets", "velodyne_msgs/msg/VelodyneScan"};
-  write_text(log, mcap_file({packets}, {{0, 1, "no matter"}}, {}));
-  CHECK_THAT(log_error(log),
+  log.write({packets}, {{0, 1, "no matter"}});
+  CHECK_THAT(log.error(),
              ContainsSubstring("found /packets") &&
                  ContainsSubstring("packets of a sensor are not read: play the log through the ROS "
                                    "driver of the sensor"));
 }
 
 TEST_CASE("Robots of one log whose frames have equal names keep their own transforms") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "two.mcap";
+  const Log log;
   const Pose T_of_other = pose_at(0, 0.3);
   const auto write = [&](const std::string& points) {
-    std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+    std::vector<WrittenMessage> messages = drive_by_transforms();
     messages.push_back({4, nanoseconds(1.0), transform(1.0, "base", "lidar", T_of_other)});
     for (int i = 0; i < 4; ++i) {
       const double time = 1.01 + 0.1 * i;
       messages.push_back({3, nanoseconds(time), transform(time, "odom", "base", pose_at(-i, 1))});
     }
-    write_text(log, mcap_file({{points, kPoints.type},
-                               {"/one/tf", kTf.type},
-                               {"/one/tf_static", kTf.type},
-                               {"/two/tf", kTf.type},
-                               {"/two/tf_static", kTf.type}},
-                              messages, {}));
+    log.write({{points, kPoints.type},
+               {"/one/tf", kTf.type},
+               {"/one/tf_static", kTf.type},
+               {"/two/tf", kTf.type},
+               {"/two/tf_static", kTf.type}},
+              messages);
   };
   write("/one/points");
-  check_drive(log);
+  check_drive(log.path);
   write("/two/points");
-  CHECK(Recording(log).T_world_sensor(1).linear().isApprox((pose_at(-1, 1) * T_of_other).linear(),
-                                                           0.1));
+  CHECK(Recording(log.path).T_world_sensor(1).linear().isApprox(
+      (pose_at(-1, 1) * T_of_other).linear(), 0.1));
   write("/points");
-  CHECK_THAT(log_error(log), ContainsSubstring("found different ones of frame ") &&
-                                 ContainsSubstring(" by namespaces /one and /two"));
+  CHECK_THAT(log.error(), ContainsSubstring("found different ones of frame ") &&
+                              ContainsSubstring(" by namespaces /one and /two"));
   RecordingOptions options;
   options.pose_topic = "/one/tf";
-  CHECK(Recording(log, options).T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
+  CHECK(
+      Recording(log.path, options).T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
 }
 
 TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame") {
-  const TemporaryFolder folder;
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  const Log log;
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "map", "odom", pose_at(100, 1))});
   messages.push_back({3, nanoseconds(1.0), odometry(1.0, "base", pose_at(50, 0))});
-  write_text(folder / "drive.mcap", mcap_file({kPoints, kTf, kStaticTf, kOdometry}, messages, {}));
+  log.write({kPoints, kTf, kStaticTf, kOdometry}, messages);
   RecordingOptions options;
   options.pose_topic = "/tf";
-  CHECK(Recording(folder / "drive.mcap", options)
+  CHECK(Recording(log.path, options)
             .T_world_sensor(0)
             .isApprox(pose_at(100, 1) * pose_at(0, 0) * kT_base_lidar, 1e-9));
   options.pose_topic.clear();
   options.pose_frame = "odom";
-  CHECK(Recording(folder / "drive.mcap", options)
-            .T_world_sensor(0)
-            .isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
+  CHECK(
+      Recording(log.path, options).T_world_sensor(0).isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
   options.pose_frame = "utm";
-  CHECK_THAT(log_error(folder / "drive.mcap", options),
+  CHECK_THAT(log.error(options),
              ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
 }
 
 TEST_CASE("A time offset is applied before poses of the log are taken") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
+  const Log log;
   for (const double ahead : {0.15, 40.0}) {
     for (const bool by_transforms : {false, true}) {
       CAPTURE(ahead, by_transforms);
@@ -372,16 +370,16 @@ TEST_CASE("A time offset is applied before poses of the log are taken") {
                             by_transforms ? transform(time, "odom", "lidar", pose_at(i, 0))
                                           : odometry(time, "lidar", pose_at(i, 0))});
       }
-      write_text(log, mcap_file({kPoints, by_transforms ? kTf : kOdometry}, messages, {}));
+      log.write({kPoints, by_transforms ? kTf : kOdometry}, messages);
       RecordingOptions options;
       options.time_offset = ahead;
-      const Recording recording(log, options);
+      const Recording recording(log.path, options);
       REQUIRE(recording.size() == 3);
       for (std::size_t i = 0; i < 3; ++i) {
         CHECK(recording.T_world_sensor(i).translation().x() == Approx(i).margin(1e-6));
       }
       options.time_offset = ahead + 7;
-      CHECK_THAT(log_error(log, options),
+      CHECK_THAT(log.error(options),
                  ContainsSubstring("found none for 3 clouds, which are from 1 s to 1.2 s (by "
                                    "--time-offset ") &&
                      ContainsSubstring("poses are from "));
@@ -390,20 +388,18 @@ TEST_CASE("A time offset is applied before poses of the log are taken") {
 }
 
 TEST_CASE("An extrinsic calibration of the user stands for a transform that the log lacks") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
+  const Log log;
   std::vector<WrittenMessage> messages;
-  for (const WrittenMessage& message : drive_by_transforms(MessageEncoding::kCdr)) {
+  for (const WrittenMessage& message : drive_by_transforms()) {
     if (message.channel != 2) messages.push_back(message);
   }
-  const auto write = [&] { write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {})); };
+  const auto write = [&] { log.write(kDrive, messages); };
   write();
   RecordingOptions options;
-  CHECK_THAT(log_error(log, options),
-             ContainsSubstring("--extrinsic gives the pose of lidar in base"));
+  CHECK_THAT(log.error(options), ContainsSubstring("--extrinsic gives the pose of lidar in base"));
   options.convention.T_body_sensor = kT_base_lidar;
   const auto check = [&] {
-    const Recording recording(log, options);
+    const Recording recording(log.path, options);
     CHECK(recording.T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
     CHECK(has_note(recording, "poses of base, in which --extrinsic places the sensor"));
   };
@@ -420,18 +416,18 @@ TEST_CASE("An extrinsic calibration of the user stands for a transform that the 
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "mast", "lidar", kT_base_lidar)});
   write();
   check();
-  CHECK_THAT(log_error(log), ContainsSubstring("--extrinsic gives the pose of lidar in base"));
+  CHECK_THAT(log.error(), ContainsSubstring("--extrinsic gives the pose of lidar in base"));
   // Two bodies that nothing connects.
   messages.push_back({1, nanoseconds(1.0), transform(1.0, "world", "trailer", pose_at(0, 0))});
   write();
-  CHECK_THAT(log_error(log, options),
+  CHECK_THAT(log.error(options),
              ContainsSubstring("expected one moving body for --extrinsic, found moving transforms "
                                "of base, left, right, trailer"));
 }
 
 TEST_CASE("Parts of a log that are missing are named, and accepted on demand") {
   const TemporaryFolder folder;
-  const std::vector<WrittenMessage> all = drive_by_transforms(MessageEncoding::kCdr);
+  const std::vector<WrittenMessage> all = drive_by_transforms();
   const auto write = [&](const std::string& name, std::size_t first, std::size_t last) {
     const auto begin = all.begin();
     write_text(folder / name, mcap_file({kPoints, kTf, kStaticTf},
@@ -472,11 +468,11 @@ TEST_CASE("Parts of a log that are missing are named, and accepted on demand") {
 
 TEST_CASE("Messages that rosbag2 compressed are read, and compressed files are named") {
   const TemporaryFolder folder;
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   for (WrittenMessage& message : messages) message.data = compressed("zstd", message.data);
-  write_text(folder / "drive.mcap", mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+  write_text(folder / "drive.mcap", mcap_file(kDrive, messages, {}));
 #if defined(DYNAINS_HAS_SQLITE3)
-  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf}, messages);
+  write_db3(folder / "drive.db3", kDrive, messages);
 #endif
   std::vector<std::uint8_t> bytes, spare;
   const std::string frame = compressed("zstd", "a");
@@ -487,7 +483,7 @@ TEST_CASE("Messages that rosbag2 compressed are read, and compressed files are n
     check_drive(folder / "drive.db3");
 #endif
     messages[2].data.resize(messages[2].data.size() - 1);
-    write_text(folder / "cut.mcap", mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
+    write_text(folder / "cut.mcap", mcap_file(kDrive, messages, {}));
     CHECK_THAT(log_error(folder / "cut.mcap"), ContainsSubstring("/points at 1030000000 ns: "));
   } else {
     CHECK_THAT(log_error(folder / "drive.mcap"), ContainsSubstring("this build has no zstd"));
@@ -503,8 +499,7 @@ TEST_CASE("Messages that rosbag2 compressed are read, and compressed files are n
 }
 
 TEST_CASE("Contradictory poses and clouds are refused with their place") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
+  const Log log;
   Eigen::Isometry3d not_finite = pose_at(0, 0);
   not_finite.translation().x() = std::numeric_limits<double>::quiet_NaN();
   struct Case {
@@ -531,35 +526,36 @@ TEST_CASE("Contradictory poses and clouds are refused with their place") {
        "--time-offset"},
   };
   for (const Case& one : cases) {
-    write_text(log, mcap_file({kPoints, one.poses}, clouds_with("lidar", one.messages), {}));
-    CHECK_THAT(log_error(log), StartsWith(log.string() + ": ") && ContainsSubstring(one.expected));
+    log.write({kPoints, one.poses}, clouds_with("lidar", one.messages));
+    CHECK_THAT(log.error(),
+               StartsWith(log.path.string() + ": ") && ContainsSubstring(one.expected));
   }
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   messages.back().data = small_cloud(1.3, "rear");
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  CHECK_THAT(log_error(log), ContainsSubstring("expected clouds of one frame, or --frame-id for "
-                                               "those of one sensor; found frames lidar (3), rear "
-                                               "(1)"));
+  log.write(kDrive, messages);
+  CHECK_THAT(log.error(), ContainsSubstring("expected clouds of one frame, or --frame-id for "
+                                            "those of one sensor; found frames lidar (3), rear "
+                                            "(1)"));
   RecordingOptions options;
   options.cloud_frame = "rear";
   options.without_poses = true;
-  CHECK(Recording(log, options).size() == 1);
+  CHECK(Recording(log.path, options).size() == 1);
   options.cloud_frame = "lidar";
-  CHECK(Recording(log, options).size() == 3);
+  CHECK(Recording(log.path, options).size() == 3);
   options.cloud_frame = "front";
-  CHECK_THAT(log_error(log, options), ContainsSubstring("found frames lidar (3), rear (1)"));
+  CHECK_THAT(log.error(options), ContainsSubstring("found frames lidar (3), rear (1)"));
 }
 
 TEST_CASE("Clouds that a log has lost are told, and uneven stamps are not") {
-  const TemporaryFolder folder;
+  const Log log;
   const auto warnings_of = [&](const std::vector<double>& stamps) {
     std::vector<WrittenMessage> messages;
     for (const double time : stamps) {
       messages.push_back({0, nanoseconds(time), small_cloud(time, "lidar")});
       messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(time, 0))});
     }
-    write_text(folder / "drive.mcap", mcap_file({kPoints, kOdometry}, messages, {}));
-    return Recording(folder / "drive.mcap").warnings();
+    log.write({kPoints, kOdometry}, messages);
+    return Recording(log.path).warnings();
   };
   std::vector<double> stamps;
   for (int i = 0; i < 20; ++i) stamps.push_back(1.0 + 0.1 * (i < 12 ? i : i + 3));
@@ -572,12 +568,11 @@ TEST_CASE("Clouds that a log has lost are told, and uneven stamps are not") {
 }
 
 TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
-  const TemporaryFolder folder;
-  const fs::path log = folder / "drive.mcap";
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  const Log log;
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   messages.push_back({0, nanoseconds(1.32), small_cloud(1.1, "lidar")});
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  const Recording recording(log);
+  log.write(kDrive, messages);
+  const Recording recording(log.path);
   CHECK(recording.size() == 4);
   REQUIRE(recording.warnings().size() == 1);
   CHECK_THAT(recording.warnings().front(),
@@ -586,13 +581,13 @@ TEST_CASE("Clouds whose stamps do not increase are left out and counted") {
   for (WrittenMessage& message : messages) {
     if (message.channel == 0) message.data = small_cloud(1.0, "lidar");
   }
-  write_text(log, mcap_file({kPoints, kTf, kStaticTf}, messages, {}));
-  CHECK_THAT(log_error(log), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
+  log.write(kDrive, messages);
+  CHECK_THAT(log.error(), ContainsSubstring("expected stamps that increase: 4 of 5 clouds"));
 }
 
 TEST_CASE("A field label gives the labels, and a truncated log gives the scans before its end") {
   const TemporaryFolder folder;
-  std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr);
+  std::vector<WrittenMessage> messages = drive_by_transforms();
   std::vector<CloudField> fields = kXyz;
   fields.push_back({"label", 12, 6});
   const std::string points = bytes_of<float>({1, 2, 3}) + ByteWriter().number(0x1000FBU).bytes();
@@ -601,7 +596,7 @@ TEST_CASE("A field label gives the labels, and a truncated log gives the scans b
     message.data = cloud_message(MessageEncoding::kCdr, 1e-9 * static_cast<double>(message.time),
                                  "lidar", fields, 16, points);
   }
-  const std::string whole = mcap_file({kPoints, kTf, kStaticTf}, messages, {});
+  const std::string whole = mcap_file(kDrive, messages, {});
   write_text(folder / "drive.mcap", whole);
   const Recording recording(folder / "drive.mcap");
   CHECK(recording.has_labels());

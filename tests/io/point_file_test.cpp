@@ -222,123 +222,109 @@ TEST_CASE("Empty clouds") {
 }
 
 TEST_CASE("Malformed point files are refused with position and expectation") {
-  struct Case {
-    std::string name;
-    std::string content;
-    std::string expected;
+  using Cases = std::vector<std::pair<std::string, std::string>>;  // content, part of the message
+  const auto check = [](const std::string& name, const Cases& cases) {
+    for (const auto& [content, expected] : cases) {
+      CAPTURE(content.substr(0, 200));
+      CHECK_THAT(error(name, content), ContainsSubstring(expected));
+    }
   };
   const std::string ply = "ply\nformat ascii 1.0\n";
   const std::string ply_le = "ply\nformat binary_little_endian 1.0\n";
+  const std::string vertex = ply + "element vertex 1\n", vertex_le = ply_le + "element vertex 1\n";
   const std::string huge = "18446744073709551615";
-  const auto pcd = [](const std::string& fields, const std::string& sizes, const std::string& types,
-                      const std::string& rest) {
-    return "FIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " + types + "\n" + rest;
+  check(
+      "a.ply",
+      {{"", ":1: expected \"ply\" as first line"},
+       {"PLY\n", ":1: expected \"ply\" as first line"},
+       {std::string(100000, 'p'), ":1: expected a line of text"},
+       {"ply\n", ":2: file ends, expected end_header"},
+       {"ply\nformat ascii 2.0\n", ":2: expected format version 1.0"},
+       {"ply\nformat text 1.0\n", ":2: expected ascii, binary_little_endian"},
+       {"ply\nelement vertex 0\n" + kPlyXyz, ":6: expected a line \"format\""},
+       {ply + "end_header\n", ":3: expected \"element vertex\""},
+       {ply + "property float x\n", ":3: expected an element before a property"},
+       {ply + "element vertex -1\n", ":3: expected a number of elements"},
+       {ply + "element vertex 1e3\n", ":3: expected a number of elements"},
+       {ply + "element vertex 99999999999999999999\n", ":3: expected a number of elements"},
+       {vertex + "property half x\n", ":4: expected a type"},
+       {vertex + "property list float\n", ":4: expected a type"},
+       {vertex + "property float\n", ":4: expected the name"},
+       {vertex + "vertices\n", ":4: expected element, property"},
+       {vertex + "property float x\nproperty float y\nend_header\n1 2\n",
+        ":6: expected a number property z"},
+       {ply + "element vertex 2\n" + kPlyXyz + "1 2 3\n", ": byte 100: expected 2 elements"},
+       {ply + "element vertex 2\n" + kPlyXyz + "1.25 2.25 3.25\n", ":9: file ends"},
+       {vertex + kPlyXyz + "1 2\n\n\n", ":8: expected a number for z"},
+       {vertex + kPlyXyz + "1 2 x\n", "for z, found \"x\""},
+       {vertex + kPlyXyz + "1 2 3 4\n", ":8: expected fewer values"},
+       {ply + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge + " elements"},
+       {vertex + "property int label\n" + kPlyXyz + "-1 0 0 0\n",
+        ":9: expected a whole number that label can have"},
+       {vertex + "property float ring\n" + kPlyXyz + "nan 0 0 0\n",
+        ":9: expected a whole number that ring can have"},
+       {vertex + "property float ring\n" + kPlyXyz + "1.5 0 0 0\n",
+        ":9: expected a whole number that ring can have"},
+       {ply + "element a 1\nproperty list int int i\nelement vertex 0\n" + kPlyXyz + "-1\n",
+        ":10: expected the length of list i"},
+       {ply_le + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge},
+       {ply_le + "element vertex 2\n" + kPlyXyz + std::string(23, 'x'),
+        "expected 2 elements of at least 12 bytes, the file has 23 bytes left"},
+       {vertex_le + "property list uint double l\n" + kPlyXyz + std::string(16, '\xFF'),
+        "expected the length of a list before"},
+       {vertex_le + "property list uchar double l\n" + kPlyXyz + std::string(1, '\x01') +
+            std::string(12, '\0'),
+        "file ends, expected a value"},
+       {ply_le + "element a " + huge + "\nproperty list uchar int i\nelement vertex 0\n" + kPlyXyz,
+        "expected " + huge + " elements of at least 1 bytes"}});
+  const std::string xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
+  const auto compressed = [](const std::string& points, std::uint32_t size, std::uint32_t of) {
+    return pcd_header(points, "binary_compressed") + packed(size, of);
   };
-  const std::vector<Case> cases = {
-      {"a.ply", "", ":1: expected \"ply\" as first line"},
-      {"a.ply", "PLY\n", ":1: expected \"ply\" as first line"},
-      {"a.ply", std::string(100000, 'p'), ":1: expected a line of text"},
-      {"a.ply", "ply\n", ":2: file ends, expected end_header"},
-      {"a.ply", "ply\nformat ascii 2.0\n", ":2: expected format version 1.0"},
-      {"a.ply", "ply\nformat text 1.0\n", ":2: expected ascii, binary_little_endian"},
-      {"a.ply", "ply\nelement vertex 0\n" + kPlyXyz, ":6: expected a line \"format\""},
-      {"a.ply", ply + "end_header\n", ":3: expected \"element vertex\""},
-      {"a.ply", ply + "property float x\n", ":3: expected an element before a property"},
-      {"a.ply", ply + "element vertex -1\n", ":3: expected a number of elements"},
-      {"a.ply", ply + "element vertex 1e3\n", ":3: expected a number of elements"},
-      {"a.ply", ply + "element vertex 99999999999999999999\n", ":3: expected a number of elements"},
-      {"a.ply", ply + "element vertex 1\nproperty half x\n", ":4: expected a type"},
-      {"a.ply", ply + "element vertex 1\nproperty list float\n", ":4: expected a type"},
-      {"a.ply", ply + "element vertex 1\nproperty float\n", ":4: expected the name"},
-      {"a.ply", ply + "element vertex 1\nvertices\n", ":4: expected element, property"},
-      {"a.ply", ply + "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",
-       ":6: expected a number property z"},
-      {"a.ply", ply + "element vertex 2\n" + kPlyXyz + "1 2 3\n",
-       ": byte 100: expected 2 elements"},
-      {"a.ply", ply + "element vertex 2\n" + kPlyXyz + "1.25 2.25 3.25\n", ":9: file ends"},
-      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2\n\n\n", ":8: expected a number for z"},
-      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2 x\n", "for z, found \"x\""},
-      {"a.ply", ply + "element vertex 1\n" + kPlyXyz + "1 2 3 4\n", ":8: expected fewer values"},
-      {"a.ply", ply + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge + " elements"},
-      {"a.ply", ply + "element vertex 1\nproperty int label\n" + kPlyXyz + "-1 0 0 0\n",
-       ":9: expected a whole number that label can have"},
-      {"a.ply", ply + "element vertex 1\nproperty float ring\n" + kPlyXyz + "nan 0 0 0\n",
-       ":9: expected a whole number that ring can have"},
-      {"a.ply", ply + "element vertex 1\nproperty float ring\n" + kPlyXyz + "1.5 0 0 0\n",
-       ":9: expected a whole number that ring can have"},
-      {"a.ply", ply + "element a 1\nproperty list int int i\nelement vertex 0\n" + kPlyXyz + "-1\n",
-       ":10: expected the length of list i"},
-      {"a.ply", ply_le + "element vertex " + huge + "\n" + kPlyXyz, "expected " + huge},
-      {"a.ply", ply_le + "element vertex 2\n" + kPlyXyz + std::string(23, 'x'),
-       "expected 2 elements of at least 12 bytes, the file has 23 bytes left"},
-      {"a.ply",
-       ply_le + "element vertex 1\nproperty list uint double l\n" + kPlyXyz +
-           std::string(16, '\xFF'),
-       "expected the length of a list before"},
-      {"a.ply",
-       ply_le + "element vertex 1\nproperty list uchar double l\n" + kPlyXyz +
-           std::string(1, '\x01') + std::string(12, '\0'),
-       "file ends, expected a value"},
-      {"a.ply",
-       ply_le + "element a " + huge + "\nproperty list uchar int i\nelement vertex 0\n" + kPlyXyz,
-       "expected " + huge + " elements of at least 1 bytes"},
-      {"a.pcd", "", ":1: file ends, expected a line DATA"},
-      {"a.pcd", "VERSION 0.7\n", ":2: file ends, expected a line DATA"},
-      {"a.pcd", "ply\n", ":1: expected a line of a PCD header"},
-      {"a.pcd", "FIELDS\n", ":1: expected the names of the fields"},
-      {"a.pcd", "FIELDS x\nFIELDS x\n", ":2: expected FIELDS once"},
-      {"a.pcd", "SIZE 4 4 4\n", ":1: expected FIELDS before this line"},
-      {"a.pcd", "FIELDS x y z\nSIZE 4 4\n", ":2: expected 3 values"},
-      {"a.pcd", "FIELDS x y z\nSIZE 4 4 4 4\n", ":2: expected 3 values"},
-      {"a.pcd", "FIELDS x y z\nSIZE 4 4 3\n", ":2: expected SIZE 1, 2, 4 or 8 for field z"},
-      {"a.pcd", "FIELDS x y z\nTYPE F F G\n", ":2: expected TYPE I, U or F for field z"},
-      {"a.pcd", "FIELDS x y z\nCOUNT 1 1 -1\n", ":2: expected a COUNT"},
-      {"a.pcd", "FIELDS x y z\nCOUNT 1 1 65537\n", ":2: expected a COUNT"},
-      {"a.pcd", "FIELDS x y z\nWIDTH many\n", ":2: expected WIDTH as a whole number"},
-      {"a.pcd", "FIELDS x y z\nVIEWPOINT 0 0 0 0 0 0 0\n", ":2: expected VIEWPOINT"},
-      {"a.pcd", "FIELDS x y z\nVIEWPOINT 0 0 0 1 0 0\n", ":2: expected VIEWPOINT"},
-      {"a.pcd", "FIELDS x y z\nVIEWPOINT nan 0 0 1 0 0 0\n", ":2: expected VIEWPOINT"},
-      {"a.pcd", "FIELDS x y z\nTYPE F F F\nWIDTH 0\nDATA ascii\n", ":4: expected SIZE"},
-      {"a.pcd", "FIELDS x y z\nSIZE 4 4 4\nWIDTH 0\nDATA ascii\n", ":4: expected TYPE"},
-      {"a.pcd", pcd("x y z", "4 4 2", "F F F", "WIDTH 0\nDATA ascii\n"),
-       ":5: expected SIZE 4 or 8"},
-      {"a.pcd", pcd("x y", "4 4", "F F", "WIDTH 0\nDATA ascii\n"), ":5: expected a field z"},
-      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "COUNT 1 1 3\nWIDTH 0\nDATA ascii\n"),
-       ":6: expected a field z"},
-      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "DATA ascii\n"), ":4: expected WIDTH or POINTS"},
-      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "WIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n"),
-       ":7: expected POINTS to be WIDTH * HEIGHT"},
-      {"a.pcd", pcd("x y z", "4 4 4", "F F F", "WIDTH " + huge + "\nHEIGHT 2\nDATA binary\n"),
-       ":6: expected POINTS to be WIDTH * HEIGHT"},
-      {"a.pcd", pcd_header("1", "zipped"), ":10: expected DATA ascii, binary or"},
-      {"a.pcd", pcd_header("1", "ascii") + "1 2\n\n\n", ":11: expected a number for z"},
-      {"a.pcd", pcd_header("1", "ascii") + "1 2 3 4\n", ":11: expected fewer values"},
-      {"a.pcd", pcd_header("2", "ascii") + "1.5 2.5 3.5\n", ":12: file ends, expected 2 points"},
-      {"a.pcd", pcd_header(huge, "ascii"), "expected " + huge + " points"},
-      {"a.pcd", pcd_header("1000000000000", "binary") + std::string(24, 'x'),
-       "expected 1000000000000 points of at least 12 bytes, the file has 24 bytes left"},
-      {"a.pcd", pcd_header("2", "binary") + std::string(23, 'x'), "the file has 23 bytes left"},
-      {"a.pcd", pcd_header("1", "binary_compressed") + "1234567", "file ends, expected the sizes"},
-      {"a.pcd",
-       pcd_header("1", "binary_compressed") + packed(std::uint32_t{13}, std::uint32_t{12}) +
-           std::string(12, '\0'),
-       "expected 13 bytes of compressed points, the file has 12"},
-      {"a.pcd",
-       pcd_header("1", "binary_compressed") + packed(std::uint32_t{4}, std::uint32_t{13}) + "1234",
-       "expected a block of 1 points of 12 bytes, its size is given as 13"},
-      {"a.pcd",
-       pcd_header("100000000", "binary_compressed") +
-           packed(std::uint32_t{4}, std::uint32_t{1200000000}) + "1234",
-       "4 bytes cannot hold 1200000000"},
-      {"a.pcd",
-       pcd_header("1", "binary_compressed") + packed(std::uint32_t{2}, std::uint32_t{12}) + "\x20" +
-           std::string(1, '\0'),
-       "expected a sound compressed block"},
-  };
-  for (const Case& broken : cases) {
-    CAPTURE(broken.content.substr(0, 200));
-    CHECK_THAT(error(broken.name, broken.content), ContainsSubstring(broken.expected));
-  }
+  check(
+      "a.pcd",
+      {{"", ":1: file ends, expected a line DATA"},
+       {"VERSION 0.7\n", ":2: file ends, expected a line DATA"},
+       {"ply\n", ":1: expected a line of a PCD header"},
+       {"FIELDS\n", ":1: expected the names of the fields"},
+       {"FIELDS x\nFIELDS x\n", ":2: expected FIELDS once"},
+       {"SIZE 4 4 4\n", ":1: expected FIELDS before this line"},
+       {"FIELDS x y z\nSIZE 4 4\n", ":2: expected 3 values"},
+       {"FIELDS x y z\nSIZE 4 4 4 4\n", ":2: expected 3 values"},
+       {"FIELDS x y z\nSIZE 4 4 3\n", ":2: expected SIZE 1, 2, 4 or 8 for field z"},
+       {"FIELDS x y z\nTYPE F F G\n", ":2: expected TYPE I, U or F for field z"},
+       {"FIELDS x y z\nCOUNT 1 1 -1\n", ":2: expected a COUNT"},
+       {"FIELDS x y z\nCOUNT 1 1 65537\n", ":2: expected a COUNT"},
+       {"FIELDS x y z\nWIDTH many\n", ":2: expected WIDTH as a whole number"},
+       {"FIELDS x y z\nVIEWPOINT 0 0 0 0 0 0 0\n", ":2: expected VIEWPOINT"},
+       {"FIELDS x y z\nVIEWPOINT 0 0 0 1 0 0\n", ":2: expected VIEWPOINT"},
+       {"FIELDS x y z\nVIEWPOINT nan 0 0 1 0 0 0\n", ":2: expected VIEWPOINT"},
+       {"FIELDS x y z\nTYPE F F F\nWIDTH 0\nDATA ascii\n", ":4: expected SIZE"},
+       {"FIELDS x y z\nSIZE 4 4 4\nWIDTH 0\nDATA ascii\n", ":4: expected TYPE"},
+       {"FIELDS x y z\nSIZE 4 4 2\nTYPE F F F\nWIDTH 0\nDATA ascii\n", ":5: expected SIZE 4 or 8"},
+       {"FIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 0\nDATA ascii\n", ":5: expected a field z"},
+       {xyz + "COUNT 1 1 3\nWIDTH 0\nDATA ascii\n", ":6: expected a field z"},
+       {xyz + "DATA ascii\n", ":4: expected WIDTH or POINTS"},
+       {xyz + "WIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n",
+        ":7: expected POINTS to be WIDTH * HEIGHT"},
+       {xyz + "WIDTH " + huge + "\nHEIGHT 2\nDATA binary\n",
+        ":6: expected POINTS to be WIDTH * HEIGHT"},
+       {pcd_header("1", "zipped"), ":10: expected DATA ascii, binary or"},
+       {pcd_header("1", "ascii") + "1 2\n\n\n", ":11: expected a number for z"},
+       {pcd_header("1", "ascii") + "1 2 3 4\n", ":11: expected fewer values"},
+       {pcd_header("2", "ascii") + "1.5 2.5 3.5\n", ":12: file ends, expected 2 points"},
+       {pcd_header(huge, "ascii"), "expected " + huge + " points"},
+       {pcd_header("1000000000000", "binary") + std::string(24, 'x'),
+        "expected 1000000000000 points of at least 12 bytes, the file has 24 bytes left"},
+       {pcd_header("2", "binary") + std::string(23, 'x'), "the file has 23 bytes left"},
+       {pcd_header("1", "binary_compressed") + "1234567", "file ends, expected the sizes"},
+       {compressed("1", 13, 12) + std::string(12, '\0'),
+        "expected 13 bytes of compressed points, the file has 12"},
+       {compressed("1", 4, 13) + "1234",
+        "expected a block of 1 points of 12 bytes, its size is given as 13"},
+       {compressed("100000000", 4, 1200000000) + "1234", "4 bytes cannot hold 1200000000"},
+       {compressed("1", 2, 12) + "\x20" + std::string(1, '\0'),
+        "expected a sound compressed block"}});
 }
 
 TEST_CASE("A truncated point file is detected without reading its points") {

@@ -41,11 +41,18 @@ bool tells(const Recording& recording, const std::string& note) {
   return std::find(notes.begin(), notes.end(), note) != notes.end();
 }
 
+/// Writes a raw scan of one point, or a PLY, for each name.
+void write_scans(const fs::path& folder, const std::vector<std::string>& names,
+                 const std::string& ending = ".bin") {
+  for (const std::string& name : names) {
+    write_text(folder / (name + ending), ending == ".ply" ? ply() : std::string(16, 'B'));
+  }
+}
+
 /// Times (s) of scans whose files have these names, without poses.
 std::vector<double> recorded_times(const std::vector<std::string>& names) {
   const TemporaryFolder folder;
-  for (const std::string& name : names)
-    write_text(folder / "velodyne" / (name + ".bin"), std::string(16, 'B'));
+  write_scans(folder / "velodyne", names);
   RecordingOptions options;
   options.without_poses = true;
   const Recording recording(folder.path(), options);
@@ -203,9 +210,7 @@ TEST_CASE("The frame of the points is detected, and can be forced") {
 
 TEST_CASE("Names are ordered by the numbers in them") {
   const TemporaryFolder folder;
-  for (const char* name : {"scan10", "scan9", "scan1"}) {
-    write_text(folder / ("scans/" + std::string(name) + ".ply"), ply());
-  }
+  write_scans(folder / "scans", {"scan10", "scan9", "scan1"}, ".ply");
   write_text(folder / "poses.txt", "0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n2 0 0 0 0 0 1\n");
   const Recording recording(folder.path());
   CHECK(recording.name(0) == "scan1");
@@ -220,9 +225,8 @@ TEST_CASE("Names are ordered by the numbers in them") {
 
 TEST_CASE("Times in names find their poses by interpolation, and scans without pose are left out") {
   const TemporaryFolder folder;
-  for (const char* name : {"1600000000.00", "1600000000.25", "1600000000.50", "1600000009.00"}) {
-    write_text(folder / (std::string(name) + ".ply"), ply());
-  }
+  write_scans(folder.path(), {"1600000000.00", "1600000000.25", "1600000000.50", "1600000009.00"},
+              ".ply");
   write_text(folder / "trajectory.tum",
              tum(1600000000.0, 0.0) + tum(1600000000.5, 2.0) + tum(1600000000.9, 2.0));
   const Recording recording(folder.path());
@@ -260,9 +264,7 @@ TEST_CASE("A pose that no map can take is refused with its file and scan") {
 
 TEST_CASE("A shift gives every scan the pose of a neighbour") {
   const TemporaryFolder folder;
-  for (const char* name : {"0", "1", "2"}) {
-    write_text(folder / ("velodyne/" + std::string(name) + ".bin"), std::string(16, '\0'));
-  }
+  write_scans(folder / "velodyne", {"0", "1", "2"});
   write_text(folder / "poses.txt", tum(1, 10) + tum(2, 11) + tum(3, 12));
   RecordingOptions options;
   options.convention.shift = 1;
@@ -370,22 +372,17 @@ TEST_CASE("Folders and devices in the place of files are refused before they are
   const fs::path seq = folder / "seq";
   write_text(seq / "0.ply", ply());
   write_text(seq / "poses.txt", tum(1, 0));
-  RecordingOptions options;
-  for (const char* device : {"/dev/null", "/dev/zero"}) {
-    options.times = device;
-    CHECK(error_of(seq, options) ==
-          std::string(device) + ": cannot be read: is a device or a pipe; expected a file");
-    options.times.clear();
-    options.poses = device;
-    CHECK(error_of(seq, options) ==
-          std::string(device) + ": cannot be read: is a device or a pipe; expected a file");
-    options.poses.clear();
+  const std::string device = "is a device or a pipe; expected a file";
+  for (const auto& [file, reason] : {std::pair<fs::path, std::string>("/dev/null", device),
+                                     {"/dev/zero", device},
+                                     {seq, "is a folder; expected a file"},
+                                     {seq / "none.txt", "No such file or directory"}}) {
+    for (const auto role : {&RecordingOptions::times, &RecordingOptions::poses}) {
+      RecordingOptions options;
+      options.*role = file;
+      CHECK(error_of(seq, options) == file.string() + ": cannot be read: " + reason);
+    }
   }
-  options.poses = seq;
-  CHECK(error_of(seq, options) == seq.string() + ": cannot be read: is a folder; expected a file");
-  options.poses = seq / "none.txt";
-  CHECK(error_of(seq, options) ==
-        (seq / "none.txt").string() + ": cannot be read: No such file or directory");
   CHECK_THAT(error_of(""), StartsWith("\"\": is not a folder; expected a KITTI folder"));
 }
 
@@ -574,9 +571,7 @@ TEST_CASE("Poses may begin with a mark of UTF-8") {
 TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
   const TemporaryFolder folder;
   const std::string scans = GENERATE("velodyne", "velodyne_points/data");
-  for (const char* name : {"0000000001", "0000000002", "0000000004"}) {
-    write_text(folder / scans / (std::string(name) + ".bin"), std::string(16, 'B'));
-  }
+  write_scans(folder / scans, {"0000000001", "0000000002", "0000000004"});
   write_text(folder / "poses.txt", "1 " + row12(10) + "3 " + row12(30) + "4 " + row12(40));
   const Recording recording(folder.path());
   REQUIRE(recording.size() == 2);
@@ -622,9 +617,7 @@ TEST_CASE("Parts of a second in names are read so that scans follow each other e
 
 TEST_CASE("Names of 19 digits are times") {
   const TemporaryFolder folder;
-  for (const char* name : {"1566535940000000000", "1566535940100000000"}) {
-    write_text(folder / "velodyne" / (std::string(name) + ".bin"), std::string(16, 'B'));
-  }
+  write_scans(folder / "velodyne", {"1566535940000000000", "1566535940100000000"});
   write_text(folder / "poses.txt",
              "1566535940000000000 " + row12(1) + "1566535940100000000 " + row12(2));
   const Recording recording(folder.path());
