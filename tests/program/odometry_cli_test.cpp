@@ -31,6 +31,12 @@ class Unposed {
     fs::remove(sequence() / "poses.txt");
   }
 
+  Outcome odometry(const fs::path& poses, const Arguments& more = {}) const {
+    return start(Arguments{"odometry", sequence(), "--out", poses, "-q"} + more);
+  }
+  Outcome run(const fs::path& out, const Arguments& more = {}) const {
+    return start(Arguments{"run", sequence(), "--odometry", "--out", out, "-q"} + more);
+  }
   fs::path sequence() const { return folder_ / "sequence"; }
   fs::path operator/(const std::string& name) const { return folder_ / name; }
   const Recording& exact() const { return *exact_; }
@@ -47,15 +53,14 @@ class Unposed {
 
 TEST_CASE("Without poses, commands propose the odometry, and it finds the poses") {
   const Unposed recording;
-  for (const char* command : {"check", "run"}) {
-    std::vector<std::string> arguments = {command, recording.sequence()};
-    if (std::string(command) == "run")
-      arguments.insert(arguments.end(), {"--out", recording / "x"});
-    check_refused(start(arguments), 1, "run --odometry estimates them");
+  for (const Arguments& command :
+       {Arguments{"check", recording.sequence()},
+        Arguments{"run", recording.sequence(), "--out", recording / "x"}}) {
+    check_refused(start(command), 1, "run --odometry estimates them");
   }
 
   const fs::path poses = recording / "poses.txt";
-  succeed(start({"odometry", recording.sequence(), "--out", poses, "-q"}));
+  succeed(recording.odometry(poses));
   const Trajectory found = read_trajectory(poses);
   REQUIRE(found.poses.size() == 12);
   const Pose T_first_world = recording.exact().T_world_sensor(0).inverse();
@@ -63,50 +68,42 @@ TEST_CASE("Without poses, commands propose the odometry, and it finds the poses"
     const Pose exact = T_first_world * recording.exact().T_world_sensor(i);
     CHECK((found.poses[i].translation() - exact.translation()).norm() < 0.1);
   }
-  CHECK_THAT(start({"odometry", recording.sequence(), "--out", poses}).err,
-             ContainsSubstring("--force"));
+  CHECK_THAT(recording.odometry(poses).err, ContainsSubstring("--force"));
   CHECK_FALSE(fs::exists(poses.string() + ".partial"));
-  CHECK(start({"odometry", recording.sequence(), "--out", poses, "--force", "--one-thread", "-q"})
-            .code == 0);
+  CHECK(recording.odometry(poses, {"--force", "--one-thread"}).code == 0);
   CHECK(read_trajectory(poses).poses.back().matrix() == found.poses.back().matrix());
 
   // In the recording, poses of the odometry are replaced, and those of others are not.
   const fs::path inside = recording.sequence() / "poses.txt";
-  const std::vector<std::string> again = {"odometry", recording.sequence(), "--out", inside, "-q",
-                                          "--force"};
-  succeed(start(again));
-  CHECK(start(again).code == 0);
+  for (int i = 0; i < 2; ++i) succeed(recording.odometry(inside, {"--force"}));
   write_text(inside, read_text(inside) + "\n");
-  check_refused(start(again), 1, "is a part of");
+  check_refused(recording.odometry(inside, {"--force"}), 1, "is a part of");
   fs::remove(inside);
 
   const fs::path out = recording / "out";
-  succeed(start({"run", recording.sequence(), "--odometry", "--out", out, "-q"}));
+  succeed(recording.run(out));
   CHECK(read_trajectory(out / "poses.txt").poses.back().matrix() == found.poses.back().matrix());
   CHECK(count_entries(out / "labels") == 12);
-  CHECK(start({"run", recording.sequence(), "--odometry", "--out", out, "--force", "-q"}).code ==
-        0);
+  succeed(recording.run(out, {"--force"}));
   CHECK(start({"view", out}).code == 0);
 }
 
 TEST_CASE("After a loss of track, the scans before it have results") {
   const Unposed recording(12, 8);
   const fs::path poses = recording / "poses.txt";
-  const Outcome odometry = start({"odometry", recording.sequence(), "--out", poses, "-q"});
+  const Outcome odometry = recording.odometry(poses);
   CHECK(odometry.code == 3);
   CHECK_THAT(odometry.err, ContainsSubstring("lost track at scan 000008"));
   CHECK(read_trajectory(poses).poses.size() == 8);
   const fs::path out = recording / "out";
-  const Outcome outcome = start({"run", recording.sequence(), "--odometry", "--out", out, "-q"});
-  CHECK(outcome.code == 3);
-  CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000008"));
+  check_refused(recording.run(out), 3, "lost track at scan 000008");
   CHECK(count_entries(out / "labels") == 8);
 }
 
 TEST_CASE("Scans that fit to none before are named, and the odometry goes on behind them") {
   const Unposed recording(14, 8, 10);
   const fs::path poses = recording / "poses.txt";
-  const Outcome outcome = start({"odometry", recording.sequence(), "--out", poses, "-q"});
+  const Outcome outcome = recording.odometry(poses);
   CHECK(outcome.code == 0);
   CHECK_THAT(outcome.err, ContainsSubstring("2 scans from 000008 to 000009: no hold"));
   const Trajectory found = read_trajectory(poses);
@@ -124,24 +121,17 @@ TEST_CASE("The odometry says about the clouds what a run says") {
   for (float& value : xyzi) value = 0.05F * std::round(value / 0.05F);
   write_scan(scan, xyzi);
   const std::string expected = "warning: points lie on a grid of 0.05 m";
-  const Outcome poses =
-      start({"odometry", recording.sequence(), "--out", recording / "poses.txt", "-q"});
-  CHECK(poses.code == 0);
+  const Outcome poses = succeed(recording.odometry(recording / "poses.txt"));
   CHECK_THAT(poses.err, ContainsSubstring(expected));
-  const Outcome run =
-      start({"run", recording.sequence(), "--odometry", "--out", recording / "out", "-q"});
-  CHECK_THAT(run.err, ContainsSubstring(expected));
+  CHECK_THAT(recording.run(recording / "out").err, ContainsSubstring(expected));
 }
 
 TEST_CASE("A loss of track at the second scan leaves nothing, with the exit code of a later one") {
   const Unposed recording(4, 1);
   const fs::path out = recording / "out";
-  for (const char* command : {"odometry", "run"}) {
-    std::vector<std::string> arguments = {command, recording.sequence(), "--out", out, "-q"};
-    if (std::string(command) == "run") arguments.push_back("--odometry");
-    const Outcome outcome = start(arguments);
-    CHECK(outcome.code == 3);
-    CHECK_THAT(outcome.err, ContainsSubstring("lost track at scan 000001"));
+  for (const bool is_run : {false, true}) {
+    check_refused(is_run ? recording.run(out) : recording.odometry(out), 3,
+                  "lost track at scan 000001");
     CHECK_FALSE(fs::exists(out));
   }
 }
@@ -149,8 +139,7 @@ TEST_CASE("A loss of track at the second scan leaves nothing, with the exit code
 TEST_CASE("The odometry refuses what it cannot use") {
   const Unposed recording(3);
   const auto error = [&](const Arguments& more) {
-    const Outcome outcome =
-        start(Arguments{"odometry", recording.sequence(), "--out", recording / "new.txt"} + more);
+    const Outcome outcome = recording.odometry(recording / "new.txt", more);
     CHECK_FALSE(fs::exists(recording / "new.txt"));
     return std::to_string(outcome.code) + outcome.err;
   };

@@ -66,10 +66,7 @@ TEST_CASE("No command replaces a file unasked, and none ever one that it was giv
     CHECK_THAT(start(command.words + Arguments{mine}).err, ContainsSubstring(mine + ": exists"));
     CHECK(read_text(mine) == "mine");
     for (const std::string& file : command.read) {
-      const Outcome refused = start(command.words + Arguments{file, "--force"});
-      CAPTURE(file);
-      CHECK(refused.code == 1);
-      CHECK_THAT(refused.err, ContainsSubstring(file + ": is "));
+      check_refused(start(command.words + Arguments{file, "--force"}), 1, file + ": is ");
     }
     start(command.words + Arguments{mine, "--force"});
     CHECK(read_text(mine) != "mine");
