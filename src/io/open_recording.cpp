@@ -91,9 +91,9 @@ void list_scans(RecordingContents& r) {
     check_bin_content(files.front());
   }
   for (const fs::path& file : files) {
-    r.scans.emplace_back();
-    r.scans.back().file = file;
-    r.scans.back().name = name_of_scan(file);
+    ScanEntry& scan = r.scans.emplace_back();
+    scan.file = file;
+    scan.name = name_of_scan(file);
   }
   check_names(r);
   r.is_numbered = std::all_of(r.scans.begin(), r.scans.end(),
@@ -258,12 +258,12 @@ void note_frame(RecordingContents& r) {
 
 }  // namespace
 
-OpenedRecording open_recording(const fs::path& path, const RecordingOptions& options) {
+std::unique_ptr<ScanReader> open_recording(const fs::path& path, const RecordingOptions& options,
+                                           RecordingContents& r) {
   if (!(options.sensor_origin.array().abs() <= kMaxSensor).all()) {
     throw ConfigError("the origin of the sensor must be finite and within " +
                       std::to_string(static_cast<int>(kMaxSensor)) + " m of that of the clouds");
   }
-  RecordingContents r;
   r.folder = path;
   r.options = options;
   std::unique_ptr<ScanReader> reader = open_scans(r);
@@ -277,7 +277,7 @@ OpenedRecording open_recording(const fs::path& path, const RecordingOptions& opt
   r.options.deskew = options.deskew || is_raw;
   if (r.options.deskew || r.clock) prepare_deskewing(r, *reader);
   warn_of_lost_scans(r);
-  return {std::move(r), std::move(reader)};
+  return reader;
 }
 
 }  // namespace dynains

@@ -233,11 +233,8 @@ std::vector<Eigen::AlignedBox3d> parse_self_boxes(const std::string& text) {
   return boxes;
 }
 
-Recording::Recording(const fs::path& path, const RecordingOptions& options) {
-  OpenedRecording opened = open_recording(path, options);
-  contents_ = std::move(opened.contents);
-  reader_ = std::move(opened.reader);
-}
+Recording::Recording(const fs::path& path, const RecordingOptions& options)
+    : reader_(open_recording(path, options, contents_)) {}
 
 std::vector<fs::path> Recording::files() const {
   std::vector<fs::path> files = contents_.files;

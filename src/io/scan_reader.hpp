@@ -53,14 +53,11 @@ std::optional<std::filesystem::path> nuscenes_tables(const std::filesystem::path
 /// has no JSON.
 void read_nuscenes(RecordingContents& r, const std::filesystem::path& tables);
 
-struct OpenedRecording {
-  RecordingContents contents;
-  std::unique_ptr<ScanReader> reader;
-};
-
-/// Reads and checks all files except points and labels. Throws IoError with path, position and
-/// expected content, and ConfigError for options that are for recordings of another format.
-OpenedRecording open_recording(const std::filesystem::path& path, const RecordingOptions& options);
+/// Reads and checks all files except points and labels, and gives the reader of these. Throws
+/// IoError with path, position and expected content, and ConfigError for options that are for
+/// recordings of another format.
+std::unique_ptr<ScanReader> open_recording(const std::filesystem::path& path,
+                                           const RecordingOptions& options, RecordingContents& r);
 
 // Poses and times of a recording, and how they belong to its scans: poses/recording_poses.cpp. All
 // functions throw IoError with path, position and expected content.

@@ -9,7 +9,7 @@
 #include "dynains/io/kitti.hpp"
 #include "io/folder.hpp"
 #include "io/logs/mcap_writer.hpp"
-#include "io/logs/message_writer.hpp"
+#include "io/logs/message_fields.hpp"
 #include "io/scalar.hpp"
 
 namespace dynains::simulation {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "io/files.hpp"
-#include "io/logs/message_writer.hpp"
+#include "io/logs/message_fields.hpp"
 #include "io/logs/ros_messages.hpp"
 #include "support/standard.hpp"
 

@@ -10,8 +10,7 @@
 #include "../scalar.hpp"
 #include "log_scans.hpp"
 #include "mcap_writer.hpp"
-#include "message_reader.hpp"
-#include "message_writer.hpp"
+#include "message_fields.hpp"
 #include "point_cloud2.hpp"
 
 namespace dynains {

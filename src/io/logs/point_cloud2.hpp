@@ -11,8 +11,7 @@
 #include "../points/point_sink.hpp"
 #include "../scalar.hpp"
 #include "dynains/io/point_file.hpp"
-#include "message_reader.hpp"
-#include "message_writer.hpp"
+#include "message_fields.hpp"
 
 namespace dynains {
 

@@ -4,8 +4,7 @@
 #include <iterator>
 
 #include "../poses/kitti_files.hpp"
-#include "message_reader.hpp"
-#include "message_writer.hpp"
+#include "message_fields.hpp"
 #include "point_cloud2.hpp"
 
 namespace dynains {
@@ -22,9 +21,10 @@ Pose read_pose(MessageReader& in) {
   return *pose;
 }
 
-StampedPose read_transform(MessageReader& in) {
+/// A pose behind a header and, with a child, the name of its frame.
+StampedPose read_stamped(MessageReader& in, bool has_child) {
   const MessageHeader header = in.header();
-  std::string child = in.frame("a child frame id");
+  std::string child = has_child ? in.frame("a child frame id") : std::string();
   return {header.time, header.frame, std::move(child), read_pose(in)};
 }
 
@@ -215,14 +215,10 @@ std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMes
   std::vector<StampedPose> poses;
   if (is_transform_type(type)) {
     const std::uint32_t count = in.length(72, "transforms");  // bytes of the smallest one
-    for (std::uint32_t i = 0; i < count; ++i) poses.push_back(read_transform(in));
-  } else if (type == "geometry_msgs/TransformStamped") {
-    poses.push_back(read_transform(in));
+    for (std::uint32_t i = 0; i < count; ++i) poses.push_back(read_stamped(in, true));
   } else {
-    const MessageHeader header = in.header();
-    std::string child;
-    if (type == "nav_msgs/Odometry") child = in.frame("a child frame id");
-    poses.push_back({header.time, header.frame, std::move(child), read_pose(in)});
+    const bool has_child = type == "nav_msgs/Odometry" || type == "geometry_msgs/TransformStamped";
+    poses.push_back(read_stamped(in, has_child));
   }
   return poses;
 }

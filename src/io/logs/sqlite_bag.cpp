@@ -14,7 +14,7 @@
 #include "../failure.hpp"
 #include "../scalar.hpp"
 #include "log_file.hpp"
-#include "message_writer.hpp"
+#include "message_fields.hpp"
 
 namespace dynains {
 namespace {

@@ -106,6 +106,11 @@ void write_all(const std::filesystem::path& path, Span<const T> values) {
   file.commit(AtomicFile::Sync::kLater);
 }
 
+/// The upper 3x4 of a pose, row by row.
+void write_row(const Pose& pose, std::ostream& out) {
+  for (Eigen::Index i = 0; i < 12; ++i) out << pose(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
+}
+
 }  // namespace
 
 BinLayout parse_bin_layout(const std::string& text) {
@@ -250,11 +255,7 @@ void write_point_bytes(const std::filesystem::path& file, Span<const std::uint8_
 void write_poses(const std::filesystem::path& file, Span<const Pose> poses) {
   AtomicFile out(file);
   text::exact(out.stream());
-  for (const Pose& pose : poses) {
-    for (Eigen::Index i = 0; i < 12; ++i) {
-      out.stream() << pose(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
-    }
-  }
+  for (const Pose& pose : poses) write_row(pose, out.stream());
   out.commit();
 }
 
@@ -267,9 +268,7 @@ void write_times(const std::filesystem::path& file, Span<const double> times) {
 
 void write_calib(const std::filesystem::path& file, const Pose& Tr) {
   AtomicFile out(file);
-  text::exact(out.stream()) << "Tr:";
-  for (Eigen::Index i = 0; i < 12; ++i) out.stream() << ' ' << Tr(i / 4, i % 4);
-  out.stream() << '\n';
+  write_row(Tr, text::exact(out.stream()) << "Tr: ");
   out.commit();
 }
 

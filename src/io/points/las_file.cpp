@@ -304,10 +304,10 @@ std::string las_record(const std::filesystem::path& path, const LasOptions& opti
   const double intensity = std::round(options.intensity_scale * point.intensity);
   // NaN is not >= 0 and becomes 0.
   record.number(static_cast<std::uint16_t>(intensity >= 0.0 ? std::min(intensity, 65535.0) : 0.0));
-  constexpr std::uint8_t kReturn = 1U << 4U | 1U;  // 1 of 1
   const auto point_class = static_cast<std::uint8_t>(point.is_ground ? 2 : 1);
-  record.numbers(kReturn, std::uint8_t{0}, point_class, std::uint8_t{0}, std::int16_t{0},
-                 std::uint16_t{0}, point.scan_time);
+  record.numbers(std::uint8_t{1U << 4U | 1U}, std::uint8_t{0});  // return 1 of 1
+  record.numbers(point_class, std::uint8_t{0}, std::int16_t{0}, std::uint16_t{0});
+  record.number(point.scan_time);
   return record.numbers(point.belief, point.cause, point.instance).bytes();
 }
 

@@ -270,29 +270,6 @@ void read_compressed(ByteReader& reader, const PcdHeader& header, PointSink& sin
   }
 }
 
-void copy_pcd_header(const std::filesystem::path& path, std::uint64_t size, std::size_t count,
-                     std::ostream& target) {
-  copy_lines(path, size, target, [&](const std::string& line) -> std::string {
-    std::string_view rest = line;
-    const std::string_view keyword = text::next_token(rest);
-    if (keyword == "WIDTH") return "WIDTH " + std::to_string(count);
-    if (keyword == "HEIGHT") return "HEIGHT 1";
-    if (keyword == "POINTS") return "POINTS " + std::to_string(count);
-    if (keyword == "DATA" && text::next_token(rest) == "binary_compressed") return "DATA binary";
-    return line;
-  });
-}
-
-/// Writes the values of point `i` of a block with the values of all points field by field.
-void copy_point(const std::vector<char>& block, const PcdHeader& header, std::size_t i,
-                std::ostream& target) {
-  const char* column = block.data();
-  for (const Field& field : header.fields) {
-    target.write(column + i * field.bytes(), static_cast<std::streamsize>(field.bytes()));
-    column += field.bytes() * static_cast<std::size_t>(header.points);
-  }
-}
-
 }  // namespace
 
 void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
@@ -300,14 +277,28 @@ void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   ByteReader reader(path);
   PointSink sink;
   const PcdHeader header = parse_pcd_header(reader, sink);
-  copy_pcd_header(path, reader.position(), kept_count(keep), target);
+  const std::string count = std::to_string(kept_count(keep));
+  copy_lines(path, reader.position(), target, [&](const std::string& line) -> std::string {
+    std::string_view rest = line;
+    const std::string_view keyword = text::next_token(rest);
+    if (keyword == "HEIGHT") return "HEIGHT 1";
+    if (keyword == "WIDTH" || keyword == "POINTS") return std::string(keyword) + ' ' + count;
+    if (keyword == "DATA" && text::next_token(rest) == "binary_compressed") return "DATA binary";
+    return line;
+  });
   if (header.encoding != PcdEncoding::kCompressed) {
     const bool is_text = header.encoding == PcdEncoding::kAscii;
     return copy_records(reader, is_text ? 0 : header.record_bytes(), "a point", keep, target);
   }
   const std::vector<char> block = read_block(reader, header);
   for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i] != 0) copy_point(block, header, i, target);
+    if (keep[i] == 0) continue;
+    const char* column = block.data();
+    for (const Field& field : header.fields) {
+      const std::size_t size = field.bytes();
+      target.write(column + i * size, static_cast<std::streamsize>(size));
+      column += size * static_cast<std::size_t>(header.points);
+    }
   }
 }
 

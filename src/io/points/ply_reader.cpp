@@ -203,19 +203,6 @@ void read_element(ByteReader& reader, const Element& element, PlyEncoding encodi
   }
 }
 
-/// Copies the header for a file with `count` vertices. Throws IoError for further elements.
-void copy_ply_header(const std::filesystem::path& path, std::uint64_t size, std::size_t count,
-                     std::ostream& target) {
-  const ByteReader reader(path);
-  copy_lines(path, size, target, [&](const std::string& line) {
-    std::string_view rest = line;
-    if (text::next_token(rest) != "element") return line;
-    if (text::next_token(rest) == "vertex") return "element vertex " + std::to_string(count);
-    if (reader.whole_number(text::next_token(rest), kElementCount) == 0) return line;
-    fail(path, "expected points alone, found \"" + line.substr(0, 60) + "\"");
-  });
-}
-
 }  // namespace
 
 void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
@@ -223,7 +210,15 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   ByteReader reader(path);
   PointSink sink;
   const PlyHeader header = parse_ply_header(reader, sink);
-  copy_ply_header(path, reader.position(), kept_count(keep), target);
+  copy_lines(path, reader.position(), target, [&](const std::string& line) {
+    std::string_view rest = line;
+    if (text::next_token(rest) != "element") return line;
+    if (text::next_token(rest) == "vertex") {
+      return "element vertex " + std::to_string(kept_count(keep));
+    }
+    if (reader.whole_number(text::next_token(rest), kElementCount) == 0) return line;
+    fail(path, "expected points alone, found \"" + line.substr(0, 60) + "\"");
+  });
   const Element& vertex = header.elements.back();
   for (const Property& property : vertex.properties) {
     if (property.is_list) reader.fail_here("expected vertices without the list " + property.name);

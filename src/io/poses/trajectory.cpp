@@ -22,8 +22,8 @@ constexpr const char* kExpectedColumns =
     "expected 12 numbers (KITTI), 8 (TUM: time x y z qx qy qz qw), 7, 13 or 16 numbers, or a first "
     "line that names the columns time x y z qx qy qz qw";
 
-/// What a column holds; axes follow each other. kMatrix is the first of 12 or 16 numbers.
-enum Meaning : std::size_t { kTime, kNanoseconds, kMatrix, kX, kQx = kX + 3, kMeanings = kQx + 4 };
+/// What a column holds. kMatrix is the first of 12 or 16 numbers.
+enum Meaning : std::size_t { kTime, kNanoseconds, kMatrix, kX, kY, kZ, kQx, kQy, kQz, kQw };
 
 /// Positions of the values in a row.
 struct Columns {
@@ -36,7 +36,7 @@ struct Columns {
   bool complete() const { return std::find(of.begin() + kX, of.end(), kNoColumn) == of.end(); }
 
   std::size_t count = 0;
-  std::array<std::size_t, kMeanings> of{};  ///< by meaning; nanoseconds are beside seconds
+  std::array<std::size_t, kQw + 1> of{};  ///< by meaning; nanoseconds are beside seconds
   QuaternionOrder order = QuaternionOrder::kNone;
 };
 
@@ -93,7 +93,7 @@ Columns columns_of_header(std::string_view line) {
   for (std::size_t i = 0; i < cells.size(); ++i) add_column(cells[i], i, columns);
   columns.count = cells.size();
   columns.order =
-      columns.of[kQx + 3] < columns.of[kQx] ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+      columns.of[kQw] < columns.of[kQx] ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
   return columns;
 }
 
