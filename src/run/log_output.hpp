@@ -1,4 +1,4 @@
-// The log of a recording, written again with its clouds cleaned or marked.
+// The scans or the log of a recording, written again with their points cleaned or marked.
 #pragma once
 
 #include <filesystem>
@@ -18,5 +18,12 @@ void check_log_output(const RunPlan& plan);
 /// IoError.
 bool write_log(const RunPlan& plan, const PointStore& labels, const std::filesystem::path& file,
                const Warn& warn);
+
+/// Writes a scan to `folder`: all finite points that are not dynamic, or with `drop_not_judged` all
+/// static ones, in their order and frame. Files of .bin, .pcd and .ply are copied without the other
+/// points, so that all columns stay as they are. Scans of other formats become .pcd with the
+/// columns of the scan, m. Throws IoError.
+void write_clean(const Recording& recording, const JudgedScan& judged,
+                 const std::filesystem::path& folder, bool drop_not_judged);
 
 }  // namespace dynains::run

@@ -166,16 +166,14 @@ void Picture::write_png(const std::filesystem::path& path) const {
   file.commit();
 }
 
-Overview::Overview(const std::vector<Eigen::Vector3d>& path)
-    : static_step_(static_step(path.size())) {
-  Eigen::Array2d low = path.front().head<2>().array();
-  Eigen::Array2d high = low;
-  for (const Eigen::Vector3d& position : path) {
-    low = low.min(position.head<2>().array());
-    high = high.max(position.head<2>().array());
+Overview::Overview(const Recording& recording, const ScanRange& range)
+    : static_step_(static_step(range.size())) {
+  Eigen::AlignedBox2d box;
+  for (std::size_t i = range.first; i <= range.last; ++i) {
+    box.extend(recording.T_world_sensor(i).translation().head<2>());
   }
-  low_ = low - kStyle.margin;
-  const Eigen::Array2d size = high + kStyle.margin - low_.array();
+  low_ = box.min().array() - kStyle.margin;
+  const Eigen::Array2d size = box.max().array() + kStyle.margin - low_.array();
   scale_ = std::min(kStyle.max_per_metre, kStyle.longer_side / size.maxCoeff());
   const auto pixels = [&](double metres) {
     return std::max(1, static_cast<int>(std::ceil(metres * scale_)));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "scan_range.hpp"
 #include "verdict_files.hpp"
 
 namespace dynains::run {
@@ -56,8 +57,8 @@ class Picture {
 
 class Overview {
  public:
-  /// `path`: positions of the sensor in the world, m; the picture shows 50 m around them.
-  explicit Overview(const std::vector<Eigen::Vector3d>& path);
+  /// Shows 50 m around the positions of the sensor.
+  Overview(const Recording& recording, const ScanRange& range);
 
   /// Adds all removed points of a scan, and some of its static points.
   void add(const JudgedScan& judged);

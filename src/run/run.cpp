@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -26,6 +27,7 @@
 #include "run/remarks/run_doubts.hpp"
 #include "run_plan.hpp"
 #include "run_report.hpp"
+#include "run_results.hpp"
 #include "verdict_files.hpp"
 #include "write_grid.hpp"
 #include "write_view.hpp"
@@ -158,43 +160,6 @@ void warn_of_scans(const RunPlan& plan, const RunResults& results, const RunTimi
   }
 }
 
-/// Files outside of the folder of results, which are put in place with it.
-class OutsideFiles {
- public:
-  /// Files of the results that `out` replaces are replaced, too.
-  OutsideFiles(const RunPlan& plan, const OutputFolder& out) {
-    const auto add = [&](const fs::path& target) {
-      return files_.emplace_back(target, out.owns(target), plan.inputs).path();
-    };
-    const RunOutputs& outputs = plan.settings.outputs;
-    if (outputs.has_outside_map()) map = add(outputs.map);
-    if (!outputs.log.empty()) {
-      check_log_output(plan);
-      log = add(outputs.log);
-    }
-    if (outputs.grid.empty()) return;
-    grid = add(outputs.grid);
-    image = add(grid_image(outputs.grid));
-  }
-
-  /// Where to write them; empty: not asked for.
-  fs::path map, log, grid, image;
-
-  /// The contents, by the names of the targets.
-  nlohmann::ordered_json contents() const {
-    nlohmann::ordered_json json;
-    for (const OutputFile& file : files_) json[file.listed_target()] = content_of(file.path());
-    return json;
-  }
-  /// All bytes are on the disk before the first name changes.
-  void put_in_place(std::size_t first = 0) {
-    if (first < files_.size()) files_[first].put_in_place([&] { put_in_place(first + 1); });
-  }
-
- private:
-  std::deque<OutputFile> files_;
-};
-
 /// Whether the run adds a session: the results that are replaced may have added it already.
 bool adds_session(const RunPlan& plan, const OutputFolder& out) {
   if (plan.session.city.empty()) return false;
@@ -202,7 +167,7 @@ bool adds_session(const RunPlan& plan, const OutputFolder& out) {
 }
 
 /// Writes the grid. Returns PlacedGrid::summary(), null after a signal.
-nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& plan,
+nlohmann::ordered_json write_grid(const RunOutputs& outputs, const RunPlan& plan,
                                   const PointStore& labels, const Warn& warn) {
   std::vector<std::size_t> scans(plan.range.size());
   std::iota(scans.begin(), scans.end(), plan.range.first);
@@ -210,11 +175,11 @@ nlohmann::ordered_json write_grid(const OutsideFiles& outside, const RunPlan& pl
       [&](std::size_t i, const RecordedScan&, std::vector<PointLabel>& of_scan) {
         labels.read(i - plan.range.first, of_scan);
       },
-      plan.sequence, scans, plan.settings.outputs.grid_config, false,
+      plan.sequence, scans, outputs.grid_config, false,
       [](std::size_t) { return InterruptGuard::signal() == 0; });
   if (InterruptGuard::signal() != 0) return nullptr;
   for (const std::string& doubt : made.doubts) warn(doubt);
-  grid::write_grid(outside.image, outside.grid, made.grid, made.origin);
+  grid::write_grid(outputs.grid_image, outputs.grid, made.grid, made.origin);
   return made.summary();
 }
 
@@ -233,20 +198,28 @@ void check_before(const RunPlan& plan, const Warn& warn) {
 }
 
 /// With the places where the files are written that appear at the end.
-RunSettings partial_settings(const RunPlan& plan, const OutputFolder& out,
-                             const OutsideFiles& outside) {
+RunSettings begin_outputs(const RunPlan& plan, OutputFolder& out) {
   RunSettings settings = plan.settings;
   RunOutputs& outputs = settings.outputs;
-  outputs.folder = out.path();
-  if (!outputs.map.empty()) {
-    outputs.map = outside.map.empty() ? out.path() / outputs.map.filename() : outside.map;
+  const auto begin = [&](fs::path& file) {
+    if (!file.empty()) file = out.add(file, plan.inputs);
+  };
+  if (outputs.has_outside_map()) {
+    begin(outputs.map);
+  } else if (!outputs.map.empty()) {
+    outputs.map = out.path() / outputs.map.filename();
   }
+  if (!outputs.log.empty()) check_log_output(plan);
+  begin(outputs.log);
+  begin(outputs.grid);
+  begin(outputs.grid_image);
+  outputs.folder = out.path();
   return settings;
 }
 
 /// Writes the results, from the first scan on, or until a signal comes.
-RunOutcome write_results(const RunPlan& plan, const RunListener& listener, OutputFolder& out,
-                         OutsideFiles& outside) {
+RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
+                         const RunListener& listener, OutputFolder& out) {
   std::vector<std::string> warnings = plan.sequence.warnings();
   const Warn warn = [&](const std::string& text) {
     warnings.push_back(text);
@@ -263,7 +236,6 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
   }
 
   const InterruptGuard interrupt(listener.second_signal);
-  const RunSettings settings = partial_settings(plan, out, outside);
   const RunOutputs& outputs = settings.outputs;
   std::optional<viewer::Page> page;
   PointStore labels(outputs.folder);  // final ones, for what reads the recording again
@@ -280,7 +252,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
     page.emplace(make_page(plan.sequence, plan.range, settings.config.map.map_voxel));
     results.add([&](const JudgedScan& judged) { add_to_page(plan.sequence, judged, *page); }, true);
   }
-  if (!outside.log.empty() || !outside.grid.empty()) {
+  if (!outputs.log.empty() || !outputs.grid.empty()) {
     results.add([&](const JudgedScan& judged) { labels.add(judged.arrays.labels); });
   }
   const RunTiming timing = process(plan, listener, results);
@@ -296,12 +268,12 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kResultNames.poses, plan.sequence);
   bool is_complete = results.finished() == plan.range.size() && results.is_revised();
-  if (is_complete && !outside.log.empty()) {
-    is_complete = write_log(plan, labels, outside.log, warn);
+  if (is_complete && !outputs.log.empty()) {
+    is_complete = write_log(plan, labels, outputs.log, warn);
   }
   nlohmann::ordered_json grid;
-  if (is_complete && !outside.grid.empty()) {
-    grid = write_grid(outside, plan, labels, warn);
+  if (is_complete && !outputs.grid.empty()) {
+    grid = write_grid(outputs, plan, labels, warn);
     is_complete = !grid.is_null();
   }
   nlohmann::ordered_json remarks = doubts.json;
@@ -316,10 +288,7 @@ RunOutcome write_results(const RunPlan& plan, const RunListener& listener, Outpu
     return outcome;
   }
   if (page) write_page(*page, outputs.folder / kResultNames.page);
-  const nlohmann::ordered_json written = outside.contents();
-  if (!written.is_null()) outcome.report["written"] = written;
   out.finish(outcome.report, [&] {
-    outside.put_in_place();
     if (session) session->commit();
   });
   return outcome;
@@ -331,8 +300,7 @@ RunOutcome run(const RunSettings& settings, Recording recording, const RunListen
   const RunPlan plan = make_plan(settings, std::move(recording));
   OutputFolder out(plan.settings.outputs.folder, kRunOutput, plan.listing, settings.force,
                    plan.inputs);
-  OutsideFiles outside(plan, out);
-  return write_results(plan, listener, out, outside);
+  return write_results(plan, begin_outputs(plan, out), listener, out);
 }
 
 }  // namespace dynains::run

@@ -125,6 +125,7 @@ void complete_log_and_grid(RunOutputs& outputs) {
   if (outputs.grid.empty()) return;
   outputs.grid_config.validate();
   take_outside("--grid", grid_file(outputs.grid), outputs, outputs.grid);
+  outputs.grid_image = grid_image(outputs.grid);
 }
 
 /// Throws ConfigError.

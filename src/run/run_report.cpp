@@ -12,6 +12,7 @@
 #include "dynains/evaluation/report.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/trajectory.hpp"
+#include "run_results.hpp"
 
 namespace dynains::run {
 namespace {
@@ -126,6 +127,25 @@ void write_timing(const std::filesystem::path& path, const RunTiming& timing) {
     out << ',';
     if (row.pose_residual) out << row.pose_residual->second;
     out << ',' << std::setprecision(9) << row.time << std::setprecision(4) << '\n';
+  }
+  file.commit();
+}
+
+void write_tracks(const std::filesystem::path& path, std::vector<TrackRow>& rows) {
+  std::map<std::uint32_t, std::uint64_t> last_scans;
+  for (const TrackRow& row : rows) last_scans[row.object.id] = row.object.last_scan;
+  AtomicFile file(path);
+  std::ostream& out = file.stream();
+  out.imbue(std::locale::classic());
+  out << std::setprecision(15) << "scan,time";
+  const MovingObject none;
+  MovingObject::visit(none, [&](const char* name, auto) { out << ',' << name; });
+  out << '\n';
+  for (TrackRow& row : rows) {
+    row.object.last_scan = last_scans[row.object.id];
+    out << row.scan << ',' << row.time;
+    MovingObject::visit(row.object, [&](const char*, auto number) { out << ',' << number; });
+    out << '\n';
   }
   file.commit();
 }

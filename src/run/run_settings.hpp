@@ -57,6 +57,7 @@ struct RunOutputs {
   std::filesystem::path log;     ///< by whole_path(); empty: none
   bool mark_log = false;         ///< adds labels to its clouds, which keep all points
   std::filesystem::path grid;    ///< description, by whole_path(); empty: none
+  std::filesystem::path grid_image;
   grid::Config grid_config;
   bool write_poses = false;
   bool write_page = false;  ///< of dynains view

@@ -456,12 +456,20 @@ void OutputFolder::keep_unfinished(const Json& marker) {
   partial_->keep();
 }
 
+void OutputFolder::put_files_in_place(std::size_t first) {
+  if (first < files_.size()) files_[first].put_in_place([&] { put_files_in_place(first + 1); });
+}
+
 void OutputFolder::finish(Json marker, const std::function<void()>& put_others) {
+  for (const OutputFile& file : files_) {
+    marker["written"][file.listed_target()] = content_of(file.path());
+  }
   marker["complete"] = true;
   marker[kContents] = partial_->results().contents();
   partial_->results().mark(marker, listing_);
   sync_files(path());
   partial_->keep();  // the results are whole
+  put_files_in_place(0);
   put_others();
   partial_->replace(earlier_ ? &*earlier_ : nullptr);
 }

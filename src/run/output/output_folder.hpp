@@ -6,6 +6,7 @@
 // folder that holds the target.
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -241,37 +242,6 @@ class PartialFolder {
   bool is_kept_ = false;
 };
 
-/// Results in a folder.
-class OutputFolder {
- public:
-  /// `listing` has all files that will be written. Throws IoError unless `target` is missing, empty
-  /// or, if `may_replace`, holds results of this kind, all of which are listed and none of which
-  /// are `inputs`; UsageError if another command uses it.
-  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
-               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
-
-  /// The folder to write into.
-  const std::filesystem::path& path() const { return partial_->path(); }
-  /// Whether the results that will be replaced, or complete ones that a killed command has left
-  /// beside the target, have this text in `field` of their marker.
-  bool had(const char* field, const std::string& text) const;
-  /// kOurs if any of those results have written the file `path`, as it is now: their markers have
-  /// its content_of() in the field `written`, by its listed_target().
-  Existing owns(const std::filesystem::path& path) const;
-  /// The results so far stay in path(), with this marker. Throws IoError.
-  void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Writes `marker` with "complete" and the contents set, syncs the results, calls `put_others()`,
-  /// and then replaces the target: a complete marker there means that the other outputs are in
-  /// place. If `put_others()` fails, the results stay in path(). Throws IoError.
-  void finish(
-      nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
-
- private:
-  OutputListing listing_;
-  std::optional<ResultFolder> earlier_;
-  std::optional<PartialFolder> partial_;
-};
-
 /// A file as an output of its own, or in the folder of finished results.
 class OutputFile {
  public:
@@ -299,6 +269,47 @@ class OutputFile {
   Folder::Rename how_;
   std::optional<PartialFolder> partial_;
   const Folder* folder_ = nullptr;  // of the target
+};
+
+/// Results in a folder.
+class OutputFolder {
+ public:
+  /// `listing` has all files that will be written. Throws IoError unless `target` is missing, empty
+  /// or, if `may_replace`, holds results of this kind, all of which are listed and none of which
+  /// are `inputs`; UsageError if another command uses it.
+  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
+               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
+
+  /// The folder to write into.
+  const std::filesystem::path& path() const { return partial_->path(); }
+  /// Whether the results that will be replaced, or complete ones that a killed command has left
+  /// beside the target, have this text in `field` of their marker.
+  bool had(const char* field, const std::string& text) const;
+  /// kOurs if any of those results have written the file `path`, as it is now: their markers have
+  /// its content_of() in the field `written`, by its listed_target().
+  Existing owns(const std::filesystem::path& path) const;
+  /// Also writes a file outside of the folder; one of the results that are replaced is replaced,
+  /// too. Returns where to write it. Throws IoError, UsageError.
+  std::filesystem::path add(const std::filesystem::path& file, const InputFiles& inputs) {
+    return files_.emplace_back(file, owns(file), inputs).path();
+  }
+  /// The results so far stay in path(), with this marker. Throws IoError.
+  void keep_unfinished(const nlohmann::ordered_json& marker);
+  /// Writes `marker` with "complete", the contents and the field `written` set, syncs the results,
+  /// puts the added files in place, calls `put_others()`, and then replaces the target: a complete
+  /// marker there means that the other outputs are in place. If any of them fails, the results stay
+  /// in path(). Throws IoError.
+  void finish(
+      nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
+
+ private:
+  /// All bytes are on the disk before the first name changes.
+  void put_files_in_place(std::size_t first);
+
+  OutputListing listing_;
+  std::optional<ResultFolder> earlier_;
+  std::optional<PartialFolder> partial_;
+  std::deque<OutputFile> files_;  // outside of the folder
 };
 
 }  // namespace dynains::run
