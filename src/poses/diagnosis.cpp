@@ -18,7 +18,6 @@
 #include "dynains/surfaces/surface_grid.hpp"
 #include "dynains/threads/in_two_threads.hpp"
 #include "io/points/finite_points.hpp"
-#include "openings.hpp"
 #include "pose_fit.hpp"
 #include "readings.hpp"
 

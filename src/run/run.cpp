@@ -22,7 +22,6 @@
 #include "recorded_scans.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/cloud_remarks.hpp"
-#include "run/remarks/odd_scans.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"
 #include "run_plan.hpp"

@@ -15,7 +15,7 @@
 #include "io/fingerprint.hpp"
 #include "io/points/finite_points.hpp"
 #include "recorded_scans.hpp"
-#include "remarks/odd_scans.hpp"
+#include "remarks/cloud_remarks.hpp"
 #include "write_grid.hpp"
 
 namespace dynains::run {

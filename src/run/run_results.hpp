@@ -27,7 +27,7 @@
 #include "map_file.hpp"
 #include "overview.hpp"
 #include "recorded_scans.hpp"
-#include "run/remarks/odd_scans.hpp"
+#include "run/remarks/cloud_remarks.hpp"
 #include "run_report.hpp"
 #include "run_settings.hpp"
 #include "verdict_files.hpp"

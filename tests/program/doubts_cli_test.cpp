@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "program/start.hpp"
-#include "run/remarks/odd_scans.hpp"
+#include "run/remarks/cloud_remarks.hpp"
 #include "simulation/config.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"

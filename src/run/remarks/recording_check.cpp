@@ -13,7 +13,6 @@
 #include "dynains/poses/ray_origin.hpp"
 #include "dynains/poses/sensor_agreement.hpp"
 #include "io/text.hpp"
-#include "odd_scans.hpp"
 #include "run/settings/parameter_values.hpp"
 #include "run/settings/recording_settings.hpp"
 
