@@ -1,6 +1,7 @@
 #include "dynains/evaluation/report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iomanip>
 #include <locale>
@@ -71,32 +72,34 @@ constexpr Rate kRates[] = {{"pr", "PR %", &EvaluationRow::voxels, &Score::kept},
                            {"aa", "AA %", &EvaluationRow::points, &Score::associated},
                            {"ha", "HA %", &EvaluationRow::points, &Score::harmonic}};
 
+/// The counts of voxels, of which those that are preserved count, or of points or objects.
+std::array<std::pair<const char*, std::uint64_t>, 4> counts_of(const Score& score,
+                                                               bool are_voxels = false) {
+  const std::uint64_t preserved = score.dynamic_total - score.dynamic_removed;
+  return {{{"static_total", score.static_total},
+           {are_voxels ? "static_preserved" : "static_kept", score.static_kept},
+           {"dynamic_total", score.dynamic_total},
+           {are_voxels ? "dynamic_preserved" : "dynamic_removed",
+            are_voxels ? preserved : score.dynamic_removed}}};
+}
+
 /// The rates and the counts of the voxels or the points of a row.
 Json to_json(const EvaluationRow& row, Score EvaluationRow::*score) {
   Json json;
   for (const Rate& rate : kRates) {
     if (rate.score == score) json[rate.name] = json_number(rate.of(row));
   }
-  const Score& counts = row.*score;
-  const bool is_of_voxels = score == &EvaluationRow::voxels;
-  json["static_total"] = counts.static_total;
-  json[is_of_voxels ? "static_preserved" : "static_kept"] = counts.static_kept;
-  json["dynamic_total"] = counts.dynamic_total;
-  if (is_of_voxels) {
-    json["dynamic_preserved"] = counts.dynamic_total - counts.dynamic_removed;
-  } else {
-    json["dynamic_removed"] = counts.dynamic_removed;
+  for (const auto& [name, count] : counts_of(row.*score, score == &EvaluationRow::voxels)) {
+    json[name] = count;
   }
   return json;
 }
 
 Json to_json(const Score& objects) {
-  return {{"static_kept_percent", json_number(objects.kept())},
-          {"dynamic_removed_percent", json_number(objects.removed())},
-          {"static_total", objects.static_total},
-          {"static_kept", objects.static_kept},
-          {"dynamic_total", objects.dynamic_total},
-          {"dynamic_removed", objects.dynamic_removed}};
+  Json json = {{"static_kept_percent", json_number(objects.kept())},
+               {"dynamic_removed_percent", json_number(objects.removed())}};
+  for (const auto& [name, count] : counts_of(objects)) json[name] = count;
+  return json;
 }
 
 /// Without ground, which has no objects.
@@ -261,18 +264,10 @@ std::string to_csv(const Evaluation& evaluation) {
   for (const EvaluationRow& row : evaluation.rows) {
     text << csv_field(row.name);
     for (const Rate& rate : kRates) text << ',' << format_number(rate.of(row), 6, "");
-    const Score& voxels = row.voxels;
-    for (const std::uint64_t value :
-         {voxels.static_total, voxels.static_kept, voxels.dynamic_total,
-          voxels.dynamic_total - voxels.dynamic_removed, row.points.static_total,
-          row.points.static_kept, row.points.dynamic_total, row.points.dynamic_removed}) {
-      text << ',' << value;
-    }
-    if (row.objects) {
-      text << ',' << row.objects->static_total << ',' << row.objects->static_kept << ','
-           << row.objects->dynamic_total << ',' << row.objects->dynamic_removed;
-    } else {
-      text << ",,,,";
+    for (const auto& [name, count] : counts_of(row.voxels, true)) text << ',' << count;
+    for (const auto& [name, count] : counts_of(row.points)) text << ',' << count;
+    for (const auto& [name, count] : counts_of(row.objects.value_or(Score()))) {
+      text << ',' << (row.objects ? std::to_string(count) : "");
     }
     text << '\n';
   }

@@ -36,20 +36,6 @@ std::vector<Eigen::Vector3d> select(PointsView points, const Mounting& mounting,
   return sorted;
 }
 
-// Result of a search for the nearest point, as nanoflann fills it in.
-struct NearestWithin {
-  double squared;  // m^2; at first the largest distance of interest
-
-  bool full() const { return true; }
-  std::size_t size() const { return 1; }
-  double worstDist() const { return squared; }
-  bool addPoint(double squared_distance, std::size_t) {
-    squared = std::min(squared, squared_distance);
-    return true;
-  }
-  void sort() {}
-};
-
 }  // namespace
 
 // The points, as nanoflann reads them, and the tree over them, which the first search builds.
@@ -87,11 +73,15 @@ const SurfaceGrid& Landmarks::surfaces() const {
 }
 
 double Landmarks::distance_to(const Eigen::Vector3d& p) const {
-  NearestWithin nearest{kMaxGap * kMaxGap};
   if (size() == 0) return kMaxGap;
+  nanoflann::KNNResultSet<double> nearest(1);
+  std::size_t index = 0;
+  double squared = 0.0;
+  nearest.init(&index, &squared);
+  squared = kMaxGap * kMaxGap;  // farther points do not count
   if (!tree_->index) tree_->index.emplace(3, *tree_);
   tree_->index->findNeighbors(nearest, p.data(), {});
-  return std::sqrt(nearest.squared);
+  return std::sqrt(squared);
 }
 
 Agreement Landmarks::compare(const Landmarks& other, const Pose& T_this_other) const {
