@@ -32,7 +32,8 @@ RecordingPointer open(const std::filesystem::path& path, const py::dict& values)
     const py::gil_scoped_release release;
     recording.emplace(path, settings.checked());
   }
-  return std::make_shared<SharedRecording>(std::move(*recording), values, settings);
+  return std::make_shared<SharedRecording>(
+      SharedRecording{std::move(*recording), values, settings});
 }
 
 /// One scan, whose labels are read when they are asked for.
@@ -40,9 +41,9 @@ struct ScanOfRecording {
   ScanOfRecording(RecordingPointer opened, std::size_t i)
       : recording(std::move(opened)),
         index(i),
-        name(recording->get().name(i)),
-        time(recording->get().time(i)),
-        T_world_sensor(to_array(recording->get().T_world_sensor(i))) {
+        name(recording->recording.name(i)),
+        time(recording->recording.time(i)),
+        T_world_sensor(to_array(recording->recording.T_world_sensor(i))) {
     RecordedScan scan = recording->read([i](const Recording& open) { return open.read_scan(i); });
     points = to_array(std::move(scan.xyzi), 4);
     if (!scan.ring.empty()) rings = to_array(std::move(scan.ring));
@@ -50,12 +51,12 @@ struct ScanOfRecording {
   }
 
   py::object intensity() const {
-    if (!recording->get().columns().intensity) return py::none();
+    if (!recording->recording.columns().intensity) return py::none();
     return points[py::make_tuple(py::ellipsis(), 3)];
   }
 
   py::object read_labels() {
-    if (labels.is_none() && recording->get().has_labels()) {
+    if (labels.is_none() && recording->recording.has_labels()) {
       labels =
           to_array(recording->read([&](const Recording& open) { return open.read_labels(index); }));
     }
@@ -88,7 +89,7 @@ std::string joined(const py::object& numbers) {
 }
 
 ScanOfRecording scan_of(const RecordingPointer& recording, py::ssize_t index) {
-  const auto size = static_cast<py::ssize_t>(recording->get().size());
+  const auto size = static_cast<py::ssize_t>(recording->recording.size());
   if (index < 0) index += size;
   if (index < 0 || index >= size) throw py::index_error("the recording has no such scan");
   return {recording, static_cast<std::size_t>(index)};
@@ -97,22 +98,22 @@ ScanOfRecording scan_of(const RecordingPointer& recording, py::ssize_t index) {
 template <class ValueOf>
 auto values_of_scans(const SharedRecording& recording, ValueOf&& value_of) {
   std::vector<decltype(value_of(std::size_t{0}))> values;
-  for (std::size_t i = 0; i < recording.get().size(); ++i) values.push_back(value_of(i));
+  for (std::size_t i = 0; i < recording.recording.size(); ++i) values.push_back(value_of(i));
   return values;
 }
 
 py::array_t<double> poses_of(const SharedRecording& recording) {
-  py::array_t<double> poses({recording.get().size(), std::size_t{4}, std::size_t{4}});
+  py::array_t<double> poses({recording.recording.size(), std::size_t{4}, std::size_t{4}});
   using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-  for (std::size_t i = 0; i < recording.get().size(); ++i) {
+  for (std::size_t i = 0; i < recording.recording.size(); ++i) {
     const auto row = static_cast<py::ssize_t>(i);
-    Eigen::Map<RowMajor>(poses.mutable_data(row)) = recording.get().T_world_sensor(i).matrix();
+    Eigen::Map<RowMajor>(poses.mutable_data(row)) = recording.recording.T_world_sensor(i).matrix();
   }
   return poses;
 }
 
 std::string represent(const SharedRecording& recording) {
-  const Recording& open = recording.get();
+  const Recording& open = recording.recording;
   std::ostringstream text;
   text << "<dynains.Recording: " << open.size() << " scans";
   if (open.size() > 0) text << " in " << open.time(open.size() - 1) - open.time(0) << " s";
@@ -196,13 +197,13 @@ void bind_recording(py::module_& module) {
       "What the files mean, by name (dynains.check finds out):\n" +
       describe_settings<run::RecordingSettings>();
   const auto of = [](auto member) {
-    return [member](const SharedRecording& recording) { return (recording.get().*member)(); };
+    return [member](const SharedRecording& recording) { return (recording.recording.*member)(); };
   };
   py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
       .def(
           py::init([](const std::filesystem::path& path, const py::kwargs& options) {
             RecordingPointer recording = open(path, py::dict(options));
-            show_warnings(recording->get());
+            show_warnings(recording->recording);
             return recording;
           }),
           py::arg("path"),
@@ -215,31 +216,31 @@ void bind_recording(py::module_& module) {
       .def_property_readonly(
           "options",
           [](const SharedRecording& recording) {
-            return py::dict(recording.options().attr("copy")());
+            return py::dict(recording.options.attr("copy")());
           },
           "The options that it was opened with.")
       .def_property_readonly(
           "frame",
-          [](const SharedRecording& recording) { return plain_value(recording.get().frame()); },
+          [](const SharedRecording& recording) { return plain_value(recording.recording.frame()); },
           "Frame of the points in the files, 'sensor' or 'world'.")
       .def_property_readonly(
           "names",
           [](const SharedRecording& recording) {
             return values_of_scans(recording,
-                                   [&](std::size_t i) { return recording.get().name(i); });
+                                   [&](std::size_t i) { return recording.recording.name(i); });
           },
           "Name of each scan.")
       .def_property_readonly(
           "times",
           [](const SharedRecording& recording) {
-            return to_array(
-                values_of_scans(recording, [&](std::size_t i) { return recording.get().time(i); }));
+            return to_array(values_of_scans(
+                recording, [&](std::size_t i) { return recording.recording.time(i); }));
           },
           "(scans,) float64, s, strictly increasing.")
       .def_property_readonly("poses", &poses_of, "(scans, 4, 4) float64, T_world_sensor.")
       .def_property_readonly(
           "has_labels",
-          [](const SharedRecording& recording) { return recording.get().has_labels(); },
+          [](const SharedRecording& recording) { return recording.recording.has_labels(); },
           "Whether scans have labels.")
       .def_property_readonly("missing_poses", of(&Recording::missing_pose_count),
                              "Number of scans that are left out because they have no pose.")
@@ -319,7 +320,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
   const run::RecordingCheck check = shared->read(run::check_recording);
   const Diagnosis& d = check.diagnosis;
   CheckedRecording result{check.passed,
-                          shared->options().attr("copy")(),
+                          shared->options.attr("copy")(),
                           without_last_newlines(check.advice + check.remark),
                           plain_value(d.verdict),
                           {},
@@ -333,7 +334,7 @@ CheckedRecording check_by_name(const py::object& recording, const py::kwargs& op
     result.rotation_error = 180.0 / M_PI * d.rotation_error;
   }
   if (!check.flags.empty()) {
-    result.text += "    " + call_text(shared->get().folder().string(), result.options) + '\n';
+    result.text += "    " + call_text(shared->recording.folder().string(), result.options) + '\n';
   }
   result.text = without_last_newlines(result.text + check.remark);
   return result;

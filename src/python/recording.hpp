@@ -5,37 +5,23 @@
 
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "dynains/io/recording.hpp"
 #include "run/settings/recording_settings.hpp"
 
 namespace dynains::python {
 
-class SharedRecording {
- public:
-  SharedRecording(Recording recording, pybind11::dict options, run::RecordingSettings settings)
-      : recording_(std::move(recording)),
-        options_(std::move(options)),
-        settings_(std::move(settings)) {}
-
-  /// Several threads may read.
-  const Recording& get() const { return recording_; }
-  /// The keyword arguments that it was opened with.
-  const pybind11::dict& options() const { return options_; }
-  const run::RecordingSettings& settings() const { return settings_; }
+struct SharedRecording {
+  const Recording recording;     ///< several threads may read
+  const pybind11::dict options;  ///< keyword arguments that it was opened with
+  const run::RecordingSettings settings;
 
   /// Calls `work` with the recording, without the interpreter's lock.
   template <class Work>
   auto read(Work&& work) const {
     const pybind11::gil_scoped_release release;
-    return work(recording_);
+    return work(recording);
   }
-
- private:
-  Recording recording_;
-  pybind11::dict options_;
-  run::RecordingSettings settings_;
 };
 
 /// Opens a recording with keyword arguments, or takes an open one, to which none may be given.

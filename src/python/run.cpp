@@ -123,10 +123,10 @@ RunArguments prepare(const py::object& recording, const fs::path& out, const py:
   run::check_settings(settings);
   arguments.recording = to_recording(recording, options);
   const SharedRecording& shared = *arguments.recording;
-  if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared.get());
-  settings.recording = shared.get().folder().string();
-  settings.recording_flags = shared.settings().flags;
-  settings.recording_as_given = shared.settings().as_given(settings.recording);
+  if (!py::isinstance<SharedRecording>(recording)) show_warnings(shared.recording);
+  settings.recording = shared.recording.folder().string();
+  settings.recording_flags = shared.settings.flags;
+  settings.recording_as_given = shared.settings.as_given(settings.recording);
   return arguments;
 }
 
@@ -137,7 +137,7 @@ RunResult run(const py::object& recording, const fs::path& out, const py::object
   RunOutcome outcome;
   {
     const py::gil_scoped_release release;
-    outcome = run::run(arguments.settings, arguments.recording->get(), listener);
+    outcome = run::run(arguments.settings, arguments.recording->recording, listener);
   }
   if (outcome.signal != 0) raise_signal(outcome);
   const run::RunOutputs& outputs = outcome.outputs;
@@ -162,7 +162,7 @@ fs::path write_page(const fs::path& out, const py::object& recording, std::size_
   const auto open = [&](const run::ResultFolder& finished) {
     if (!recording.is_none()) {
       const py::gil_scoped_acquire acquire;
-      return to_recording(recording, py::dict())->get();
+      return to_recording(recording, py::dict())->recording;
     }
     run::RecordingSettings settings;
     settings.complete(finished.marker().value("sequence_flags", nlohmann::ordered_json::object()));

@@ -6,19 +6,6 @@
 namespace dynains::run {
 namespace {
 
-/// Point i of a scan, but for its position.
-FilePoint attributes_of(const JudgedScan& judged, std::size_t i) {
-  const ScanVerdict& verdict = judged.verdict;
-  FilePoint point = judged.scan.point(i);
-  point.scan_time = verdict.time;
-  point.belief = verdict.beliefs[i];
-  if (!judged.truth.empty()) point.label = judged.truth[i];
-  point.instance = verdict.instances[i];
-  point.cause = static_cast<std::uint8_t>(verdict.causes[i]);
-  point.is_ground = verdict.labels[i] == PointLabel::kGround;
-  return point;
-}
-
 /// Points lie around the poses; near the limit doubles cost little and lose nothing.
 bool is_far(const Recording& recording, const ScanRange& range) {
   // No sensor reaches farther than 500 m.
@@ -85,37 +72,6 @@ PointColumns moving_columns(const Recording& recording, const ScanRange& range) 
   columns.intensity = true;
   columns.label = true;
   return columns;
-}
-
-MapAttributeTable::MapAttributeTable(double voxel, const Eigen::Vector3d& origin)
-    : voxel_(voxel), origin_((origin / voxel).array().floor()) {}
-
-void MapAttributeTable::add(const JudgedScan& judged) {
-  const ScanVerdict& verdict = judged.verdict;
-  for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-    if (!is_static(verdict.labels[i])) continue;
-    const Eigen::Map<const Eigen::Vector3f> point(judged.scan.xyzi.data() + 4 * i);
-    const std::uint32_t voxel =
-        voxels_.insert(key_of(verdict.T_world_sensor * point.cast<double>()));
-    if (voxel == attributes_.size()) attributes_.push_back(attributes_of(judged, i));
-  }
-}
-
-FilePoint MapAttributeTable::at(const Eigen::Vector3d& position) const {
-  const VoxelKey key = key_of(position);
-  std::uint32_t found = voxels_.find(key);
-  for_each_touching(key, [&](VoxelKey near) {
-    if (found == kNoIndex) found = voxels_.find(near);
-  });
-  FilePoint point = found == kNoIndex ? FilePoint() : attributes_[found];
-  point.position = position;
-  return point;
-}
-
-VoxelKey MapAttributeTable::key_of(const Eigen::Vector3d& position) const {
-  const Eigen::Vector3d index = (position / voxel_).array().floor() - origin_.array();
-  return voxel_key(static_cast<std::int64_t>(index.x()), static_cast<std::int64_t>(index.y()),
-                   static_cast<std::int64_t>(index.z()));
 }
 
 }  // namespace dynains::run

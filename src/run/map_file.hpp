@@ -23,17 +23,53 @@ namespace dynains::run {
 class MapAttributeTable {
  public:
   /// `voxel`: edge of the voxels of the map, m. `origin`: m, world frame, within 200 km of the map.
-  MapAttributeTable(double voxel, const Eigen::Vector3d& origin);
+  MapAttributeTable(double voxel, const Eigen::Vector3d& origin)
+      : voxel_(voxel), origin_((origin / voxel).array().floor()) {}
 
   /// Adds the points that the verdict keeps.
-  void add(const JudgedScan& judged);
+  void add(const JudgedScan& judged) {
+    const ScanVerdict& verdict = judged.verdict;
+    for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
+      if (!is_static(verdict.labels[i])) continue;
+      const Eigen::Map<const Eigen::Vector3f> point(judged.scan.xyzi.data() + 4 * i);
+      const std::uint32_t voxel =
+          voxels_.insert(key_of(verdict.T_world_sensor * point.cast<double>()));
+      if (voxel == attributes_.size()) attributes_.push_back(attributes_of(judged, i));
+    }
+  }
 
   /// A point of the map, world frame, with the attributes of its voxel. Rounding can move a point
   /// over a border, so that a neighbouring voxel counts if its own one is empty.
-  FilePoint at(const Eigen::Vector3d& position) const;
+  FilePoint at(const Eigen::Vector3d& position) const {
+    const VoxelKey key = key_of(position);
+    std::uint32_t found = voxels_.find(key);
+    for_each_touching(key, [&](VoxelKey near) {
+      if (found == kNoIndex) found = voxels_.find(near);
+    });
+    FilePoint point = found == kNoIndex ? FilePoint() : attributes_[found];
+    point.position = position;
+    return point;
+  }
 
  private:
-  VoxelKey key_of(const Eigen::Vector3d& position) const;
+  /// Point i of a scan, but for its position.
+  static FilePoint attributes_of(const JudgedScan& judged, std::size_t i) {
+    const ScanVerdict& verdict = judged.verdict;
+    FilePoint point = judged.scan.point(i);
+    point.scan_time = verdict.time;
+    point.belief = verdict.beliefs[i];
+    if (!judged.truth.empty()) point.label = judged.truth[i];
+    point.instance = verdict.instances[i];
+    point.cause = static_cast<std::uint8_t>(verdict.causes[i]);
+    point.is_ground = verdict.labels[i] == PointLabel::kGround;
+    return point;
+  }
+
+  VoxelKey key_of(const Eigen::Vector3d& position) const {
+    const Eigen::Vector3d index = (position / voxel_).array().floor() - origin_.array();
+    return voxel_key(static_cast<std::int64_t>(index.x()), static_cast<std::int64_t>(index.y()),
+                     static_cast<std::int64_t>(index.z()));
+  }
 
   double voxel_;
   Eigen::Vector3d origin_;
