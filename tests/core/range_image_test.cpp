@@ -189,6 +189,12 @@ int around_with_objects(const RangeImageGrid& grid, const ReferenceImage& all,
   return result;
 }
 
+void build_objects(RangeImage& image, const RangeImageGrid& grid, PointsView objects,
+                   RangeImage::Scratch& scratch) {
+  const RangeImage::Scan scan = {{}, objects, {}, {}};
+  image.build(grid, {&scan, 1}, 0.0F, scratch);
+}
+
 TEST_CASE("an image equals its definition: near objects protect more cells around them") {
   Random random(6);
   SensorModel sensor = SensorModel::typical();
@@ -224,7 +230,8 @@ TEST_CASE("an image equals its definition: near objects protect more cells aroun
     }
     for (int& range : objects) range = is_moving(range) ? RangeImage::kNothing : range;
     for (const float reach : {0.0F, 0.05F, 0.4F, 1.0F}) {
-      image.build(grid, points[0], points[1], moving_objects, reach, scratch);
+      const RangeImage::Scan scan = {points[0], points[1], moving_objects, {}};
+      image.build(grid, {&scan, 1}, reach, scratch);
       for (int row = 0; row < grid.rows; ++row) {
         for (int column = 0; column < grid.columns; ++column) {
           const RangeImage::Cell cell = image[all.at(row, column)];
@@ -261,7 +268,7 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
   const RangeImageGrid grid = RangeImageGrid::for_sensor(sensor);
   RangeImage image;
   RangeImage::Scratch scratch;
-  image.build(grid, PointsView(), coarse_wall(grid, 60.0), {}, 0.0F, scratch);
+  build_objects(image, grid, coarse_wall(grid, 60.0), scratch);
   const double azimuth = 0.5 / static_cast<double>(grid.columns_per_radian);  // of a beam
   PointBuffer samples;
   const double distances[] = {0.0, 0.10, 0.15, 0.18, 0.19, -0.15, -0.19};  // m, 30 m away: 17 cm
@@ -303,7 +310,7 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
   detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
                           visibility);
   // Another view of the same reference adds what it sees; its hits count more.
-  image.build(grid, PointsView(), coarse_wall(grid, 30.0), {}, 0.0F, scratch);
+  build_objects(image, grid, coarse_wall(grid, 30.0), scratch);
   detail::add_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
                          visibility);
   REQUIRE(visibility.count(0, count).free > 0);
@@ -343,7 +350,7 @@ TEST_CASE("the beam of a cell is the direction of its nearest return") {
                        static_cast<float>(across * std::sin(azimuth)),
                        static_cast<float>(range * sine));
     }
-    image.build(grid, PointsView(), points, {}, 0.0F, scratch);
+    build_objects(image, grid, points, scratch);
     const std::size_t cell =
         grid.cell(static_cast<std::int32_t>(row), static_cast<std::int32_t>(column));
     REQUIRE(image[cell].nearest < 1002);
@@ -398,7 +405,7 @@ TEST_CASE(
   }
   RangeImage image;
   RangeImage::Scratch scratch;
-  image.build(grid, PointsView(), wall, {}, 0.0F, scratch);
+  build_objects(image, grid, wall, scratch);
 
   // The margin at 20 m is 0.25 + 0.01 * 20 = 0.45 m. Samples are in the frame of a sensor 5 m
   // behind this one.

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dynains/points.hpp"
@@ -164,6 +165,13 @@ class RangeImage {
   static constexpr std::int16_t kNothing = 32766;
   static constexpr std::int16_t kUnknown = -2;
 
+  /// Points of one scan, m.
+  struct Scan {
+    PointsView ground, objects;
+    Span<const std::uint8_t> moving;  ///< by object point, 1 if it moves; empty if none does
+    std::optional<detail::PackTransform> to_image;  ///< from the frame of the points, if it differs
+  };
+
   /// Buffers of build(), which several images can share.
   struct Scratch {
     std::vector<std::int32_t> returns;         // by cell: nearest return, see collect()
@@ -197,19 +205,16 @@ class RangeImage {
     grid_ = grid;
   }
 
-  /// Replaces the image by the image of one scan. `ground`, `objects`: its points, m, sensor frame.
-  /// `moving`: by point of `objects`, 1 for a moving point; empty if no point moves.
-  /// `reach` (m): a return of an object protects the cells within this lateral distance, and at
-  /// least its 3x3 cells. Near the sensor, the 3x3 cells alone are narrower than the error of the
-  /// poses.
-  void build(const RangeImageGrid& grid, PointsView ground, PointsView objects,
-             Span<const std::uint8_t> moving, float reach, Scratch& scratch) {
+  /// Replaces the image by the image of some scans. `reach` (m): a return of an object protects the
+  /// cells within this lateral distance, and at least its 3x3 cells. Near the sensor, the 3x3 cells
+  /// alone are narrower than the error of the poses.
+  void build(const RangeImageGrid& grid, Span<const Scan> scans, float reach, Scratch& scratch) {
     allocate(grid);
     scratch.returns.assign(grid.cell_count(), kNoReturn);
     scratch.border.assign(grid.stride(), kNothing);
-    collect(grid, objects, moving, scratch.returns.data());
+    for (const Scan& scan : scans) collect(grid, scan, scan.objects, scan.moving, scratch);
     keep_objects(scratch);
-    collect(grid, ground, {}, scratch.returns.data());
+    for (const Scan& scan : scans) collect(grid, scan, scan.ground, {}, scratch);
     split(scratch);
     close_holes(grid, scratch);
     store_with_least_around(grid, scratch);
@@ -224,9 +229,10 @@ class RangeImage {
   // Writes the nearest return of each cell: its range, then the places of its column and its row,
   // 8 bits each. Returns of a block are stored in arrays, which is faster than an extraction of
   // single numbers from packs.
-  static void collect(const RangeImageGrid& grid, PointsView points,
-                      Span<const std::uint8_t> moving, std::int32_t* nearest) {
+  static void collect(const RangeImageGrid& grid, const Scan& scan, PointsView points,
+                      Span<const std::uint8_t> moving, Scratch& scratch) {
     const ImageLocator locator(grid);
+    std::int32_t* const nearest = scratch.returns.data();
     static constexpr detail::PackConstant kMaxMetres(kMaxRange), kScale(kCentimetres),
         kFine(kPlaces), kFirst(0.0F), kLast(kPlaces - 1);
     detail::with_packs([&](auto packs) {
@@ -238,9 +244,15 @@ class RangeImage {
       for (std::size_t begin = 0; begin < points.size(); begin += detail::kStepPoints) {
         const std::size_t size = std::min(detail::kStepPoints, points.size() - begin);
         detail::for_slices<Packs>(0, size, [&](auto place) {
-          const Float x = place.load(points.x.data() + begin);
-          const Float y = place.load(points.y.data() + begin);
-          const Float z = place.load(points.z.data() + begin);
+          Float x = place.load(points.x.data() + begin);
+          Float y = place.load(points.y.data() + begin);
+          Float z = place.load(points.z.data() + begin);
+          if (scan.to_image) {
+            const Float px = x, py = y, pz = z;
+            x = (*scan.to_image)(0, px, py, pz);
+            y = (*scan.to_image)(1, px, py, pz);
+            z = (*scan.to_image)(2, px, py, pz);
+          }
           const Float metres = sqrt((x * x + y * y) + z * z);
           const auto located = locator.template locate<Packs>(x, y, z, metres);
           const auto byte = [](const Float& within) {

@@ -128,7 +128,6 @@ class ReferenceScans {
       T_level_beams_.back().linear() = sensor.R_level_headed;
       T_level_beams_.back().translation() = sensor.origin;
     }
-    is_level_ = sensors.size() == 1 && sensors[0].is_level();
     if (scans != scans_) forget();
     scans_ = scans;
     span_ = ReferenceSpan(config_, scans_);
@@ -167,14 +166,10 @@ class ReferenceScans {
     if (!open_) open_ = begin_reference(scan, epoch);
     ReferenceScan& reference = references_[*open_];
     const bool is_last = scans_until_reference(since_begin) == 0;
-    if (scans_ == 1 && sensors_.size() == 1) {
-      build_only_view(scan, T_world_level, split, moving, reference);
-    } else {
-      if (part_count_ > 0 && !shares_image(T_world_level)) build_views(reference);
-      keep(scan, T_world_level, split, moving);
-      if (is_last) build_views(reference);
-    }
+    if (part_count_ > 0 && !shares_image(T_world_level)) build_views(reference);
+    keep(scan, T_world_level, split, moving);
     if (!is_last) return;
+    build_views(reference);
     reference.scan = scan;
     reference.epoch = epoch;
     reference.since_begin = since_begin;
@@ -220,15 +215,14 @@ class ReferenceScans {
   // m: within it, scans share an image. Farther apart, their beams differ in direction.
   static constexpr double kSamePlace = 0.25;
 
-  // The points of one sensor of one scan.
+  // The points of one sensor of one scan, level frame.
   struct Part {
     std::uint64_t scan = 0;
     Pose T_world_level = Pose::Identity();
+    RangeImage::Scan points;  // of the split of the scan, or of `own`
     GroundSplit own;
-    std::vector<std::uint8_t> moving;  // by point above the ground
+    std::vector<std::uint8_t> moving;  // by own point above the ground
   };
-
-  float lateral_margin() const { return static_cast<float>(config_.lateral_margin); }
 
   std::uint64_t scans_until_reference(std::uint64_t since_begin) const {
     const auto step = static_cast<std::uint64_t>(span_.step);
@@ -248,25 +242,6 @@ class ReferenceScans {
     return static_cast<std::size_t>(unneeded - references_.begin());
   }
 
-  // The image of the only scan of the only sensor.
-  void build_only_view(std::uint64_t scan, const Pose& T_world_level, const GroundSplit& split,
-                       Span<const std::uint8_t> moving, ReferenceScan& reference) {
-    reference.count = 1;
-    ReferenceView& view = reference.views.front();
-    view.first = view.last = scan;
-    view.T_world_beams = T_world_level;
-    PointsView ground = split.ground();
-    PointsView rest = split.non_ground();
-    if (!is_level_) {
-      const Eigen::Matrix3d R_beams_level = T_level_beams_.front().linear().transpose();
-      view.T_world_beams = rotated(T_world_level, R_beams_level);
-      ground = rotate(ground, R_beams_level, rotated_ground_);
-      rest = rotate(rest, R_beams_level, rotated_rest_);
-    }
-    view.image.build(RangeImageGrid::for_sensor(sensors_.front()), ground, rest, moving,
-                     lateral_margin(), scratch_);
-  }
-
   // Whether a scan shares its image with those that are kept. Images of several sensors overlap
   // without that.
   bool shares_image(const Pose& T_world_level) const {
@@ -274,7 +249,7 @@ class ReferenceScans {
            distance(parts_.front().T_world_level, T_world_level) <= kSamePlace;
   }
 
-  // Keeps the points of a scan until its images are built, by sensor.
+  // Keeps the points of a scan until its images are built, by sensor. The only ones are not copied.
   void keep(std::uint64_t scan, const Pose& T_world_level, const GroundSplit& split,
             Span<const std::uint8_t> moving) {
     for (std::size_t sensor = 0; sensor < sensors_.size(); ++sensor) {
@@ -282,6 +257,8 @@ class ReferenceScans {
       Part& part = parts_[part_count_++];
       part.scan = scan;
       part.T_world_level = T_world_level;
+      part.points = {split.ground(), split.non_ground(), moving, {}};
+      if (scans_ == 1 && sensors_.size() == 1) return;
       part.own.points.grow(split.count + kPackWidth);
       part.own.count = part.own.ground_count = 0;
       part.moving.clear();
@@ -294,16 +271,14 @@ class ReferenceScans {
           part.moving.push_back(moving.empty() ? std::uint8_t{0} : moving[i - split.ground_count]);
         }
       }
+      part.points = {part.own.ground(), part.own.non_ground(), part.moving, {}};
     }
   }
 
   // Adds the images of the points that were kept.
   void build_views(ReferenceScan& reference) {
     for (std::size_t sensor = 0; sensor < sensors_.size(); ++sensor) {
-      ReferenceView& view = reference.views[reference.count++];
-      view.first = parts_.front().scan;
-      view.last = parts_[part_count_ - 1].scan;
-      build_view(sensor, view);
+      build_view(sensor, reference.views[reference.count++]);
     }
     part_count_ = 0;
   }
@@ -311,28 +286,22 @@ class ReferenceScans {
   void build_view(std::size_t sensor, ReferenceView& view) {
     const std::size_t sensors = sensors_.size();
     const std::size_t scans = part_count_ / sensors;
-    view.T_world_beams =
-        composed(parts_[scans / 2 * sensors].T_world_level, T_level_beams_[sensor]);
-    std::size_t count = 0;
-    for (std::size_t i = sensor; i < part_count_; i += sensors) count += parts_[i].own.count;
-    all_.points.grow(count + kPackWidth);
-    all_.count = 0;
-    const auto append = [&](const Part& part, PointsView points) {
-      const Pose T_beams_points = composed(inverted(view.T_world_beams), part.T_world_level);
-      transform_points(points, PackTransform(T_beams_points), all_.points, all_.count);
-      all_.count += points.size();
-    };
+    const std::size_t middle = scans / 2 * sensors + sensor;
+    const Pose& T_world_level = parts_[middle].T_world_level;
+    const Pose T_beams_level = inverted(T_level_beams_[sensor]);
+    scans_of_view_.clear();
     for (std::size_t i = sensor; i < part_count_; i += sensors) {
-      append(parts_[i], parts_[i].own.ground());
+      const Part& part = parts_[i];
+      const Pose T_level_part = composed(inverted(T_world_level), part.T_world_level);
+      const Pose T = i == middle ? T_beams_level : composed(T_beams_level, T_level_part);
+      scans_of_view_.push_back(part.points);
+      if (!T.matrix().isIdentity(0.0)) scans_of_view_.back().to_image = PackTransform(T);
     }
-    all_.ground_count = all_.count;
-    all_moving_.clear();
-    for (std::size_t i = sensor; i < part_count_; i += sensors) {
-      append(parts_[i], parts_[i].own.non_ground());
-      all_moving_.insert(all_moving_.end(), parts_[i].moving.begin(), parts_[i].moving.end());
-    }
+    view.first = parts_.front().scan;
+    view.last = parts_[part_count_ - 1].scan;
+    view.T_world_beams = composed(T_world_level, T_level_beams_[sensor]);
     view.image.build(RangeImageGrid::for_sensor(sensors_[sensor], static_cast<int>(scans)),
-                     all_.ground(), all_.non_ground(), all_moving_, lateral_margin(), scratch_);
+                     scans_of_view_, static_cast<float>(config_.lateral_margin), scratch_);
   }
 
   FreeSpaceConfig config_;
@@ -344,13 +313,9 @@ class ReferenceScans {
   std::vector<SensorModel> sensors_;
   std::vector<Pose> T_level_beams_;                      // by sensor
   Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();  // mean origin of the sensors, level frame
-  bool is_level_ = true;                  // the images of the only sensor are in the level frame
-  std::vector<Part> parts_;               // of the open reference: by scan, then by sensor
-  std::size_t part_count_ = 0;            // of those in use
-  GroundSplit all_;                       // points of one sensor
-  std::vector<std::uint8_t> all_moving_;  // by its point above the ground
-  PointBuffer rotated_ground_;
-  PointBuffer rotated_rest_;
+  std::vector<Part> parts_;     // of the open reference: by scan, then by sensor
+  std::size_t part_count_ = 0;  // of those in use
+  std::vector<RangeImage::Scan> scans_of_view_;
   RangeImage::Scratch scratch_;
 };
 

@@ -159,8 +159,8 @@ class RecordingReferences {
     latest_ = position;
     reference_.scan = scan;
     reference_.T_world_beams = T_world_sensor;
-    reference_.image.build(grid_, split_.ground(), split_.non_ground(), moving_,
-                           static_cast<float>(lateral_margin_), scratch_);
+    const RangeImage::Scan only = {split_.ground(), split_.non_ground(), moving_, {}};
+    reference_.image.build(grid_, {&only, 1}, static_cast<float>(lateral_margin_), scratch_);
     forget_moving(reference_.image);
     return &reference_;
   }
