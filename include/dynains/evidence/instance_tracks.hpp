@@ -72,9 +72,10 @@ class InstanceLinker {
     out.instances.assign(samples.instance_count(), TrackedInstances::Instance());
     out.shapes.assign(samples.instance_count(), TrackedInstances::Shape());
     cells_.swap(cells_before_);
+    table_.swap(table_before_);
+    for (const Cell& cell : cells_) table_[slot_of(cell)] = kNoIndex;
     cells_.clear();
     find_cells(samples, cell_, T_origin_sensor, place_);
-    table_.assign(kTable, kNoIndex);
     for (std::uint32_t i = 0; i < samples.instance_count(); ++i) {
       TrackedInstances::Shape& shape = out.shapes[i];
       const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
@@ -84,7 +85,7 @@ class InstanceLinker {
       for (std::uint32_t p = begin; p < end; ++p) {
         if (p > begin && place_[p] == place_[p - 1]) continue;
         const Cell cell = {place_[p], i};
-        std::uint32_t& slot = slot_of(cell);
+        std::uint32_t& slot = table_[slot_of(cell)];
         // A collision in the table may count a cell twice. Collisions are rare, and the count needs
         // no more accuracy.
         if (slot != kNoIndex && cells_[slot].place == cell.place && cells_[slot].instance == i) {
@@ -100,14 +101,12 @@ class InstanceLinker {
   /// Links each instance of the last two scans to the instance of the other scan with the largest
   /// overlap.
   void link(TrackedInstances& before, TrackedInstances& now) {
-    table_.assign(kTable, kNoIndex);
-    for (std::uint32_t i = 0; i < cells_before_.size(); ++i) slot_of(cells_before_[i]) = i;
     shared_.assign(before.instances.size(), 0);
     std::size_t at = 0;
     for (std::uint32_t i = 0; i < now.instances.size(); ++i) {
       touched_.clear();
       for (; at < cells_.size() && cells_[at].instance == i; ++at) {
-        const std::uint32_t slot = slot_of(cells_[at]);
+        const std::uint32_t slot = table_before_[slot_of(cells_[at])];
         if (slot == kNoIndex || cells_before_[slot].place != cells_[at].place) continue;
         const std::uint32_t other = cells_before_[slot].instance;
         if (shared_[other]++ == 0) touched_.push_back(other);
@@ -129,8 +128,8 @@ class InstanceLinker {
   static constexpr std::uint32_t kMinSamples = 2;  // a single sample may overlap by chance
 
   // The hash does not include the instance, so that equal cells of two scans share a slot.
-  std::uint32_t& slot_of(const Cell& cell) {
-    return table_[voxel_hash(cell.place) >> 8 & (kTable - 1)];
+  static std::size_t slot_of(const Cell& cell) {
+    return voxel_hash(cell.place) >> 8 & (kTable - 1);
   }
 
   void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
@@ -169,8 +168,10 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  std::vector<Cell> cells_, cells_before_;  // of the last two scans, ordered by instance
-  std::vector<std::uint32_t> table_;        // direct-mapped: index in cells
+  // Of the last two scans: cells, ordered by instance; direct-mapped tables of their indices.
+  std::vector<Cell> cells_, cells_before_;
+  std::vector<std::uint32_t> table_ = std::vector<std::uint32_t>(kTable, kNoIndex);
+  std::vector<std::uint32_t> table_before_ = table_;
   std::vector<VoxelKey> place_;             // by sample
   std::vector<std::uint32_t> shared_;   // by instance of the scan before: number of common cells
   std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
