@@ -68,8 +68,12 @@ class DynamicOccupancyGrid {
     }
     for (std::size_t s = 0; s < samples.supervoxel_count(); ++s) {
       if (counted[s] != Count::kStatic) continue;
+      const float highest =
+          highest_ratio(samples.sample_begin[s], samples.sample_begin[s + 1], now);
+      if (highest <= 0.0F) continue;
       const bool is_large = tracked != nullptr && !tracked->shapes[samples.instance_of[s]].carried;
-      judge_supervoxel(samples, s, now, is_large ? kOfLarge * ratio_ : ratio_, verdicts[s]);
+      if (highest <= (is_large ? kOfLarge * ratio_ : ratio_)) continue;
+      verdicts[s] = {Cause::kDynamicOccupancy, std::max(verdicts[s].belief, highest)};
     }
   }
 
@@ -148,18 +152,15 @@ class DynamicOccupancyGrid {
            static_cast<float>(std::max(cell.dynamic_count + cell.static_count, 1));
   }
 
-  void judge_supervoxel(const InstanceSamples& samples, std::size_t s, std::uint32_t now,
-                        float ratio, Verdict& verdict) const {
-    const std::uint32_t begin = samples.sample_begin[s];
-    const std::uint32_t end = samples.sample_begin[s + 1];
+  // Highest ratio of dynamic samples of the cells of samples [begin, end).
+  float highest_ratio(std::uint32_t begin, std::uint32_t end, std::uint32_t now) const {
     float highest = 0.0F;
     for (std::uint32_t i = begin; i < end; ++i) {
       if (may_be_dynamic_[line_of_[i]] == 0) continue;
       const Cell* const cell = find(i, now);
       if (cell != nullptr) highest = std::max(highest, dynamic_ratio(*cell));
     }
-    if (!(highest > ratio)) return;
-    verdict = {Cause::kDynamicOccupancy, std::max(verdict.belief, highest)};
+    return highest;
   }
 
   double cell_;
