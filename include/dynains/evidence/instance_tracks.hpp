@@ -172,7 +172,7 @@ class InstanceLinker {
   std::vector<Cell> cells_, cells_before_;
   std::vector<std::uint32_t> table_ = std::vector<std::uint32_t>(kTable, kNoIndex);
   std::vector<std::uint32_t> table_before_ = table_;
-  std::vector<VoxelKey> place_;             // by sample
+  std::vector<VoxelKey> place_;         // by sample
   std::vector<std::uint32_t> shared_;   // by instance of the scan before: number of common cells
   std::vector<std::uint32_t> touched_;  // instances of the scan before with common cells
 };
