@@ -200,6 +200,31 @@ class PointFileReader final : public ScanReader {
   }
 };
 
+/// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
+std::optional<FileTransform> T_sensor_file(const RecordingContents& r, const ScanEntry& scan) {
+  const bool is_in_world = r.frame == PointFrame::kWorld;
+  if (!is_in_world && r.options.point_unit == 1.0) return std::nullopt;
+  FileTransform T = FileTransform::Identity();
+  if (is_in_world) T = scan.T_world_sensor.inverse();
+  if (r.options.point_unit != 1.0) T.scale(r.options.point_unit);
+  return T;
+}
+
+/// Numbers of the sensors in a file beside the scans take the place of those of the scan.
+void read_sensors(const RecordingContents& r, const std::string& name, RecordedScan& scan) {
+  if (r.options.sensors.empty()) {
+    scan.sensor.clear();
+    return;
+  }
+  const fs::path file = r.folder / "sensor" / (name + ".id");
+  if (is_file(file)) scan.sensor = read_point_bytes(file, scan.size());
+  if (r.options.sensor_beams > 0) {
+    for (std::uint8_t& sensor : scan.sensor) {
+      sensor = static_cast<std::uint8_t>(sensor / r.options.sensor_beams);
+    }
+  }
+}
+
 }  // namespace
 
 void transform_scan(const FileTransform* T_target_file, RecordedScan& points) {
@@ -251,41 +276,17 @@ std::uint64_t Recording::point_count(std::size_t i) const {
   return reader_->point_count(contents_.scans.at(i));
 }
 
-/// From the coordinates of a file to the sensor frame, m; nothing if they are the same.
-std::optional<FileTransform> Recording::T_sensor_file(std::size_t i) const {
-  const bool is_in_world = contents_.frame == PointFrame::kWorld;
-  if (!is_in_world && contents_.options.point_unit == 1.0) return std::nullopt;
-  FileTransform T = FileTransform::Identity();
-  if (is_in_world) T = T_world_sensor(i).inverse();
-  if (contents_.options.point_unit != 1.0) T.scale(contents_.options.point_unit);
-  return T;
-}
-
 void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
-  const std::optional<FileTransform> T = T_sensor_file(i);
-  reader_->read(contents_.scans.at(i), T ? &*T : nullptr, scan);
+  const ScanEntry& entry = contents_.scans.at(i);
+  const std::optional<FileTransform> T = T_sensor_file(contents_, entry);
+  reader_->read(entry, T ? &*T : nullptr, scan);
   if (contents_.frame == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
     subtract_origin(sensor_origin().cast<float>(), scan);
   }
-  read_sensors(i, scan);
+  read_sensors(contents_, entry.name, scan);
   if (!contents_.options.self_boxes.empty()) clear_boxes(contents_.options.self_boxes, scan);
   if (contents_.clock && !contents_.motion.poses.empty())
     deskew(contents_.motion, time(i), T_world_sensor(i), *contents_.clock, file(i), scan);
-}
-
-/// Numbers of the sensors in a file beside the scans take the place of those of the scan.
-void Recording::read_sensors(std::size_t i, RecordedScan& scan) const {
-  if (contents_.options.sensors.empty()) {
-    scan.sensor.clear();
-    return;
-  }
-  const fs::path file = contents_.folder / "sensor" / (name(i) + ".id");
-  if (is_file(file)) scan.sensor = read_point_bytes(file, scan.size());
-  if (contents_.options.sensor_beams > 0) {
-    for (std::uint8_t& sensor : scan.sensor) {
-      sensor = static_cast<std::uint8_t>(sensor / contents_.options.sensor_beams);
-    }
-  }
 }
 
 RecordedScan Recording::read_scan(std::size_t i) const {

@@ -264,10 +264,6 @@ class Recording {
   std::size_t missing_pose_count() const { return scan_file_count() - size(); }
 
  private:
-  std::optional<Eigen::Transform<double, 3, Eigen::Affine, Eigen::DontAlign>> T_sensor_file(
-      std::size_t i) const;
-  void read_sensors(std::size_t i, RecordedScan& scan) const;
-
   RecordingContents contents_;
   std::shared_ptr<const ScanReader> reader_;  ///< shared by copies of the recording
 };

@@ -30,6 +30,11 @@ struct Element {
   bool is_vertex = false;
   std::uint64_t count = 0;
   std::vector<Property> properties;
+
+  bool has_lists() const {
+    return std::any_of(properties.begin(), properties.end(),
+                       [](const Property& property) { return property.is_list; });
+  }
 };
 
 enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
@@ -39,10 +44,7 @@ struct PlyHeader {
   std::vector<Element> elements;  ///< up to and with the vertices: later ones are not read
 
   PlyEncoding encoding() const { return *stated_encoding; }
-  bool has_vertices() const {
-    return std::any_of(elements.begin(), elements.end(),
-                       [](const Element& element) { return element.is_vertex; });
-  }
+  bool has_vertices() const { return !elements.empty() && elements.back().is_vertex; }
 };
 
 Scalar parse_type(const ByteReader& reader, std::string_view name) {
@@ -87,13 +89,6 @@ Property parse_property(const ByteReader& reader, std::string_view line) {
   return property;
 }
 
-Element parse_element(const ByteReader& reader, std::string_view line) {
-  Element element;
-  element.is_vertex = text::next_token(line) == "vertex";
-  element.count = reader.whole_number(text::next_token(line), kElementCount);
-  return element;
-}
-
 PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   std::string line;
   if (!reader.read_line(line) || line != "ply") {
@@ -111,7 +106,9 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
     if (keyword == "format") {
       header.stated_encoding = parse_format(reader, rest);
     } else if (keyword == "element") {
-      Element element = parse_element(reader, rest);
+      Element element;
+      element.is_vertex = text::next_token(rest) == "vertex";
+      element.count = reader.whole_number(text::next_token(rest), kElementCount);
       is_past = header.has_vertices();
       if (!is_past) header.elements.push_back(std::move(element));
     } else if (keyword == "property") {
@@ -136,14 +133,19 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
   return header;
 }
 
-/// Reads one element. Calls `store(property, value)` for values that are not in lists.
+/// Reads one element. Calls `store(property, value)` for values that are not in lists. `bytes`:
+/// memory for all of its values, which are read at once unless there are lists among them.
 template <class Store>
-void read_binary_element(ByteReader& reader, const Element& element, bool swap, Store&& store) {
-  std::array<char, 8> bytes{};
+void read_binary_element(ByteReader& reader, const Element& element, bool swap,
+                         std::vector<char>& bytes, Store&& store) {
+  const bool has_lists = element.has_lists();
+  if (!has_lists) reader.read(bytes.data(), bytes.size(), "a value");
+  const char* next = bytes.data();
   for (const Property& property : element.properties) {
     if (!property.is_list) {
-      reader.read(bytes.data(), size_of(property.type), "a value");
-      store(property, load_scalar(property.type, bytes.data(), swap));
+      if (has_lists) reader.read(bytes.data(), size_of(property.type), "a value");
+      store(property, load_scalar(property.type, next, swap));
+      if (!has_lists) next += size_of(property.type);
       continue;
     }
     reader.read(bytes.data(), size_of(property.length_type), "the length of a list");
@@ -189,6 +191,8 @@ void read_element(ByteReader& reader, const Element& element, PlyEncoding encodi
   if (element.is_vertex) sink.resize(static_cast<std::size_t>(element.count));
   const bool is_text = encoding == PlyEncoding::kAscii;
   std::string line;
+  const std::uint64_t size = min_bytes(element, encoding);
+  std::vector<char> bytes(element.has_lists() ? sizeof(double) : static_cast<std::size_t>(size));
   for (std::size_t i = 0; i < element.count; ++i) {
     const auto store = [&](const Property& property, double value) {
       if (sink.set(i, property.role, value)) return;
@@ -198,7 +202,7 @@ void read_element(ByteReader& reader, const Element& element, PlyEncoding encodi
     if (is_text) {
       read_ascii_element(reader, element, line, store);
     } else {
-      read_binary_element(reader, element, encoding == PlyEncoding::kBigEndian, store);
+      read_binary_element(reader, element, encoding == PlyEncoding::kBigEndian, bytes, store);
     }
   }
 }
