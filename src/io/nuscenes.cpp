@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <fstream>
 #include <set>
-#include <string_view>
 #include <unordered_map>
 
 #include "byte_reader.hpp"
@@ -96,17 +95,11 @@ struct SweepRow {
   double time = 0.0;
 };
 
-bool is_sweep(const std::string& file) {
-  constexpr std::string_view kEnd = ".pcd.bin";
-  return file.size() > kEnd.size() &&
-         file.compare(file.size() - kEnd.size(), kEnd.size(), kEnd) == 0;
-}
-
 std::vector<SweepRow> read_sample_data(const fs::path& table) {
   std::vector<SweepRow> sweeps;
   read_table(table, [&](const TableRow& row) {
     const std::string file = row.text("filename");
-    if (!is_sweep(file)) return;
+    if (scan_format_of(file) != ScanFormat::kNuScenes) return;
     sweeps.push_back({file, row.text("sample_token"), row.text("ego_pose_token"),
                       row.text("calibrated_sensor_token"), to_seconds(row.number("timestamp"))});
   });

@@ -22,13 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Beams without a return stay at the origin.
-void subtract_origin(const Eigen::Vector3f& origin, RecordedScan& scan) {
-  for_each_position(scan, [&](auto p) {
-    if (!p.isZero(0.0F)) p -= origin;
-  });
-}
-
 /// Points of the own vehicle become beams without a return.
 void clear_boxes(const std::vector<Eigen::AlignedBox3d>& boxes, RecordedScan& scan) {
   for_each_position(scan, [&](auto p) {
@@ -281,7 +274,10 @@ void Recording::read_scan(std::size_t i, RecordedScan& scan) const {
   const std::optional<FileTransform> T = T_sensor_file(contents_, entry);
   reader_->read(entry, T ? &*T : nullptr, scan);
   if (contents_.frame == PointFrame::kSensor && !sensor_origin().isZero(0.0)) {
-    subtract_origin(sensor_origin().cast<float>(), scan);
+    const Eigen::Vector3f origin = sensor_origin().cast<float>();
+    for_each_position(scan, [&](auto p) {
+      if (!p.isZero(0.0F)) p -= origin;  // beams without a return stay at the origin
+    });
   }
   read_sensors(contents_, entry.name, scan);
   if (!contents_.options.self_boxes.empty()) clear_boxes(contents_.options.self_boxes, scan);

@@ -16,40 +16,38 @@
 #include "point_sink.hpp"
 
 namespace dynains {
-namespace las {
+namespace {
 
 /// Signature of a file, and user and number of its record of extra bytes.
-struct Marks {
+struct LasMarks {
   std::string_view magic = "LASF", spec_user = "LASF_Spec";
   std::uint16_t extra_bytes_record = 4;
 };
-constexpr Marks kMarks;
+constexpr LasMarks kLasMarks;
 
 /// Bytes of the parts of a file.
-struct Sizes {
+struct LasSizes {
   std::size_t header_1_2 = 227, header_1_4 = 375;
   std::size_t before_count = 247;  ///< the number of points in 64 bits, in the header of 1.4
   std::size_t record_header = 54;  ///< of a variable length record
   std::size_t extra_bytes = 192;   ///< of the description of one value
 };
-constexpr Sizes kSizes;
+constexpr LasSizes kLasSizes;
 
 /// Parts of a point record, by its format.
-struct PointFormat {
+struct LasPointFormat {
   std::uint16_t size;        ///< bytes, without extra bytes
   std::uint16_t gps_offset;  ///< bytes from the begin; 0: no time
 };
-constexpr PointFormat kPointFormats[] = {{20, 0},  {28, 20}, {26, 0},  {34, 20}, {57, 20}, {63, 20},
-                                         {30, 22}, {36, 22}, {38, 22}, {59, 22}, {67, 22}};
+constexpr LasPointFormat kLasPointFormats[] = {{20, 0},  {28, 20}, {26, 0},  {34, 20},
+                                               {57, 20}, {63, 20}, {30, 22}, {36, 22},
+                                               {38, 22}, {59, 22}, {67, 22}};
 
 /// Types of extra bytes; index 0 has no type.
-constexpr Scalar kExtraTypes[] = {Scalar::kUint8, Scalar::kUint8,  Scalar::kInt8,  Scalar::kUint16,
-                                  Scalar::kInt16, Scalar::kUint32, Scalar::kInt32, Scalar::kUint64,
-                                  Scalar::kInt64, Scalar::kFloat,  Scalar::kDouble};
-
-}  // namespace las
-
-namespace {
+constexpr Scalar kLasExtraTypes[] = {Scalar::kUint8,  Scalar::kUint8,  Scalar::kInt8,
+                                     Scalar::kUint16, Scalar::kInt16,  Scalar::kUint32,
+                                     Scalar::kInt32,  Scalar::kUint64, Scalar::kInt64,
+                                     Scalar::kFloat,  Scalar::kDouble};
 
 struct LasColumn {
   Role role;
@@ -75,17 +73,17 @@ void add_column(PointSink& sink, LasHeader& header, LasColumn column) {
 /// Columns of extra bytes whose names are those of a ring or a label.
 void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
   std::size_t offset = header.extra_begin;
-  while (descriptions.remaining() >= las::kSizes.extra_bytes) {
-    Bytes fields = descriptions.block(las::kSizes.extra_bytes, "the description of extra bytes");
+  while (descriptions.remaining() >= kLasSizes.extra_bytes) {
+    Bytes fields = descriptions.block(kLasSizes.extra_bytes, "the description of extra bytes");
     fields.skip(2, "reserved bytes");
     const auto type = fields.number<std::uint8_t>("a type of extra bytes");
     const auto options = fields.number<std::uint8_t>("options of extra bytes");
     const auto* const text = reinterpret_cast<const char*>(fields.here());
     const std::string name(text, std::find(text, text + 32, '\0'));
-    if (type >= std::size(las::kExtraTypes)) {
+    if (type >= std::size(kLasExtraTypes)) {
       fields.fail("expected a type of extra bytes from 0 to 10, found " + std::to_string(type));
     }
-    const Scalar scalar = las::kExtraTypes[type];
+    const Scalar scalar = kLasExtraTypes[type];
     const std::size_t size = type == 0 ? options : size_of(scalar);
     if (offset + size > header.point_size) {
       fields.fail("expected extra bytes within the " + std::to_string(header.point_size) +
@@ -102,7 +100,7 @@ void add_extra_columns(PointSink& sink, LasHeader& header, Bytes descriptions) {
 
 /// Columns of a point format and of extra bytes.
 void read_columns(ByteReader& file, PointSink& sink, LasHeader& header,
-                  const las::PointFormat& format) {
+                  const LasPointFormat& format) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     add_column(sink, header, {kUsualRoles[axis], 4 * axis, Scalar::kInt32});
   }
@@ -112,7 +110,7 @@ void read_columns(ByteReader& file, PointSink& sink, LasHeader& header,
   }
   std::uint64_t position = header.vlr_begin;
   for (std::uint32_t i = 0; i < header.vlr_count; ++i) {
-    FilePart head(file, position, las::kSizes.record_header, "a variable length record");
+    FilePart head(file, position, kLasSizes.record_header, "a variable length record");
     Bytes& fields = head.fields;
     fields.skip(2, "reserved bytes");
     const auto* const text = reinterpret_cast<const char*>(fields.here());
@@ -120,8 +118,8 @@ void read_columns(ByteReader& file, PointSink& sink, LasHeader& header,
     fields.skip(16, "a user id");
     const auto record = fields.number<std::uint16_t>("a record id");
     const auto size = fields.number<std::uint16_t>("the size of a record");
-    position += las::kSizes.record_header;
-    if (user == las::kMarks.spec_user && record == las::kMarks.extra_bytes_record) {
+    position += kLasSizes.record_header;
+    if (user == kLasMarks.spec_user && record == kLasMarks.extra_bytes_record) {
       const FilePart content(file, position, size, "a variable length record");
       add_extra_columns(sink, header, content.fields);
     }
@@ -130,10 +128,10 @@ void read_columns(ByteReader& file, PointSink& sink, LasHeader& header,
 }
 
 LasHeader read_header(ByteReader& file, PointSink& sink) {
-  FilePart head(file, 0, std::min<std::uint64_t>(file.size(), las::kSizes.header_1_2),
+  FilePart head(file, 0, std::min<std::uint64_t>(file.size(), kLasSizes.header_1_2),
                 "the header of LAS");
   Bytes& fields = head.fields;
-  if (!fields.begins_with(las::kMarks.magic)) {
+  if (!fields.begins_with(kLasMarks.magic)) {
     fields.fail("expected LASF, the magic bytes of LAS");
   }
   fields.skip(24, "the header of LAS");
@@ -155,11 +153,11 @@ LasHeader read_header(ByteReader& file, PointSink& sink) {
         "points are compressed (LAZ), which is not read; convert the file: "
         "pdal translate IN.laz OUT.las");
   }
-  if (format >= std::size(las::kPointFormats)) {
+  if (format >= std::size(kLasPointFormats)) {
     fields.fail("expected a point format from 0 to 10, found " + std::to_string(format));
   }
   header.point_size = fields.number<std::uint16_t>("the size of a point");
-  header.extra_begin = las::kPointFormats[format].size;
+  header.extra_begin = kLasPointFormats[format].size;
   if (header.point_size < header.extra_begin) {
     fields.fail("expected points of at least " + std::to_string(header.extra_begin) +
                 " bytes, found " + std::to_string(header.point_size));
@@ -170,16 +168,16 @@ LasHeader read_header(ByteReader& file, PointSink& sink) {
   for (double& offset : header.offset) offset = fields.number<double>("an offset");
   header.point_count = legacy_count;
   if (minor >= 4) {
-    FilePart count(file, las::kSizes.before_count, 8, "the number of points");
+    FilePart count(file, kLasSizes.before_count, 8, "the number of points");
     header.point_count = count.fields.number<std::uint64_t>("the number of points");
   }
-  read_columns(file, sink, header, las::kPointFormats[format]);
+  read_columns(file, sink, header, kLasPointFormats[format]);
   return header;
 }
 
 std::string extra_description(const char* name, Scalar type, const char* description) {
-  const auto* const types = std::begin(las::kExtraTypes);
-  const auto* const number = std::find(types + 1, std::end(las::kExtraTypes), type);
+  const auto* const types = std::begin(kLasExtraTypes);
+  const auto* const number = std::find(types + 1, std::end(kLasExtraTypes), type);
   return ByteWriter()
       .zeros(2)
       .numbers(static_cast<std::uint8_t>(number - types), std::uint8_t{0})
@@ -201,14 +199,14 @@ std::string vlr(std::string_view user, std::uint16_t record, const std::string& 
 }
 
 std::string extra_bytes_vlr() {
-  return vlr(las::kMarks.spec_user, las::kMarks.extra_bytes_record, "extra bytes",
+  return vlr(kLasMarks.spec_user, kLasMarks.extra_bytes_record, "extra bytes",
              extra_description("belief", Scalar::kFloat, "probability of being dynamic") +
                  extra_description("cause", Scalar::kUint8, "cause of the verdict") +
                  extra_description("instance", Scalar::kUint32, "0: none"));
 }
 
-constexpr std::uint8_t kLasPointFormat = 6;  // of written files
-constexpr double kLasStep = 0.001;           // m, of written coordinates
+constexpr std::uint8_t kLasWrittenFormat = 6;  // of written files
+constexpr double kLasStep = 0.001;             // m, of written coordinates
 
 }  // namespace
 
@@ -257,20 +255,20 @@ std::string las_header(const std::filesystem::path& path, const LasOptions& opti
   }
   ByteWriter out;
   // Bit 4: coordinate systems are texts (WKT).
-  out.text(las::kMarks.magic, las::kMarks.magic.size())
+  out.text(kLasMarks.magic, kLasMarks.magic.size())
       .zeros(2)
       .number(std::uint16_t{1U << 4U})
       .zeros(16);
   out.numbers(std::uint8_t{1}, std::uint8_t{4});
   out.text("dynains", 32).text("dynains", 32);
   out.zeros(4);  // without a day, so that equal points give equal files
-  out.numbers(static_cast<std::uint16_t>(las::kSizes.header_1_4),
-              static_cast<std::uint32_t>(las::kSizes.header_1_4 + records.size()),
+  out.numbers(static_cast<std::uint16_t>(kLasSizes.header_1_4),
+              static_cast<std::uint32_t>(kLasSizes.header_1_4 + records.size()),
               std::uint32_t{options.wkt.empty() ? 1U : 2U});
   const std::size_t extra =
       sizeof(FilePoint::belief) + sizeof(FilePoint::cause) + sizeof(FilePoint::instance);
-  out.numbers(kLasPointFormat,
-              static_cast<std::uint16_t>(las::kPointFormats[kLasPointFormat].size + extra));
+  out.numbers(kLasWrittenFormat,
+              static_cast<std::uint16_t>(kLasPointFormats[kLasWrittenFormat].size + extra));
   out.zeros(24);  // numbers of points as in older versions
   out.numbers(kLasStep, kLasStep, kLasStep);
   for (const double offset : options.offset) out.number(offset);

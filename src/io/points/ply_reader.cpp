@@ -40,10 +40,9 @@ struct Element {
 enum class PlyEncoding : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
 
 struct PlyHeader {
-  std::optional<PlyEncoding> stated_encoding;
+  std::optional<PlyEncoding> encoding;
   std::vector<Element> elements;  ///< up to and with the vertices: later ones are not read
 
-  PlyEncoding encoding() const { return *stated_encoding; }
   bool has_vertices() const { return !elements.empty() && elements.back().is_vertex; }
 };
 
@@ -104,7 +103,7 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
     if (keyword == "end_header") break;
     if (keyword == "comment" || keyword == "obj_info") continue;
     if (keyword == "format") {
-      header.stated_encoding = parse_format(reader, rest);
+      header.encoding = parse_format(reader, rest);
     } else if (keyword == "element") {
       Element element;
       element.is_vertex = text::next_token(rest) == "vertex";
@@ -125,7 +124,7 @@ PlyHeader parse_ply_header(ByteReader& reader, PointSink& sink) {
                           std::string(keyword.substr(0, 40)) + "\"");
     }
   }
-  if (!header.stated_encoding) reader.fail_on_line("expected a line \"format\" before end_header");
+  if (!header.encoding) reader.fail_on_line("expected a line \"format\" before end_header");
   if (!header.has_vertices()) reader.fail_on_line("expected \"element vertex\" before end_header");
   if (const auto name = sink.missing()) {
     reader.fail_on_line("expected a number property " + *name + " of the vertices");
@@ -227,8 +226,8 @@ void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
   for (const Property& property : vertex.properties) {
     if (property.is_list) reader.fail_here("expected vertices without the list " + property.name);
   }
-  const bool is_text = header.encoding() == PlyEncoding::kAscii;
-  const std::uint64_t size = is_text ? 0 : min_bytes(vertex, header.encoding());
+  const bool is_text = *header.encoding == PlyEncoding::kAscii;
+  const std::uint64_t size = is_text ? 0 : min_bytes(vertex, *header.encoding);
   copy_records(reader, static_cast<std::size_t>(size), "a vertex", keep, target);
 }
 
@@ -236,9 +235,9 @@ std::uint64_t read_ply(const std::filesystem::path& path, PointSink& sink, bool 
   ByteReader reader(path);
   const PlyHeader header = parse_ply_header(reader, sink);
   for (const Element& element : header.elements) {
-    reader.check_room(element.count, "elements", min_bytes(element, header.encoding()),
-                      header.encoding() == PlyEncoding::kAscii);
-    if (with_points) read_element(reader, element, header.encoding(), sink);
+    reader.check_room(element.count, "elements", min_bytes(element, *header.encoding),
+                      *header.encoding == PlyEncoding::kAscii);
+    if (with_points) read_element(reader, element, *header.encoding, sink);
   }
   return header.elements.back().count;
 }

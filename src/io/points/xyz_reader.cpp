@@ -11,13 +11,6 @@
 namespace dynains {
 namespace {
 
-/// Commas and semicolons separate like blanks.
-void use_blanks(std::string& line) {
-  for (char& c : line) {
-    if (c == ',' || c == ';') c = ' ';
-  }
-}
-
 std::string_view without_marks(std::string_view token) {
   while (!token.empty() && (token.front() == '#' || token.front() == '/' || token.front() == '"')) {
     token.remove_prefix(1);
@@ -83,7 +76,8 @@ std::uint64_t read_xyz(const std::filesystem::path& path, PointSink& sink, bool 
   std::size_t count = 0;
   bool is_first = true;
   while (reader.read_line(line)) {
-    use_blanks(line);
+    const auto is_separator = [](char c) { return c == ',' || c == ';'; };
+    std::replace_if(line.begin(), line.end(), is_separator, ' ');
     const std::vector<std::string_view> tokens = text::tokens(line);
     if (tokens.empty()) continue;
     const bool may_be_names = is_first && !text::parse_number(tokens.front());
