@@ -187,9 +187,9 @@ class InstanceSampler {
   static constexpr std::uint64_t kNoKey = ~std::uint64_t{0};
 
   void begin_scan() {
+    std::fill_n(keys_.begin(), std::min(keys_.size(), table_.size() * most_), kNoKey);
     table_.clear();
     table_.insert({0, Supervoxel().z, -1});  // number 0
-    std::fill(keys_.begin(), keys_.end(), kNoKey);
   }
 
   // Computes the supervoxel and the rank of each point of a block.

@@ -294,7 +294,7 @@ class RangeImage {
   // Copies the returns of static objects, before the ground is added to the image.
   static void keep_objects(Scratch& scratch) {
     const std::size_t count = scratch.returns.size();
-    scratch.objects.resize(count);
+    detail::grow(scratch.objects, count);
     const std::int32_t* const from = scratch.returns.data();
     std::int16_t* const objects = scratch.objects.data();
     detail::with_packs([&](auto) {
@@ -308,7 +308,7 @@ class RangeImage {
   // Splits the returns into ranges and beams.
   void split(Scratch& scratch) {
     const std::size_t count = scratch.returns.size();
-    scratch.nearest.resize(count);
+    detail::grow(scratch.nearest, count);
     const std::int32_t* const from = scratch.returns.data();
     std::int16_t* const nearest = scratch.nearest.data();
     Beam* const beams = beams_.get();
