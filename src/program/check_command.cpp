@@ -7,7 +7,6 @@
 #include "run/output/output_folder.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

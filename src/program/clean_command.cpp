@@ -27,7 +27,6 @@
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -13,7 +13,6 @@
 #include "run/labelled_sequence.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/write_view.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -15,7 +15,6 @@
 #include "run/verdict_files.hpp"
 #include "run/write_grid.hpp"
 #include "run/write_view.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -19,7 +19,6 @@
 #include "run/run_plan.hpp"
 #include "run/verdict_files.hpp"
 #include "run/write_view.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -11,7 +11,6 @@
 #include "run/interrupt.hpp"
 #include "run/run.hpp"
 #include "run/run_plan.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -1,14 +1,10 @@
-#include "shared_options.hpp"
-
-
+#include "command.hpp"
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
 #include "progress.hpp"
 #include "run/run_settings.hpp"
 
 namespace dynains::program {
-
-using namespace run;
 
 RecordingFlags::RecordingFlags(CLI::App& command, const std::string& what, bool required) {
   command
@@ -40,8 +36,8 @@ Recording RecordingFlags::open_of_run(const ResultFolder& out, const std::string
   return open();
 }
 
-Recording RecordingFlags::open() const {
-  Recording recording(folder, settings.checked());
+Recording RecordingFlags::open_with(const RecordingOptions& options) const {
+  Recording recording(folder, options);
   for (const std::string& warning : recording.warnings()) print_warning(warning);
   return recording;
 }
@@ -57,9 +53,7 @@ Recording RecordingFlags::open_without_poses(bool is_compensated) const {
   RecordingOptions options = settings.checked();
   options.without_poses = true;
   options.is_compensated = is_compensated;
-  Recording recording(folder, options);
-  for (const std::string& warning : recording.warnings()) print_warning(warning);
-  return recording;
+  return open_with(options);
 }
 
 }  // namespace dynains::program

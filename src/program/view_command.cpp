@@ -2,7 +2,6 @@
 
 #include "command.hpp"
 #include "run/write_view.hpp"
-#include "shared_options.hpp"
 
 namespace dynains::program {
 namespace {

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "arrays.hpp"
-#include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "settings.hpp"
 

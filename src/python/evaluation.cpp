@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "bindings.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "settings.hpp"
 

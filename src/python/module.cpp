@@ -1,8 +1,8 @@
 #include <pybind11/pybind11.h>
 
-#include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/version.hpp"
+#include "settings.hpp"
 
 PYBIND11_MODULE(_dynains, module) {
   namespace py = pybind11;

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "run/settings/recording_settings.hpp"
@@ -93,13 +92,6 @@ ScanOfRecording scan_of(const RecordingPointer& recording, py::ssize_t index) {
   if (index < 0) index += size;
   if (index < 0 || index >= size) throw py::index_error("the recording has no such scan");
   return {recording, static_cast<std::size_t>(index)};
-}
-
-template <class ValueOf>
-auto values_of_scans(const SharedRecording& recording, ValueOf&& value_of) {
-  std::vector<decltype(value_of(std::size_t{0}))> values;
-  for (std::size_t i = 0; i < recording.recording.size(); ++i) values.push_back(value_of(i));
-  return values;
 }
 
 py::array_t<double> poses_of(const SharedRecording& recording) {
@@ -199,6 +191,15 @@ void bind_recording(py::module_& module) {
   const auto of = [](auto member) {
     return [member](const SharedRecording& recording) { return (recording.recording.*member)(); };
   };
+  const auto of_scans = [](auto member) {
+    return [member](const SharedRecording& recording) {
+      std::vector<std::decay_t<decltype((recording.recording.*member)(0))>> values;
+      for (std::size_t i = 0; i < recording.recording.size(); ++i) {
+        values.push_back((recording.recording.*member)(i));
+      }
+      return values;
+    };
+  };
   py::class_<SharedRecording, RecordingPointer>(module, "Recording", doc.c_str())
       .def(
           py::init([](const std::filesystem::path& path, const py::kwargs& options) {
@@ -223,18 +224,11 @@ void bind_recording(py::module_& module) {
           "frame",
           [](const SharedRecording& recording) { return plain_value(recording.recording.frame()); },
           "Frame of the points in the files, 'sensor' or 'world'.")
-      .def_property_readonly(
-          "names",
-          [](const SharedRecording& recording) {
-            return values_of_scans(recording,
-                                   [&](std::size_t i) { return recording.recording.name(i); });
-          },
-          "Name of each scan.")
+      .def_property_readonly("names", of_scans(&Recording::name), "Name of each scan.")
       .def_property_readonly(
           "times",
-          [](const SharedRecording& recording) {
-            return to_array(values_of_scans(
-                recording, [&](std::size_t i) { return recording.recording.time(i); }));
+          [times = of_scans(&Recording::time)](const SharedRecording& recording) {
+            return to_array(times(recording));
           },
           "(scans,) float64, s, strictly increasing.")
       .def_property_readonly("poses", &poses_of, "(scans, 4, 4) float64, T_world_sensor.")

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "bindings.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/point_cloud_traits.hpp"

@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 
-#include "bindings.hpp"
 #include "dynains/errors.hpp"
 #include "recording.hpp"
 #include "run/run_plan.hpp"

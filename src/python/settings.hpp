@@ -16,6 +16,14 @@ namespace dynains::python {
 
 namespace py = pybind11;
 
+// The parts of the module, one file each.
+void bind_config(pybind11::module_& module);
+void bind_remover(pybind11::module_& module);
+void bind_evaluation(pybind11::module_& module);
+void bind_recording(pybind11::module_& module);
+void bind_check(pybind11::module_& module);
+void bind_run(pybind11::module_& module);
+
 /// The text of a flag with this value; that of a (4, 4) array is `x y z qx qy qz qw`. Throws
 /// PoseError for another array that is no list of numbers.
 std::string to_text(const py::handle& value);
