@@ -44,7 +44,9 @@ struct OccupancyGrid {
   std::vector<CellState> cells;
 
   /// Cells in a state.
-  std::size_t count(CellState state) const;
+  std::size_t count(CellState state) const {
+    return static_cast<std::size_t>(std::count(cells.begin(), cells.end(), state));
+  }
 };
 
 /// Makes a grid of points over floors. Positions are those of the floors.
