@@ -76,9 +76,10 @@ inline std::size_t size_of(Scalar type) {
 inline std::optional<Scalar> scalar_of(char kind, std::size_t size) {
   for (const Scalar type : kScalars) {
     const char its_kind = with_type(type, [](auto zero) {
-      return std::is_floating_point_v<decltype(zero)> ? 'f'
-             : std::is_signed_v<decltype(zero)>       ? 'i'
-                                                      : 'u';
+      using Number = decltype(zero);
+      if (std::is_floating_point_v<Number>) return 'f';
+      if (std::is_signed_v<Number>) return 'i';
+      return 'u';
     });
     if (its_kind == kind && size_of(type) == size) return type;
   }
