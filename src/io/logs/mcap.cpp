@@ -82,8 +82,10 @@ class McapFile final : public ChunkedLog {
     const bool is_definition = opcode == mcap::kSchema || opcode == mcap::kChannel;
     const bool is_whole = is_definition || opcode == mcap::kMessageIndex || opcode == mcap::kHeader;
     std::optional<FilePart> record;
-    if (is_whole) record.emplace(file_, position, size, "a record");
-    if (is_whole) record->fields.skip(kRecordHead, "a record");
+    if (is_whole) {
+      record.emplace(file_, position, size, "a record");
+      record->fields.skip(kRecordHead, "a record");
+    }
     if (opcode == mcap::kMessageIndex) {
       take_message_index(record->fields);
       return true;
