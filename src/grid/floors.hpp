@@ -53,7 +53,8 @@ class Floors {
  private:
   static constexpr double kEdge = 0.25;   // m, of a column; ground differs little within it
   static constexpr double kReach = 10.0;  // m, from a place without ground to the nearest ground
-  static constexpr double kBin = 0.05;    // m, of heights in a column
+
+  static constexpr double kBin = 0.05;  // m, of heights in a column
 
   struct Bin {
     std::uint32_t ground = 0, others = 0;  // points

@@ -26,6 +26,10 @@ void Config::validate() const {
                     " must be less than max_height = " + std::to_string(max_height));
 }
 
+std::size_t OccupancyGrid::count(CellState state) const {
+  return static_cast<std::size_t>(std::count(cells.begin(), cells.end(), state));
+}
+
 GridMaker::GridMaker(const Config& config, const Floors& floors, double spacing)
     : config_((config.validate(), config)),
       reach_(static_cast<std::int64_t>(std::max(1.0, std::round(spacing / config.resolution)))),

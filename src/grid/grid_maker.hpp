@@ -44,9 +44,7 @@ struct OccupancyGrid {
   std::vector<CellState> cells;
 
   /// Cells in a state.
-  std::size_t count(CellState state) const {
-    return static_cast<std::size_t>(std::count(cells.begin(), cells.end(), state));
-  }
+  std::size_t count(CellState state) const;
 };
 
 /// Makes a grid of points over floors. Positions are those of the floors.

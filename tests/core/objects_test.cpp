@@ -170,24 +170,6 @@ TEST_CASE("a car that comes out from behind another one is not faster than it dr
   CHECK(listed > 15);
 }
 
-TEST_CASE("parts that later scans know as one van are one object in final verdicts") {
-  detail::ObjectTracks newest(18.0, 4.5, 10, nullptr), final(18.0, 4.5, 10, &newest);
-  const auto seen = [](std::uint64_t i) -> std::vector<Rectangle> {
-    const float rear = 2.0F + 0.8F * static_cast<float>(i);
-    if (i >= 6) return {{{rear, 2.0F}, {4.2F, 1.8F}}};
-    return {{{rear, 2.0F}, {1.2F, 1.8F}}, {{rear + 2.4F, 2.0F}, {1.8F, 1.8F}}};
-  };
-  for (std::uint64_t i = 0; i < 30; ++i) {
-    observe(i, seen(i), newest);
-    if (i < 10) continue;
-    const auto objects = observe(i - 10, seen(i - 10), final);
-    REQUIRE(objects.size() == 1);
-    CHECK(objects[0].id == 1);
-    const double centre = 4.1 + 0.8 * static_cast<double>(i - 10);
-    CHECK(objects[0].centre.x() == Approx(centre).margin(0.5));
-  }
-}
-
 TEST_CASE("points that were removed for others neither begin nor widen objects") {
   const auto width_with = [](Cause cause) {
     detail::ObjectTracks tracks(18.0, 4.5, 10, nullptr);

@@ -43,6 +43,7 @@ class ObjectTracks {
     sensor_ = scan.T_world_level.translation();
     for (Track& track : tracks_) predict(scan.time - time_, track);
     time_ = scan.time;
+    begin_parts(scan);
     follow_points(scan, evidence);
     begin_tracks(scan);
     measure_extents(scan, evidence);
@@ -79,11 +80,10 @@ class ObjectTracks {
     double yaw = 0.0, yaw_variance = M_PI * M_PI;
     // In the newest scan:
     std::uint32_t points = 0;
-    Eigen::Vector2d measured = Eigen::Vector2d::Zero();  // centre of its box, m
-    Eigen::Vector2f along = Eigen::Vector2f::Zero();     // direction
-    Eigen::Vector2f place = Eigen::Vector2f::Zero();     // predicted centre along and left of it, m
-    Eigen::Array2f half = Eigen::Array2f::Zero();        // of its sizes, m
-    Eigen::AlignedBox<float, 1> height;                  // m
+    Eigen::Vector2f along = Eigen::Vector2f::Zero();  // direction
+    Eigen::Vector2f place = Eigen::Vector2f::Zero();  // predicted centre along and left of it, m
+    Eigen::Array2f half = Eigen::Array2f::Zero();     // of its sizes, m
+    Eigen::AlignedBox<float, 1> height;               // m
     // Axes that its box may have, and extents along them and to their left, m from the sensor.
     std::array<Eigen::Vector2f, kAxes> axes;
     std::array<Eigen::AlignedBox2f, kAxes> extents;
@@ -99,6 +99,11 @@ class ObjectTracks {
     Eigen::AlignedBox3f box;
     std::uint32_t points = 0;
     std::uint32_t begun = kNoIndex;  // their track
+
+    void vote(std::uint32_t t) {
+      if (lead == 0) track = t;
+      lead += track == t ? 1U : -1U;
+    }
   };
 
   // An instance that was part of an object.
@@ -151,7 +156,15 @@ class ObjectTracks {
     track.pv += dt * track.vv + 0.5 * dt * noise;
     track.vv += noise;
     const double turn = kTurnRate * dt;
-    track.yaw_variance += turn * turn;
+    track.yaw_variance = std::min(M_PI * M_PI, track.yaw_variance + turn * turn);
+  }
+
+  void begin_parts(const ScanSlot& scan) {
+    parts_.assign(scan.ids.size(), Part());
+    for (std::size_t p = 0; p < parts_.size(); ++p) {
+      const Track* const track = find(object_of(scan.ids[p]));
+      if (track != nullptr) parts_[p].named = static_cast<std::uint32_t>(track - tracks_.data());
+    }
   }
 
   // Points continue the nearest track, if its box is near enough.
@@ -161,16 +174,13 @@ class ObjectTracks {
       track.place = along(track.along, from_sensor(track.object).cast<float>());
       track.half = 0.5F * size_of(track.object).cast<float>().array();
     }
-    parts_.assign(scan.ids.size(), Part());
-    for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].named = find(object_of(scan.ids[p]));
     track_of_.clear();
     for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
       const std::uint32_t t = track_around(point, certain, parts_[p].named);
       track_of_.push_back(t);
       if (t != kNoIndex) {
         ++tracks_[t].points;
-        if (parts_[p].lead == 0) parts_[p].track = t;
-        parts_[p].lead += parts_[p].track == t ? 1U : -1U;
+        parts_[p].vote(t);
       } else if (certain) {
         parts_[p].box.extend(point);
         ++parts_[p].points;
@@ -202,45 +212,32 @@ class ObjectTracks {
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       Part& part = parts_[p];
       if (part.points < kMinPoints) continue;
+      const Eigen::Vector3d size = part.box.sizes().cast<double>();
+      if (size.head<2>().norm() > max_length_ || size.z() > max_height_) continue;
       MovingObject object;
       object.centre = sensor_ + part.box.center().cast<double>();
-      object.length = static_cast<double>(part.box.sizes().x());
-      object.width = static_cast<double>(part.box.sizes().y());
-      const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(scan.ids[p]);
-      part.begun = track_that_holds(object, id);
-      if (part.begun == tracks_.size()) begin_track(scan, object, id);
-      tracks_[part.begun].points += part.points;
+      object.length = size.x();
+      object.width = size.y();
+      part.begun = static_cast<std::uint32_t>(tracks_.size());
+      begin_track(scan, scan.ids[p], object);
+      tracks_.back().points = part.points;
       if (part.track == kNoIndex) part.track = part.begun;
     }
   }
 
-  // The track of a part that later scans know to be of this object: the one that it has, if both
-  // fit into the size that is known by then, or else a new one.
-  std::uint32_t track_that_holds(const MovingObject& part, std::uint32_t id) const {
-    const auto begun = static_cast<std::uint32_t>(tracks_.size());
-    const std::uint32_t t = find(id);
-    if (t == kNoIndex || !is_followed(tracks_[t])) return begun;
-    const auto box = common_box(tracks_[t].object, part, max_length_);
-    const Track* const known = known_later(id);
-    const bool is_size_known = known != nullptr && known->is_directed;
-    if (is_size_known && box && (box->sizes() - size_of(known->object)).maxCoeff() > kGap) {
-      return begun;
-    }
-    return box ? t : begun;
-  }
-
-  // The box of two objects along the axes of the first one, from its centre, m. None if the gap
-  // between them, or their box, is too large.
+  // The box of two objects along the axes of the first one, from its centre, m. None if they are
+  // not beside each other, or too large for one object.
   std::optional<Eigen::AlignedBox2d> common_box(const MovingObject& first,
-                                                const MovingObject& second, double max_gap) const {
+                                                const MovingObject& second) const {
     const Eigen::Matrix2d R = axes_of(first.yaw).transpose();
     const Eigen::Vector2d half = 0.5 * size_of(first);
     const Eigen::Vector2d other = 0.5 * (R * axes_of(second.yaw)).cwiseAbs() * size_of(second);
     const Eigen::Vector2d offset = R * (second.centre - first.centre).head<2>();
     const double gap = (offset.cwiseAbs() - half - other).cwiseMax(0.0).norm();
+    if (gap > std::min<double>(kGap, std::max(half.norm(), other.norm()))) return std::nullopt;
     Eigen::AlignedBox2d box(-half, half);
     box.extend(Eigen::AlignedBox2d(offset - other, offset + other));
-    if (gap > max_gap || !is_size_of_object(box.sizes())) return std::nullopt;
+    if (!is_size_of_object(box.sizes())) return std::nullopt;
     return box;
   }
 
@@ -249,13 +246,13 @@ class ObjectTracks {
     return size.norm() <= max_length_ && size.minCoeff() <= max_height_;
   }
 
-  void begin_track(const ScanSlot& scan, const MovingObject& object, std::uint32_t id) {
+  void begin_track(const ScanSlot& scan, std::uint32_t instance, const MovingObject& object) {
     Track track;
     track.axes.fill(Eigen::Vector2f::Zero());
-    const Track* const known = find(id) != kNoIndex ? nullptr : known_later(id);
+    const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(instance);
+    const Track* const known = find(id) != nullptr ? nullptr : known_later(id);
     track.object = object;
-    std::uint32_t& last_id = later_ != nullptr ? later_->last_id_ : last_id_;
-    track.object.id = known != nullptr ? id : ++last_id;
+    track.object.id = known != nullptr ? id : next_id();
     track.object.first_scan = scan.scan;
     track.pp = kError * kError;
     track.vv = kSpeed * kSpeed;
@@ -270,6 +267,8 @@ class ObjectTracks {
     tracks_.push_back(track);
   }
 
+  std::uint32_t next_id() { return later_ != nullptr ? later_->next_id() : ++last_id_; }
+
   // The place of an instance in named_, or the place behind it.
   std::size_t place_of(std::uint32_t instance) const {
     std::size_t i = 0;
@@ -281,15 +280,13 @@ class ObjectTracks {
     const std::size_t i = place_of(instance);
     return i < named_.size() ? named_[i].object : 0;
   }
-  // The index of the track of an object, or kNoIndex.
-  std::uint32_t find(std::uint32_t id) const {
-    std::uint32_t t = 0;
-    while (t < tracks_.size() && tracks_[t].object.id != id) ++t;
-    return t < tracks_.size() ? t : kNoIndex;
+  const Track* find(std::uint32_t id) const {
+    const auto found = std::find_if(tracks_.begin(), tracks_.end(),
+                                    [&](const Track& track) { return track.object.id == id; });
+    return found == tracks_.end() ? nullptr : &*found;
   }
   const Track* known_later(std::uint32_t id) const {
-    const std::uint32_t t = later_ == nullptr ? kNoIndex : later_->find(id);
-    return t == kNoIndex ? nullptr : &later_->tracks_[t];
+    return later_ == nullptr ? nullptr : later_->find(id);
   }
 
   // Yaws that a box may have, as far as that of the track is uncertain.
@@ -365,7 +362,6 @@ class ObjectTracks {
       const double growth = track.is_directed ? 0.0 : 0.5 * (size_of(object) - size).norm();
       correct(centre, kError * kError + 0.5 * growth * growth, track);
     }
-    track.measured = centre;
     object.centre.z() = sensor_.z() + static_cast<double>(track.height.center().x());
     object.height = static_cast<double>(track.height.sizes().x());
     object.points = std::exchange(track.points, 0);
@@ -406,12 +402,9 @@ class ObjectTracks {
     return centre;
   }
 
-  // An object between its filtered and its measured place, since errors of boxes last. One that is
-  // at least as wide as a car is extended to the length of a car, away from the sensor. Only the
-  // hidden part is added: the squared cosine of the angle between length and view.
-  MovingObject with_hidden_length(const Track& track) const {
-    MovingObject object = track.object;
-    object.centre.head<2>() += 0.5 * (track.measured - object.centre.head<2>());
+  // Extends an object that is at least as wide as a car to the length of a car, away from the
+  // sensor. Only the hidden part is added: the squared cosine of the angle between length and view.
+  MovingObject with_hidden_length(MovingObject object) const {
     constexpr double kCarWidth = 1.3, kCarLength = 4.5;  // m: the narrowest, and a usual one
     if (object.width < kCarWidth || object.length >= kCarLength) return object;
     const Eigen::Vector2d axis = axes_of(object.yaw).col(0);
@@ -468,7 +461,7 @@ class ObjectTracks {
         const bool move_alike = (to.velocity - from.velocity).squaredNorm() <=
                                 kUnlikely * (tracks_[a].vv + tracks_[b].vv);
         if (!is_directed_now(tracks_[a]) || !is_directed_now(tracks_[b]) || !move_alike) continue;
-        const auto box = common_box(to, from, kGap);
+        const auto box = common_box(to, from);
         if (!box) continue;
         to.centre.head<2>() += axes_of(to.yaw) * box->center();
         to.length = box->sizes().x();
@@ -489,7 +482,7 @@ class ObjectTracks {
     objects_.clear();
     for (const Track& track : tracks_) {
       if (!is_directed_now(track)) continue;
-      objects_.push_back(with_hidden_length(track));
+      objects_.push_back(with_hidden_length(track.object));
       const Track* const known = known_later(track.object.id);
       if (known != nullptr) objects_.back().last_scan = known->object.last_scan;
     }
@@ -506,7 +499,9 @@ class ObjectTracks {
              (!is_followed(track) && scan > track.object.last_scan + memory_);
     };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_lost), tracks_.end());
-    const auto is_old = [&](const Named& named) { return scan > named.scan + memory_; };
+    const auto is_old = [&](const Named& named) {
+      return scan > named.scan + memory_ && find(named.object) == nullptr;
+    };
     named_.erase(std::remove_if(named_.begin(), named_.end(), is_old), named_.end());
   }
 
