@@ -168,8 +168,9 @@ class InstanceLinker {
   float max_length_;
   float max_height_;
   float overlap_;
-  // Of the last two scans: cells, ordered by instance; direct-mapped tables of their indices.
+  // Cells of the last two scans, ordered by instance.
   std::vector<Cell> cells_, cells_before_;
+  // Index of a cell by slot_of(), one table for each of the two scans.
   std::vector<std::uint32_t> table_ = std::vector<std::uint32_t>(kTable, kNoIndex);
   std::vector<std::uint32_t> table_before_ = table_;
   std::vector<VoxelKey> place_;         // by sample

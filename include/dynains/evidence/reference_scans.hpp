@@ -293,6 +293,7 @@ class ReferenceScans {
     for (std::size_t i = sensor; i < part_count_; i += sensors) {
       const Part& part = parts_[i];
       const Pose T_level_part = composed(inverted(T_world_level), part.T_world_level);
+      // Without rounding for the middle scan: a single level scan needs no transform.
       const Pose T = i == middle ? T_beams_level : composed(T_beams_level, T_level_part);
       scans_of_view_.push_back(part.points);
       if (!T.matrix().isIdentity(0.0)) scans_of_view_.back().to_image = PackTransform(T);

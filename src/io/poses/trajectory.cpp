@@ -22,7 +22,7 @@ constexpr const char* kExpectedColumns =
     "expected 12 numbers (KITTI), 8 (TUM: time x y z qx qy qz qw), 7, 13 or 16 numbers, or a first "
     "line that names the columns time x y z qx qy qz qw";
 
-/// What a column holds. kMatrix is the first of 12 or 16 numbers.
+/// Meaning of a column. kMatrix marks the first column of a matrix of 12 or 16 numbers.
 enum Meaning : std::size_t { kTime, kNanoseconds, kMatrix, kX, kY, kZ, kQx, kQy, kQz, kQw };
 
 /// Positions of the values in a row.
