@@ -142,6 +142,14 @@ std::vector<double> parse_row(const ByteReader& reader, std::string_view line, s
   return numbers_in(reader, {tokens.begin(), tokens.end()}, 0, count);
 }
 
+/// Adds the time of the last line, s.
+void add_time(const ByteReader& reader, double time, std::vector<double>& times) {
+  if (!times.empty() && !(time > times.back())) {
+    reader.fail_on_line("expected a time after that of the row before");
+  }
+  times.push_back(time);
+}
+
 Pose pose_of(const ByteReader& reader, const std::vector<std::string>& cells,
              const Columns& columns) {
   if (columns.of[kMatrix] != kNoColumn) {
@@ -195,11 +203,7 @@ std::vector<double> read_kitti_times(const std::filesystem::path& path) {
     if (has_blank && !is_blank) reader.fail_on_line("expected no row behind a blank line");
     has_blank = is_blank;
     if (is_blank) continue;
-    const double time = parse_row(reader, line, 1)[0];
-    if (!times.empty() && !(time > times.back())) {
-      reader.fail_on_line("expected a time after that of the row before");
-    }
-    times.push_back(time);
+    add_time(reader, parse_row(reader, line, 1)[0], times);
   }
   return times;
 }
@@ -252,10 +256,7 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
     if (columns.of[kNanoseconds] != kNoColumn) {
       time += 1e-9 * number_in(reader, cells, columns.of[kNanoseconds]);
     }
-    if (!trajectory.times.empty() && !(time > trajectory.times.back())) {
-      reader.fail_on_line("expected a time after that of the row before");
-    }
-    trajectory.times.push_back(time);
+    add_time(reader, time, trajectory.times);
   }
   if (trajectory.poses.empty()) reader.fail_on_line("file ends, expected at least one pose");
   trajectory.order = columns.order;
