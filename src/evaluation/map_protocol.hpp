@@ -86,6 +86,7 @@ class MapProtocol {
         groups_(grid_, map_world),
         lookup_(config.point_radius, map_world) {}
 
+  /// First pass.
   void add(const LabelledScan& scan) {
     detail::for_each_point(
         scan, grid_, gate_, [&](std::size_t i, const Eigen::Vector3d&, VoxelKey key) {
@@ -100,7 +101,7 @@ class MapProtocol {
                              point_score_.add(truth, 1, lookup_.contains(p, key) ? 1 : 0);
                            });
     finished_first_pass_ = false;
-  }  ///< first pass
+  }
   /// Second pass.
   void resolve(const LabelledScan& scan) {
     finish_first_pass();
