@@ -16,6 +16,14 @@ inline void execute(sqlite3* database, const std::string& sql) {
   }
 }
 
+/// Runs SQL on a file, which is made if there is none.
+inline void execute(const std::filesystem::path& path, const std::string& sql) {
+  sqlite3* database = nullptr;
+  if (sqlite3_open(path.c_str(), &database) != SQLITE_OK) throw std::runtime_error(path.string());
+  execute(database, sql);
+  sqlite3_close(database);
+}
+
 inline std::string blob_of(const std::string& bytes) {
   constexpr const char* kDigits = "0123456789abcdef";
   std::string text = "x'";
@@ -29,24 +37,21 @@ inline std::string blob_of(const std::string& bytes) {
 
 inline void write_db3(const std::filesystem::path& path, const std::vector<LogChannel>& channels,
                       const std::vector<WrittenMessage>& messages) {
-  sqlite3* database = nullptr;
-  if (sqlite3_open(path.c_str(), &database) != SQLITE_OK) throw std::runtime_error(path.string());
-  execute(database,
-          "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
-          "serialization_format TEXT, offered_qos_profiles TEXT);"
-          "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
-          "data BLOB); BEGIN");
+  std::string sql =
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
+      "serialization_format TEXT, offered_qos_profiles TEXT);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+      "data BLOB); BEGIN;";
   for (std::size_t i = 0; i < channels.size(); ++i) {
-    execute(database, "INSERT INTO topics VALUES(" + std::to_string(i) + ", '" + channels[i].topic +
-                          "', '" + channels[i].type + "', '" + channels[i].encoding + "', '')");
+    sql += "INSERT INTO topics VALUES(" + std::to_string(i) + ", '" + channels[i].topic + "', '" +
+           channels[i].type + "', '" + channels[i].encoding + "', '');";
   }
   for (const WrittenMessage& message : messages) {
-    execute(database, "INSERT INTO messages(topic_id, timestamp, data) VALUES(" +
-                          std::to_string(message.channel) + ", " + std::to_string(message.time) +
-                          ", " + blob_of(message.data) + ")");
+    sql += "INSERT INTO messages(topic_id, timestamp, data) VALUES(" +
+           std::to_string(message.channel) + ", " + std::to_string(message.time) + ", " +
+           blob_of(message.data) + ");";
   }
-  execute(database, "COMMIT");
-  sqlite3_close(database);
+  execute(path, sql + "COMMIT");
 }
 
 }  // namespace dynains::test

@@ -29,23 +29,33 @@ Eigen::Vector3f point_of(const RecordedScan& scan, std::size_t i) {
 
 const std::vector<double> kOffsets = {-0.02, 0.0, 0.013, 0.1};  // s
 
+/// A scan of points at these places (m) with their times.
+void write_ply(const fs::path& path,
+               const std::vector<std::pair<Eigen::Vector3d, double>>& points) {
+  fs::create_directories(path.parent_path());
+  PointColumns columns;
+  columns.time = true;
+  PointFileWriter writer(path, columns);
+  for (const auto& [position, time] : points) {
+    FilePoint point;
+    point.position = position;
+    point.time = time;
+    writer.add(point);
+  }
+  writer.commit();
+}
+
 /// Three scans that see kPlace four times each. `stored` gives the value of the column time.
 void write_drive(const fs::path& folder, const std::function<double(double, double)>& stored,
                  double first_time = 0.0) {
-  PointColumns columns;
-  columns.time = true;
   std::vector<double> times;
   for (int i = 0; i < 3; ++i) {
     const double time = 0.1 * i;
-    fs::create_directories(folder);
-    PointFileWriter writer(folder / ("scan" + std::to_string(i) + ".ply"), columns);
+    std::vector<std::pair<Eigen::Vector3d, double>> points;
     for (const double offset : kOffsets) {
-      FilePoint point;
-      point.position = seen_at(time + offset).cast<double>();
-      point.time = stored(first_time + time, offset);
-      writer.add(point);
+      points.emplace_back(seen_at(time + offset).cast<double>(), stored(first_time + time, offset));
     }
-    writer.commit();
+    write_ply(folder / ("scan" + std::to_string(i) + ".ply"), points);
     times.push_back(first_time + time);
   }
   write_times(folder / "times.txt", times);
@@ -53,21 +63,10 @@ void write_drive(const fs::path& folder, const std::function<double(double, doub
   write_text(folder / "poses.tum", timed_rows(times, pose_of));
 }
 
-/// Two scans of points at (x, 0, 0), each with x (m) and its time (s).
+/// Two scans of points
 void write_two_scans(const TemporaryFolder& folder,
-                     const std::vector<std::pair<double, double>>& points) {
-  PointColumns columns;
-  columns.time = true;
-  for (const char* const name : {"0.ply", "1.ply"}) {
-    PointFileWriter writer(folder / name, columns);
-    for (const auto& [x, time] : points) {
-      FilePoint point;
-      point.position = {x, 0, 0};
-      point.time = time;
-      writer.add(point);
-    }
-    writer.commit();
-  }
+                     const std::vector<std::pair<Eigen::Vector3d, double>>& points) {
+  for (const char* const name : {"0.ply", "1.ply"}) write_ply(folder / name, points);
 }
 
 RecordingOptions with_deskewing() {
@@ -110,7 +109,7 @@ TEST_CASE("De-skewing moves points to the time of the scan, for offsets and time
 }
 
 TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
-  const std::vector<CloudField> fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"t", 12, 5}};
+  const std::vector<CloudField> fields = xyz_and({{"t", 12, 5}});
   for (const bool by_transforms : {false, true}) {
     std::vector<WrittenMessage> messages;
     // The sensor stands still, and starts to move between the first cloud and the second one.
@@ -124,24 +123,18 @@ TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
                                         : odometry(time, "lidar", place(time))});
     }
     for (const double time : {1.0, 1.1, 1.2}) {
-      ByteWriter points;
+      std::string points;
       for (const double offset : {0.0, 0.04, 0.09}) {
-        for (const float c :
-             {static_cast<float>(50.0 - place(time + offset).translation().x()), 1.0F, 2.0F}) {
-          points.number(c);
-        }
-        points.number(static_cast<std::int32_t>(1e9 * offset));
+        const double x = 50.0 - place(time + offset).translation().x();
+        points +=
+            packed(static_cast<float>(x), 1.0F, 2.0F, static_cast<std::int32_t>(1e9 * offset));
       }
-      messages.push_back(
-          {0, nanoseconds(time),
-           cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 16, points.bytes())});
+      messages.push_back({0, nanoseconds(time),
+                          cloud_message(MessageEncoding::kCdr, time, "lidar", fields, 16, points)});
     }
     const TemporaryFolder folder;
     write_text(folder / "drive.mcap",
-               mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
-                          by_transforms ? LogChannel{"/tf", "tf2_msgs/msg/TFMessage"}
-                                        : LogChannel{"/odom", "nav_msgs/msg/Odometry"}},
-                         messages, {}));
+               mcap_file({kClouds, by_transforms ? kTf : kOdometry}, messages, {}));
     const Recording recording(folder / "drive.mcap", with_deskewing());
     REQUIRE(recording.size() == 3);
     for (std::size_t i = 0; i < 3; ++i) {
@@ -157,7 +150,7 @@ TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
 TEST_CASE("Points at the origin and points without a finite time keep their place") {
   const TemporaryFolder folder;
   const double unknown = std::numeric_limits<double>::quiet_NaN();
-  write_two_scans(folder, {{0.0, 0.05}, {5.0, unknown}, {5.0, 0.05}});
+  write_two_scans(folder, {{{0, 0, 0}, 0.05}, {{5, 0, 0}, unknown}, {{5, 0, 0}, 0.05}});
   write_text(folder / "poses.tum", "0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n");
   const Recording recording(folder.path(), with_deskewing());
   const RecordedScan scan = recording.read_scan(0);
@@ -168,7 +161,7 @@ TEST_CASE("Points at the origin and points without a finite time keep their plac
 
 TEST_CASE("De-skewing follows the time offset between scans and poses") {
   const TemporaryFolder folder;
-  write_two_scans(folder, {{5.0, 0.0}, {5.0, 0.05}});
+  write_two_scans(folder, {{{5, 0, 0}, 0.0}, {{5, 0, 0}, 0.05}});
   // The clock of the poses is 40 s ahead; the sensor moves at 20 m/s in the first 0.1 s.
   write_text(folder / "times.txt", "0\n0.1\n");
   write_text(folder / "poses.tum", "40 0 0 0 0 0 0 1\n40.1 2 0 0 0 0 0 1\n40.2 2 0 0 0 0 0 1\n");

@@ -36,6 +36,11 @@ inline void write_text(const std::filesystem::path& path, const std::string& tex
   if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
 }
 
+/// A row of KITTI: a pose at (x, 0, 0) m that is not turned.
+inline std::string pose_row(double x = 0.0) {
+  return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n";
+}
+
 inline std::size_t count_lines(const std::string& text) {
   return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
 }
@@ -51,12 +56,24 @@ inline std::size_t count_entries(const std::filesystem::path& folder) {
   return static_cast<std::size_t>(std::distance(Iterator(folder), Iterator()));
 }
 
-/// Bytes of values in memory order, one value after the other.
+/// Bytes of numbers in memory order and of texts, one after the other.
 template <class... Values>
 std::string packed(const Values&... values) {
   std::string bytes;
-  (bytes.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
+  const auto add = [&](const auto& value) {
+    if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) {
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    } else {
+      bytes += value;
+    }
+  };
+  (add(values), ...);
   return bytes;
+}
+
+/// A text behind its length, uint32.
+inline std::string counted(const std::string& text) {
+  return packed(static_cast<std::uint32_t>(text.size()), text);
 }
 
 /// Bytes of numbers.

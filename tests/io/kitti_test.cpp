@@ -10,8 +10,6 @@ using namespace dynains::test;
 
 namespace {
 
-const char* const kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
-
 std::string bytes(std::size_t count) { return std::string(count, '\0'); }
 
 /// A valid sequence of three scans with 2 points each. Tests then damage one part of it.
@@ -20,7 +18,7 @@ void make_sequence(const TemporaryFolder& folder) {
     write_text(folder / ("velodyne/" + std::string(name) + ".bin"), bytes(32));
     write_text(folder / ("labels/" + std::string(name) + ".label"), bytes(8));
   }
-  write_text(folder / "poses.txt", std::string(kIdentity) + kIdentity + kIdentity);
+  write_text(folder / "poses.txt", pose_row() + pose_row() + pose_row());
 }
 
 std::string open_error(const TemporaryFolder& folder) {
@@ -67,18 +65,18 @@ TEST_CASE("Scans find their rows by number, or by order in a clip") {
   TemporaryFolder folder;
   write_text(folder / "velodyne/000002.bin", bytes(16));
   write_text(folder / "velodyne/000003.bin", bytes(16));
-  const auto row = [](int x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; };
   const auto check = [&](double first, double second, double time) {
     const Recording recording(folder.path());
     CHECK(recording.T_world_sensor(0).translation().x() == first);
     CHECK(recording.T_world_sensor(1).translation().x() == second);
     CHECK(recording.time(1) == Approx(time));
   };
-  write_text(folder / "poses.txt", row(10) + row(11) + row(12) + row(13) + row(14));
+  write_text(folder / "poses.txt",
+             pose_row(10) + pose_row(11) + pose_row(12) + pose_row(13) + pose_row(14));
   check(12.0, 13.0, 0.3);
-  write_text(folder / "poses.txt", row(10) + row(11));  // of the clip
+  write_text(folder / "poses.txt", pose_row(10) + pose_row(11));  // of the clip
   check(10.0, 11.0, 0.1);
-  write_text(folder / "poses.txt", row(10) + row(11) + row(12));
+  write_text(folder / "poses.txt", pose_row(10) + pose_row(11) + pose_row(12));
   CHECK_THAT(open_error(folder),
              ContainsSubstring("poses.txt:4:") && ContainsSubstring("at least 4, found 3"));
 }
@@ -99,13 +97,13 @@ TEST_CASE("Empty scans and blank lines at the end are accepted") {
   TemporaryFolder folder;
   make_sequence(folder);
   write_text(folder / "velodyne/000001.bin", "");
-  write_text(folder / "poses.txt", std::string(kIdentity) + kIdentity + kIdentity + "\n  \n");
+  write_text(folder / "poses.txt", pose_row() + pose_row() + pose_row() + "\n  \n");
   const Recording recording(folder.path());
   CHECK(recording.read_scan(1).xyzi.empty());
 }
 
 TEST_CASE("Broken sequences are refused with path, line and expectation") {
-  const std::string id = kIdentity;
+  const std::string id = pose_row();
   struct Case {
     const char* file;                 // of the sequence
     std::optional<std::string> text;  // none: the file or folder is removed

@@ -5,17 +5,12 @@
 #include "files.hpp"
 #include "io/logs/log_file.hpp"
 #include "log_writer.hpp"
-#include "ros_writer.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
 
 namespace {
-
-SerialisedMessage serialised(const std::string& bytes, MessageEncoding encoding) {
-  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), encoding, "place"};
-}
 
 const std::string kCloud = "sensor_msgs/PointCloud2";
 
@@ -30,40 +25,28 @@ std::string marked_with(const std::string& type, const SerialisedMessage& cloud,
   return with_labels(type, cloud, labels);
 }
 
+const std::vector<CloudField> kFields = xyz_and({{"rgb", 12, 4}});
+
+std::string point(std::size_t i) {
+  const auto x = static_cast<float>(10 * i);
+  return packed(x, x + 1.0F, x + 2.0F, static_cast<std::uint16_t>(1000 + i));
+}
+
 /// A cloud of `rows` rows, each of two points and `padding` bytes, with a field of another type.
-std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::size_t padding) {
-  MessageWriter out(encoding);
-  out.header(nanoseconds(1.5), "lidar")
-      .number(rows)
-      .number(std::uint32_t{2})
-      .number(std::uint32_t{4});
-  for (const CloudField& field : {kXyz[0], kXyz[1], kXyz[2], CloudField{"rgb", 12, 4}}) {
-    out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
-  }
-  ByteWriter data;
+std::string rows_of_points(MessageEncoding encoding, std::uint32_t rows, std::uint32_t padding) {
+  std::string data;
   for (std::uint32_t i = 0; i < 2 * rows; ++i) {
-    for (std::uint32_t axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i + axis));
-    data.number(static_cast<std::uint16_t>(1000 + i));
-    if (i % 2 == 1) data.raw(std::string(padding, 'p'));
+    data += point(i);
+    if (i % 2 == 1) data.append(padding, 'p');
   }
-  out.number(std::uint8_t{0}).number(std::uint32_t{14});
-  out.number(static_cast<std::uint32_t>(28 + padding));
-  out.number(static_cast<std::uint32_t>(data.bytes().size()))
-      .raw(data.bytes())
-      .number(std::uint8_t{1});
-  return out.bytes();
+  return cloud_message(encoding, 1.5, "lidar", kFields, {rows, 2, 14, 28 + padding}, data);
 }
 
 /// A cloud of one row that has only the points with these numbers.
-std::string one_row(MessageEncoding encoding, const std::vector<std::uint16_t>& numbers) {
-  ByteWriter data;
-  for (const std::uint16_t i : numbers) {
-    for (std::uint32_t axis = 0; axis < 3; ++axis) data.number(static_cast<float>(10 * i + axis));
-    data.number(static_cast<std::uint16_t>(1000 + i));
-  }
-  std::vector<CloudField> fields = kXyz;
-  fields.push_back({"rgb", 12, 4});
-  return cloud_message(encoding, 1.5, "lidar", fields, 14, data.bytes());
+std::string one_row(MessageEncoding encoding, const std::vector<std::size_t>& numbers) {
+  std::string data;
+  for (const std::size_t i : numbers) data += point(i);
+  return cloud_message(encoding, 1.5, "lidar", kFields, 14, data);
 }
 
 std::string livox_message(MessageEncoding encoding, const std::vector<std::uint8_t>& points) {
@@ -79,10 +62,9 @@ std::string livox_message(MessageEncoding encoding, const std::vector<std::uint8
   return out.bytes();
 }
 
-/// Replaces the messages of one time, and ends the copy at another one.
-EditMessage replacing(std::uint64_t replaced, std::uint64_t end = 0) {
+/// Replaces the messages of one time.
+EditMessage replacing(std::uint64_t replaced) {
   return [=](const LogMessage& place, const SerialisedMessage& message) {
-    if (end != 0 && place.time == end) throw std::runtime_error("ended");
     std::optional<std::string> edited;
     if (place.time == replaced) {
       edited = "other " + std::string(reinterpret_cast<const char*>(message.data), message.size);
@@ -91,8 +73,7 @@ EditMessage replacing(std::uint64_t replaced, std::uint64_t end = 0) {
   };
 }
 
-const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
-                                           {"/other", "any/msg/Thing", "json"}};
+const std::vector<LogChannel> kChannels = {kClouds, {"/other", "any/msg/Thing", "json"}};
 constexpr std::uint64_t kReplaced = 30;
 
 std::vector<WrittenMessage> five_messages() {
@@ -112,7 +93,7 @@ void check_copy(const fs::path& log, const fs::path& target) {
 
 TEST_CASE("A cloud without some points keeps all other bytes, its rows become one") {
   for (const auto encoding : {MessageEncoding::kRos1, MessageEncoding::kCdr}) {
-    for (const std::size_t padding : {0, 6}) {
+    for (const std::uint32_t padding : {0U, 6U}) {
       CAPTURE(padding);
       const std::string cloud = rows_of_points(encoding, 2, padding);
       const auto message = serialised(cloud, encoding);
@@ -120,7 +101,7 @@ TEST_CASE("A cloud without some points keeps all other bytes, its rows become on
       CHECK(without(kCloud, message, Values(4, 0)) == one_row(encoding, {}));
       CHECK(without(kCloud, message, Values(4, 1)) == one_row(encoding, {0, 1, 2, 3}));
       CHECK_THROWS_WITH(without(kCloud, message, Values(3, 1)),
-                        ContainsSubstring("place: expected 3 points, found 4"));
+                        ContainsSubstring("log: /t: expected 3 points, found 4"));
     }
   }
 }
@@ -150,14 +131,11 @@ TEST_CASE("Labels become the last field of a cloud, and all others are as they w
     // By hand: two rows of two points of 14 + 4 bytes, and the flag of dense clouds behind them.
     for (std::size_t i = 0; i < 4; ++i) {
       const std::string point = marked.substr(marked.size() - 1 - 18 * (4 - i), 18);
-      CHECK(point.substr(12, 6) == ByteWriter()
-                                       .number(static_cast<std::uint16_t>(1000 + i))
-                                       .number(labels[i])
-                                       .raw(std::string(3, '\0'))
-                                       .bytes());
+      CHECK(point.substr(12, 6) ==
+            packed(static_cast<std::uint16_t>(1000 + i), labels[i]) + std::string(3, '\0'));
     }
     CHECK_THROWS_WITH(marked_with(kCloud, message, labels),
-                      ContainsSubstring("place: expected no field \"label\""));
+                      ContainsSubstring("log: /t: expected no field \"label\""));
   }
 }
 
@@ -196,22 +174,14 @@ TEST_CASE("The copy of an MCAP file has the same messages, with or without chunk
 TEST_CASE("Attachments, metadata, sequence numbers and publish times of an MCAP file stay") {
   const TemporaryFolder folder;
   std::string file = mcap_file(kChannels, five_messages(), {});
-  const auto times = ByteWriter().number(std::uint64_t{5}).number(std::uint64_t{6});
-  const std::string attachment = mcap_record(9, ByteWriter()
-                                                    .raw(times.bytes())
-                                                    .string("calibration")
-                                                    .string("text/plain")
-                                                    .number(std::uint64_t{4})
-                                                    .raw("data")
-                                                    .number(std::uint32_t{0}));
-  const std::string metadata = mcap_record(12, ByteWriter().string("robot").string(""));
-  const std::string message = mcap_record(5, ByteWriter()
-                                                 .number(std::uint16_t{1})
-                                                 .number(std::uint32_t{4711})
-                                                 .number(std::uint64_t{60})
-                                                 .number(std::uint64_t{55})
-                                                 .raw("late"));
-  const std::size_t data_end = file.find(mcap_record(15, ByteWriter().number(std::uint32_t{0})));
+  const std::string times = packed(std::uint64_t{5}, std::uint64_t{6});
+  const std::string attachment = mcap_record(
+      9,
+      packed(times, counted("calibration"), counted("text/plain"), std::uint64_t{4}, "data", 0U));
+  const std::string metadata = mcap_record(12, counted("robot") + counted(""));
+  const std::string message =
+      mcap_record(5, packed(std::uint16_t{1}, 4711U, std::uint64_t{60}, std::uint64_t{55}, "late"));
+  const std::size_t data_end = file.find(mcap_record(15, packed(0U)));
   file.insert(data_end, attachment + message + metadata);
   write_text(folder / "log.mcap", file);
   copy_log(*open_log(folder / "log.mcap"), folder / "copy.mcap", replacing(kReplaced));
@@ -224,19 +194,12 @@ TEST_CASE("Attachments, metadata, sequence numbers and publish times of an MCAP 
   CHECK(stamp.publish_time == 55);
   CHECK(std::string(bytes.begin(), bytes.end()) == "late");
   const auto index = [&](const std::string& record) {
-    return ByteWriter()
-        .number(std::uint64_t{copy.find(record)})
-        .number(std::uint64_t{record.size()})
-        .bytes();
+    return packed(std::uint64_t{copy.find(record)}, std::uint64_t{record.size()});
   };
-  CHECK_THAT(copy, ContainsSubstring(mcap_record(10, ByteWriter()
-                                                         .raw(index(attachment))
-                                                         .raw(times.bytes())
-                                                         .number(std::uint64_t{4})
-                                                         .string("calibration")
-                                                         .string("text/plain"))));
-  CHECK_THAT(copy,
-             ContainsSubstring(mcap_record(13, ByteWriter().raw(index(metadata)).string("robot"))));
+  CHECK_THAT(copy, ContainsSubstring(
+                       mcap_record(10, packed(index(attachment), times, std::uint64_t{4},
+                                              counted("calibration"), counted("text/plain")))) &&
+                       ContainsSubstring(mcap_record(13, index(metadata) + counted("robot"))));
 }
 
 TEST_CASE("Without chunks, a log is copied in chunks of some megabytes") {
@@ -289,12 +252,10 @@ TEST_CASE("A log that ends early is copied up to its end") {
 TEST_CASE("A database is copied with its messages, definitions and quality of service") {
   const TemporaryFolder folder;
   write_db3(folder / "log.db3", kChannels, five_messages());
-  sqlite3* database = nullptr;
-  REQUIRE(sqlite3_open((folder / "log.db3").c_str(), &database) == SQLITE_OK);
-  execute(database, "UPDATE topics SET offered_qos_profiles = '- history: 3'");
+  execute(folder / "log.db3", "UPDATE topics SET offered_qos_profiles = '- history: 3'");
   for (const bool has_definitions : {false, true}) {
     if (has_definitions) {
-      execute(database,
+      execute(folder / "log.db3",
               "CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT, encoding "
               "TEXT, encoded_message_definition TEXT, type_description_hash TEXT); INSERT INTO "
               "message_definitions VALUES(1, 'any/msg/Thing', 'ros2idl', 'module any', '')");
@@ -309,7 +270,6 @@ TEST_CASE("A database is copied with its messages, definitions and quality of se
     CHECK(other.encoding == (has_definitions ? "ros2idl" : ""));
     CHECK(other.definition == (has_definitions ? "module any" : ""));
   }
-  sqlite3_close(database);
   CHECK(count_entries(folder.path()) == 2);
 }
 #endif

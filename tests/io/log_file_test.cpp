@@ -17,8 +17,7 @@ using namespace test;
 
 namespace {
 
-const std::vector<LogChannel> kChannels = {{"/points", "sensor_msgs/msg/PointCloud2"},
-                                           {"/chatter", "std_msgs/msg/String"}};
+const std::vector<LogChannel> kChannels = {kClouds, {"/chatter", "std_msgs/msg/String"}};
 
 /// Seven messages, with some times out of order.
 std::vector<WrittenMessage> seven_messages() {
@@ -165,10 +164,7 @@ TEST_CASE("A database with a journal is refused, and nothing is written beside i
                                   "join them: sqlite3 FILE 'PRAGMA journal_mode = DELETE'");
   CHECK(count_entries(folder / "killed") == entries);
   // What the advice does.
-  sqlite3* joined = nullptr;
-  REQUIRE(sqlite3_open(killed.c_str(), &joined) == SQLITE_OK);
-  execute(joined, "PRAGMA journal_mode = DELETE");
-  sqlite3_close(joined);
+  execute(killed, "PRAGMA journal_mode = DELETE");
   CHECK(open_log(killed)->messages().size() == 6);
   CHECK(count_entries(folder / "killed") == 1);
 
@@ -207,10 +203,7 @@ TEST_CASE("No SQL of a database runs, and tables are real ones") {
   };
   for (const auto& [sql, expected] : cases) {
     fs::remove(path);
-    sqlite3* database = nullptr;
-    REQUIRE(sqlite3_open(path.c_str(), &database) == SQLITE_OK);
-    execute(database, sql);
-    sqlite3_close(database);
+    execute(path, sql);
     CHECK_THAT(read_error(path), StartsWith(path.string() + ": expected the tables of rosbag2") &&
                                      ContainsSubstring(expected));
   }
@@ -283,23 +276,7 @@ std::string zstd(const std::string& bytes) {
 
 /// A chunk of MCAP with an index of `messages`.
 std::string zstd_chunk(const std::string& records, const std::string& index) {
-  const std::string content = zstd(records);
-  return mcap_record(6, ByteWriter()
-                            .number(std::uint64_t{0})
-                            .number(std::uint64_t{0})
-                            .number(std::uint64_t{records.size()})
-                            .number(std::uint32_t{0})
-                            .string("zstd")
-                            .number(std::uint64_t{content.size()})
-                            .raw(content)) +
-         index;
-}
-
-std::string mcap_of(const std::string& records) {
-  const std::string magic("\x89MCAP0\r\n", 8);
-  return magic + mcap_record(1, ByteWriter().string("ros2").string("test")) +
-         mcap_definitions(kChannels) + records +
-         mcap_record(2, ByteWriter().raw(std::string(20, '\0'))) + magic;
+  return mcap_chunk_record(records, "zstd", zstd(records)) + index;
 }
 
 }  // namespace
@@ -309,21 +286,21 @@ TEST_CASE("A small file of MCAP takes little memory, even if its chunks unpack t
   const fs::path path = folder / "log.mcap";
   std::string empty;
   for (int i = 0; i < 300000; ++i) empty += mcap_message({0, 1, ""});
-  write_text(path, mcap_of(zstd_chunk(empty, "")));
+  write_text(path, mcap_of(mcap_definitions(kChannels) + zstd_chunk(empty, "")));
   REQUIRE(fs::file_size(path) < 100000);
   CHECK_THAT(read_error(path), StartsWith(path.string() + ": byte ") &&
                                    ContainsSubstring("expected at most one record for each byte"));
 
   const std::string zeros(std::size_t{40} << 20U, '\0');
-  write_text(path, mcap_of(zstd_chunk(zeros, "")));
+  write_text(path, mcap_of(mcap_definitions(kChannels) + zstd_chunk(zeros, "")));
   CHECK_THAT(read_error(path), ContainsSubstring("expected a chunk of at most 16777216 bytes"));
 }
 
 TEST_CASE("A message that is packed by itself unpacks to as much as a chunk may") {
   const TemporaryFolder folder;
   for (const std::size_t size : {std::size_t{15} << 20U, std::size_t{40} << 20U}) {
-    write_text(folder / "log.mcap", mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"}},
-                                              {{0, 1, zstd(std::string(size, '\0'))}}, {}));
+    write_text(folder / "log.mcap",
+               mcap_file({kClouds}, {{0, 1, zstd(std::string(size, '\0'))}}, {}));
     const auto log = open_log(folder / "log.mcap");
     const auto copy = [&] {
       copy_log(*log, folder / "copy.mcap",
@@ -343,24 +320,19 @@ TEST_CASE("A message that is packed by itself unpacks to as much as a chunk may"
 TEST_CASE("Chunks whose messages alternate in time are unpacked once, if they are few") {
   const TemporaryFolder folder;
   const fs::path path = folder / "log.mcap";
-  const std::string skipped =
-      mcap_record(0x90, ByteWriter().raw(std::string(std::size_t{15} << 20U, '\0')));
+  const std::string skipped = mcap_record(0x90, std::string(std::size_t{15} << 20U, '\0'));
   const auto write_chunks = [&](std::uint64_t count, std::uint64_t messages) {
     std::string chunks;
     for (std::uint64_t chunk = 0; chunk < count; ++chunk) {
       std::string records = skipped;
-      ByteWriter entries;
+      std::string entries;
       for (std::uint64_t i = 0; i < messages; ++i) {
-        entries.number(count * i + chunk).number(std::uint64_t{records.size()});
+        entries += packed(count * i + chunk, std::uint64_t{records.size()});
         records += mcap_message({0, count * i + chunk, "m"});
       }
-      chunks +=
-          zstd_chunk(records, mcap_record(7, ByteWriter()
-                                                 .number(std::uint16_t{0})
-                                                 .number(std::uint32_t(entries.bytes().size()))
-                                                 .raw(entries.bytes())));
+      chunks += zstd_chunk(records, mcap_record(7, std::string(2, '\0') + counted(entries)));
     }
-    write_text(path, mcap_of(chunks));
+    write_text(path, mcap_of(mcap_definitions(kChannels) + chunks));
   };
   // Unpacked for each of their messages, two chunks would exceed the work that a file may take.
   write_chunks(2, 3000);

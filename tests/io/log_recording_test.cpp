@@ -16,11 +16,7 @@ namespace {
 
 const Eigen::Isometry3d kT_base_lidar = pose_at(0.5, M_PI / 2);
 
-const LogChannel kPoints = {"/points", "sensor_msgs/msg/PointCloud2"};
-const LogChannel kTf = {"/tf", "tf2_msgs/msg/TFMessage"};
-const LogChannel kStaticTf = {"/tf_static", "tf2_msgs/msg/TFMessage"};
-const LogChannel kOdometry = {"/odom", "nav_msgs/msg/Odometry"};
-const std::vector<LogChannel> kDrive = {kPoints, kTf, kStaticTf};  // of drive_by_transforms()
+const std::vector<LogChannel> kDrive = {kClouds, kTf, kStaticTf};  // of drive_by_transforms()
 
 /// Four clouds in frame `frame`, one metre apart along x.
 std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding = MessageEncoding::kCdr,
@@ -98,7 +94,7 @@ void check_drive(const fs::path& log) {
 
 TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
   const Log log;
-  log.write({kPoints, kTf, kStaticTf}, drive_by_transforms(MessageEncoding::kCdr, "base"));
+  log.write(kDrive, drive_by_transforms(MessageEncoding::kCdr, "base"));
   RecordingOptions options;
   options.sensor_frame = "lidar";
   const Recording recording(log.path, options);
@@ -133,7 +129,7 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
     messages.push_back(
         {1, nanoseconds(time), transform(time, "odom", "base", pose_at(10 * time - 10, 0))});
   }
-  log.write({kPoints, kTf, kStaticTf, rear}, messages);
+  log.write({kClouds, kTf, kStaticTf, rear}, messages);
   RecordingOptions options;
   options.cloud_topic = "/points, /rear";
   const Recording recording(log.path, options);
@@ -169,7 +165,7 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
   options.cloud_topic = "/points,/points";
   CHECK_THAT(log.error(options), ContainsSubstring("each topic once, found /points twice"));
   messages.erase(messages.begin());
-  log.write({kPoints, kTf, kStaticTf, rear}, messages);
+  log.write({kClouds, kTf, kStaticTf, rear}, messages);
   options.cloud_topic = "/points,/rear";
   CHECK_THAT(
       log.error(options),
@@ -191,7 +187,7 @@ TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") 
   add("left", 0);
   messages.push_back({3, nanoseconds(1.1), info.bytes()});
   const LogChannel infos = {"/info", "autoware_sensing_msgs/msg/ConcatenatedPointCloudInfo"};
-  log.write({kPoints, kTf, kStaticTf, infos}, messages);
+  log.write({kClouds, kTf, kStaticTf, infos}, messages);
   const Recording recording(log.path);
   REQUIRE(recording.sensors().size() == 2);
   const RecordedScan scan = recording.read_scan(1);
@@ -213,7 +209,7 @@ TEST_CASE("A log of each format is a recording with clouds and with poses from t
     check_drive(folder / name);
   }
 #if defined(DYNAINS_HAS_SQLITE3)
-  write_db3(folder / "drive.db3", {kPoints, kTf, kStaticTf}, drive_by_transforms());
+  write_db3(folder / "drive.db3", kDrive, drive_by_transforms());
   check_drive(folder / "drive.db3");
 #endif
 }
@@ -237,12 +233,12 @@ TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
   const Log log;
   std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)});
-  log.write({kPoints, kOdometry, kStaticTf}, messages);
+  log.write({kClouds, kOdometry, kStaticTf}, messages);
   CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
   CHECK(has_note(Recording(log.path), "the transform from lidar to base is from the log"));
 
   messages.pop_back();
-  log.write({kPoints, kOdometry}, messages);
+  log.write({kClouds, kOdometry}, messages);
   CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1), 1e-9));
   CHECK(has_note(Recording(log.path),
                  "no transform from lidar to base: poses count as those of lidar"));
@@ -254,13 +250,13 @@ TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
                         .pose(pose_at(i, 0.1))
                         .bytes());
   }
-  log.write({kPoints, {"/pose", "geometry_msgs/msg/PoseStamped"}}, clouds_with("lidar", poses));
+  log.write({kClouds, {"/pose", "geometry_msgs/msg/PoseStamped"}}, clouds_with("lidar", poses));
   CHECK(Recording(log.path).T_world_sensor(1).isApprox(pose_at(1, 0.1), 1e-9));
 }
 
 TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the sensor") {
   const Log log;
-  log.write({kPoints, kOdometry}, clouds_with("odom", three_odometries("body")));
+  log.write({kClouds, kOdometry}, clouds_with("odom", three_odometries("body")));
   const Recording recording(log.path);
   CHECK(recording.frame() == PointFrame::kWorld);
   const RecordedScan scan = recording.read_scan(2);
@@ -275,7 +271,7 @@ TEST_CASE("Topics are found if there is only one, and listed otherwise") {
     messages.push_back(
         {static_cast<std::uint16_t>(message.channel + 2), message.time, message.data});
   }
-  log.write({kPoints,
+  log.write({kClouds,
              kOdometry,
              {"/rear", "sensor_msgs/msg/PointCloud2"},
              {"/wheels", "nav_msgs/msg/Odometry"}},
@@ -295,7 +291,7 @@ TEST_CASE("Topics are found if there is only one, and listed otherwise") {
   options.pose_topic = "/odom";
   CHECK(Recording(log.path, options).size() == 3);
 
-  log.write({kPoints}, clouds_with("lidar", {}));
+  log.write({kClouds}, clouds_with("lidar", {}));
   CHECK_THAT(log.error(), ContainsSubstring("expected a topic with poses, or a file of poses"));
   log.write({kOdometry}, {{0, 1, three_odometries("base")[0]}});
   CHECK_THAT(log.error(), ContainsSubstring("expected a topic with clouds; found /odom"));
@@ -317,7 +313,7 @@ TEST_CASE("Robots of one log whose frames have equal names keep their own transf
       const double time = 1.01 + 0.1 * i;
       messages.push_back({3, nanoseconds(time), transform(time, "odom", "base", pose_at(-i, 1))});
     }
-    log.write({{points, kPoints.type},
+    log.write({{points, kClouds.type},
                {"/one/tf", kTf.type},
                {"/one/tf_static", kTf.type},
                {"/two/tf", kTf.type},
@@ -343,7 +339,7 @@ TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame")
   std::vector<WrittenMessage> messages = drive_by_transforms();
   messages.push_back({2, nanoseconds(1.0), transform(1.0, "map", "odom", pose_at(100, 1))});
   messages.push_back({3, nanoseconds(1.0), odometry(1.0, "base", pose_at(50, 0))});
-  log.write({kPoints, kTf, kStaticTf, kOdometry}, messages);
+  log.write({kClouds, kTf, kStaticTf, kOdometry}, messages);
   RecordingOptions options;
   options.pose_topic = "/tf";
   CHECK(Recording(log.path, options)
@@ -370,7 +366,7 @@ TEST_CASE("A time offset is applied before poses of the log are taken") {
                             by_transforms ? transform(time, "odom", "lidar", pose_at(i, 0))
                                           : odometry(time, "lidar", pose_at(i, 0))});
       }
-      log.write({kPoints, by_transforms ? kTf : kOdometry}, messages);
+      log.write({kClouds, by_transforms ? kTf : kOdometry}, messages);
       RecordingOptions options;
       options.time_offset = ahead;
       const Recording recording(log.path, options);
@@ -430,7 +426,7 @@ TEST_CASE("Parts of a log that are missing are named, and accepted on demand") {
   const std::vector<WrittenMessage> all = drive_by_transforms();
   const auto write = [&](const std::string& name, std::size_t first, std::size_t last) {
     const auto begin = all.begin();
-    write_text(folder / name, mcap_file({kPoints, kTf, kStaticTf},
+    write_text(folder / name, mcap_file(kDrive,
                                         {begin + static_cast<std::ptrdiff_t>(first),
                                          begin + static_cast<std::ptrdiff_t>(last)},
                                         {}));
@@ -526,7 +522,7 @@ TEST_CASE("Contradictory poses and clouds are refused with their place") {
        "--time-offset"},
   };
   for (const Case& one : cases) {
-    log.write({kPoints, one.poses}, clouds_with("lidar", one.messages));
+    log.write({kClouds, one.poses}, clouds_with("lidar", one.messages));
     CHECK_THAT(log.error(),
                StartsWith(log.path.string() + ": ") && ContainsSubstring(one.expected));
   }
@@ -554,7 +550,7 @@ TEST_CASE("Clouds that a log has lost are told, and uneven stamps are not") {
       messages.push_back({0, nanoseconds(time), small_cloud(time, "lidar")});
       messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(time, 0))});
     }
-    log.write({kPoints, kOdometry}, messages);
+    log.write({kClouds, kOdometry}, messages);
     return Recording(log.path).warnings();
   };
   std::vector<double> stamps;

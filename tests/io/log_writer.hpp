@@ -21,6 +21,11 @@ struct LogChannel {
   std::string encoding = "cdr";
 };
 
+inline const LogChannel kClouds = {"/points", "sensor_msgs/msg/PointCloud2"};
+inline const LogChannel kTf = {"/tf", "tf2_msgs/msg/TFMessage"};
+inline const LogChannel kStaticTf = {"/tf_static", "tf2_msgs/msg/TFMessage"};
+inline const LogChannel kOdometry = {"/odom", "nav_msgs/msg/Odometry"};
+
 struct WrittenMessage {
   std::uint16_t channel;
   std::uint64_t time;  ///< ns
@@ -31,24 +36,17 @@ struct WrittenMessage {
 inline std::string compressed(const std::string& method, const std::string& bytes) {
   const auto size = static_cast<std::uint32_t>(bytes.size());
   if (method == "lz4") {
-    const std::string head("\x04\x22\x4D\x18\x60\x40\x82", 7);
-    return ByteWriter().raw(head).number(size | 1U << 31U).raw(bytes).number(0U).bytes();
+    return packed(std::string("\x04\x22\x4D\x18\x60\x40\x82", 7), size | 1U << 31U, bytes, 0U);
   }
   if (method == "zstd") {
     const std::uint32_t block = size << 3U | 1U;  // the last block, raw
-    const std::string block_head = ByteWriter().number(block).bytes().substr(0, 3);
-    const std::string head("\x28\xB5\x2F\xFD\xA0", 5);
-    return ByteWriter().raw(head).number(size).raw(block_head).raw(bytes).bytes();
+    return packed(std::string("\x28\xB5\x2F\xFD\xA0", 5), size, packed(block).substr(0, 3), bytes);
   }
   return bytes;
 }
 
-inline std::string mcap_record(std::uint8_t opcode, const ByteWriter& content) {
-  return ByteWriter()
-      .number(opcode)
-      .number(std::uint64_t{content.bytes().size()})
-      .raw(content.bytes())
-      .bytes();
+inline std::string mcap_record(std::uint8_t opcode, const std::string& content) {
+  return packed(opcode, std::uint64_t{content.size()}, content);
 }
 
 /// Schemas and channels; the id of a schema is that of its channel and 1.
@@ -57,21 +55,29 @@ inline std::string mcap_definitions(const std::vector<LogChannel>& channels) {
   for (std::uint16_t i = 0; i < channels.size(); ++i) {
     const auto schema = static_cast<std::uint16_t>(i + 1);
     const auto& [topic, type, encoding] = channels[i];
-    records +=
-        mcap_record(3, ByteWriter().number(schema).string(type).string("ros2msg").string(""));
-    records += mcap_record(
-        4, ByteWriter().number(i).number(schema).string(topic).string(encoding).string(""));
+    records += mcap_record(3, packed(schema, counted(type), counted("ros2msg"), counted("")));
+    records += mcap_record(4, packed(i, schema, counted(topic), counted(encoding), counted("")));
   }
   return records;
 }
 
 inline std::string mcap_message(const WrittenMessage& message) {
-  return mcap_record(5, ByteWriter()
-                            .number(message.channel)
-                            .number(std::uint32_t{0})
-                            .number(message.time)
-                            .number(message.time)
-                            .raw(message.data));
+  return mcap_record(5, packed(message.channel, 0U, message.time, message.time, message.data));
+}
+
+/// A chunk of `records` from `first` to `last` (ns); `content`: as compressed by the method.
+inline std::string mcap_chunk_record(const std::string& records, const std::string& compression,
+                                     const std::string& content, std::uint64_t first = 0,
+                                     std::uint64_t last = 0, std::uint32_t checksum = 0) {
+  return mcap_record(6, packed(first, last, std::uint64_t{records.size()}, checksum,
+                               counted(compression), std::uint64_t{content.size()}, content));
+}
+
+/// A file of these records, with the header and the footer of a log of ROS 2.
+inline std::string mcap_of(const std::string& records) {
+  const std::string magic("\x89MCAP0\r\n", 8);
+  return magic + mcap_record(1, counted("ros2") + counted("test")) + records +
+         mcap_record(2, std::string(20, '\0')) + magic;
 }
 
 /// A chunk of `definitions` and `messages`, and its index.
@@ -80,32 +86,21 @@ inline std::string mcap_chunk(const std::string& definitions,
   std::string records = definitions;
   std::string index;
   for (const WrittenMessage& message : messages) {
-    index += mcap_record(7, ByteWriter()
-                                .number(message.channel)
-                                .number(std::uint32_t{16})
-                                .number(message.time)
-                                .number(std::uint64_t{records.size()}));
+    index +=
+        mcap_record(7, packed(message.channel, 16U, message.time, std::uint64_t{records.size()}));
     records += mcap_message(message);
   }
-  const std::string content = compressed(parts.compression, records);
-  const std::string chunk = mcap_record(6, ByteWriter()
-                                               .number(messages.front().time)
-                                               .number(messages.back().time)
-                                               .number(std::uint64_t{records.size()})
-                                               .number(parts.checksum)
-                                               .string(parts.compression)
-                                               .number(std::uint64_t{content.size()})
-                                               .raw(content));
+  const std::string chunk =
+      mcap_chunk_record(records, parts.compression, compressed(parts.compression, records),
+                        messages.front().time, messages.back().time, parts.checksum);
   return parts.message_index ? chunk + index : chunk;
 }
 
 /// An MCAP file with a chunk for every two messages.
 inline std::string mcap_file(const std::vector<LogChannel>& channels,
                              const std::vector<WrittenMessage>& messages, const McapParts& parts) {
-  const std::string magic("\x89MCAP0\r\n", 8);
   const std::string definitions = mcap_definitions(channels);
-  std::string file = magic + mcap_record(1, ByteWriter().string("ros2").string("test"));
-  if (!parts.chunks) file += definitions;
+  std::string file = parts.chunks ? "" : definitions;
   for (auto begin = messages.begin(); begin != messages.end();) {
     const auto end = begin + std::min<std::ptrdiff_t>(2, messages.end() - begin);
     if (parts.chunks) {
@@ -116,9 +111,8 @@ inline std::string mcap_file(const std::vector<LogChannel>& channels,
     }
     begin = end;
   }
-  file += mcap_record(15, ByteWriter().number(std::uint32_t{0}));
-  if (parts.summary) file += definitions;
-  return file + mcap_record(2, ByteWriter().raw(std::string(20, '\0'))) + magic;
+  file += mcap_record(15, packed(0U));
+  return mcap_of(parts.summary ? file + definitions : file);
 }
 
 struct BagParts {
@@ -131,19 +125,18 @@ struct BagParts {
 inline std::string bag_file(const std::vector<LogChannel>& channels,
                             const std::vector<WrittenMessage>& messages, const BagParts& parts) {
   const auto field = [](const std::string& name, const std::string& value) {
-    return ByteWriter().string(name + '=' + value).bytes();
+    return counted(name + '=' + value);
   };
-  const auto bytes = [](auto value) { return ByteWriter().number(value).bytes(); };
   const auto record = [&](std::uint8_t opcode, const std::string& fields, const std::string& data) {
-    return ByteWriter().string(field("op", bytes(opcode)) + fields).string(data).bytes();
+    return counted(field("op", packed(opcode)) + fields) + counted(data);
   };
   const auto stamp = [&](std::uint64_t time) {
-    return bytes(static_cast<std::uint32_t>(time / 1000000000)) +
-           bytes(static_cast<std::uint32_t>(time % 1000000000));
+    return packed(static_cast<std::uint32_t>(time / 1000000000),
+                  static_cast<std::uint32_t>(time % 1000000000));
   };
   std::string definitions;
   for (std::uint32_t i = 0; i < channels.size(); ++i) {
-    definitions += record(7, field("conn", bytes(i)) + field("topic", channels[i].topic),
+    definitions += record(7, field("conn", packed(i)) + field("topic", channels[i].topic),
                           field("topic", channels[i].topic) + field("type", channels[i].type) +
                               field("latching", "1") +
                               field("message_definition", "std_msgs/Header header\n"));
@@ -155,25 +148,25 @@ inline std::string bag_file(const std::vector<LogChannel>& channels,
     std::string records = begin == 0 ? definitions : std::string();
     std::string index;
     for (std::size_t i = begin; i < std::min(begin + 2, messages.size()); ++i) {
-      const std::string connection = field("conn", bytes(std::uint32_t{messages[i].channel}));
+      const std::string connection = field("conn", packed(std::uint32_t{messages[i].channel}));
       const std::string time = stamp(messages[i].time);
-      index += record(4, field("ver", bytes(1U)) + connection + field("count", bytes(1U)),
-                      time + bytes(static_cast<std::uint32_t>(records.size())));
+      index += record(4, field("ver", packed(1U)) + connection + field("count", packed(1U)),
+                      time + packed(static_cast<std::uint32_t>(records.size())));
       records += record(2, connection + field("time", time), messages[i].data);
     }
     chunks += record(5,
                      field("compression", parts.compression) +
-                         field("size", bytes(static_cast<std::uint32_t>(records.size()))),
+                         field("size", packed(static_cast<std::uint32_t>(records.size()))),
                      compressed(parts.compression, records));
     if (parts.index) chunks += index;
-    infos += record(6, field("ver", bytes(1U)), "");
+    infos += record(6, field("ver", packed(1U)), "");
   }
   const std::uint64_t index_position = parts.is_closed ? 4096 : 0;
   std::string file =
       "#ROSBAG V2.0\n" +
       record(3,
-             field("index_pos", bytes(index_position)) + field("conn_count", bytes(2U)) +
-                 field("chunk_count", bytes(parts.is_closed ? chunk_count : 0U)),
+             field("index_pos", packed(index_position)) + field("conn_count", packed(2U)) +
+                 field("chunk_count", packed(parts.is_closed ? chunk_count : 0U)),
              std::string(200, ' '));
   file += chunks;
   return parts.is_closed ? file + definitions + infos : file;

@@ -1,7 +1,7 @@
 #include "dynains/io/point_file.hpp"
 
 #include "dynains/errors.hpp"
-#include "io/files.hpp"
+#include "point_format_writer.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
@@ -10,20 +10,6 @@ using namespace dynains::test;
 namespace {
 
 std::string reversed(std::string bytes) { return {bytes.rbegin(), bytes.rend()}; }
-
-PointFile read(const std::string& name, const std::string& content) {
-  TemporaryFolder folder;
-  write_text(folder / name, content);
-  return read_points(folder / name);
-}
-
-std::string error(const std::string& name, const std::string& content) {
-  TemporaryFolder folder;
-  write_text(folder / name, content);
-  const std::string text = message_of<IoError>([&] { read_points(folder / name); });
-  CHECK_THAT(text, StartsWith((folder / name).string()));
-  return text;
-}
 
 const std::string kPlyXyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
 
@@ -118,19 +104,20 @@ TEST_CASE("Only .ply, .pcd and .las are written as point files") {
 }
 
 TEST_CASE("PLY: ascii with other elements, lists, aliases and any order") {
-  const PointFile file = read("a.ply",
-                              "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\n"
-                              "element camera 1\r\nproperty list uchar int ids\r\n"
-                              "property float f\r\nelement vertex 2\r\nproperty double z\r\n"
-                              "property uchar Ring\r\nproperty list uchar float extra\r\n"
-                              "property float x\r\nproperty int y\r\n"
-                              "property float scalar_Intensity\r\nproperty uint t\r\n"
-                              "element face 1\r\nproperty list uchar int vertex_index\r\n"
-                              "end_header\r\n"
-                              "2 5 6 1.5\r\n"
-                              "0.25 63 2 9 9 -1e3 4 0.5 4000000000\r\n"
-                              "nan 0 0 +2 -5 1 0\r\n"
-                              "3 0 1 2\r\n");
+  const PointFile file =
+      read_file_of("a.ply",
+                   "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\n"
+                   "element camera 1\r\nproperty list uchar int ids\r\n"
+                   "property float f\r\nelement vertex 2\r\nproperty double z\r\n"
+                   "property uchar Ring\r\nproperty list uchar float extra\r\n"
+                   "property float x\r\nproperty int y\r\n"
+                   "property float scalar_Intensity\r\nproperty uint t\r\n"
+                   "element face 1\r\nproperty list uchar int vertex_index\r\n"
+                   "end_header\r\n"
+                   "2 5 6 1.5\r\n"
+                   "0.25 63 2 9 9 -1e3 4 0.5 4000000000\r\n"
+                   "nan 0 0 +2 -5 1 0\r\n"
+                   "3 0 1 2\r\n");
   REQUIRE(file.positions.size() == 2);
   CHECK(file.positions[0] == Eigen::Vector3d(-1000.0, 4.0, 0.25));
   CHECK(file.positions[1].head<2>() == Eigen::Vector2d(2.0, -5.0));
@@ -162,18 +149,19 @@ TEST_CASE("PLY: binary of both byte orders, all types, lists before and within")
            order(v(3.5)) + order(v(std::uint32_t{4000000000U})) + order(v(691234.125)) +
            order(v(-2.5F)) + v(std::int8_t{-7}) + order(v(0.1));
   };
-  check(read("le.ply", "ply\nformat binary_little_endian 1.0\n" + types +
-                           build([](std::string s) { return s; })));
-  check(read("be.ply", "ply\nformat binary_big_endian 1.0\n" + types + build(reversed)));
+  check(read_file_of("le.ply", "ply\nformat binary_little_endian 1.0\n" + types +
+                                   build([](std::string s) { return s; })));
+  check(read_file_of("be.ply", "ply\nformat binary_big_endian 1.0\n" + types + build(reversed)));
 }
 
 TEST_CASE("PCD: ascii, with a field to skip and a viewpoint") {
-  const PointFile file = read("a.pcd",
-                              "# .PCD v0.7\nVERSION .7\nFIELDS x y z normal ring label\n"
-                              "SIZE 4 4 4 4 2 4\nTYPE F F F F U U\nCOUNT 1 1 1 2 1 1\nWIDTH 2\n"
-                              "HEIGHT 1\n# half a turn about z\nVIEWPOINT 1 2 3 0 0 0 1\n"
-                              "POINTS 2\nDATA ascii\n"
-                              "1 2 3 0 0 5 251\nnan nan nan 0 0 6 9\n");
+  const PointFile file =
+      read_file_of("a.pcd",
+                   "# .PCD v0.7\nVERSION .7\nFIELDS x y z normal ring label\n"
+                   "SIZE 4 4 4 4 2 4\nTYPE F F F F U U\nCOUNT 1 1 1 2 1 1\nWIDTH 2\n"
+                   "HEIGHT 1\n# half a turn about z\nVIEWPOINT 1 2 3 0 0 0 1\n"
+                   "POINTS 2\nDATA ascii\n"
+                   "1 2 3 0 0 5 251\nnan nan nan 0 0 6 9\n");
   REQUIRE(file.positions.size() == 2);
   CHECK(file.positions[0] == Eigen::Vector3d(1.0, 2.0, 3.0));
   CHECK(file.positions[1].array().isNaN().all());
@@ -184,9 +172,10 @@ TEST_CASE("PCD: ascii, with a field to skip and a viewpoint") {
 }
 
 TEST_CASE("PCD: POINTS counts if WIDTH is 0") {
-  const PointFile file = read("a.pcd",
-                              "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 0\nHEIGHT 1\nPOINTS 2\n"
-                              "DATA ascii\n1 2 3\n4 5 6\n");
+  const PointFile file =
+      read_file_of("a.pcd",
+                   "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 0\nHEIGHT 1\nPOINTS 2\n"
+                   "DATA ascii\n1 2 3\n4 5 6\n");
   REQUIRE(file.positions.size() == 2);
   CHECK(file.positions[1] == Eigen::Vector3d(4.0, 5.0, 6.0));
 }
@@ -201,24 +190,26 @@ TEST_CASE("PCD: binary and compressed files hold equal points") {
     CHECK(file.positions[1] == Eigen::Vector3d(4.0, 5.0, 6.0));
     CHECK(file.time == std::vector<double>{0.25, 0.5});
   };
-  check(read("a.pcd", header + "binary\n" + packed(1.0F) + "abc" + packed(2.0F, 3.0F, 0.25) +
-                          packed(4.0F) + "def" + packed(5.0F, 6.0F, 0.5)));
+  check(read_file_of("a.pcd", header + "binary\n" + packed(1.0F) + "abc" +
+                                  packed(2.0F, 3.0F, 0.25) + packed(4.0F) + "def" +
+                                  packed(5.0F, 6.0F, 0.5)));
   // Field after field, stored in literals of at most 32 bytes.
   const std::string plain =
       packed(1.0F, 4.0F) + "abcdef" + packed(2.0F, 5.0F, 3.0F, 6.0F) + packed(0.25, 0.5);
   REQUIRE(plain.size() == 46);
   const std::string compressed =
       std::string(1, 31) + plain.substr(0, 32) + std::string(1, 13) + plain.substr(32);
-  check(read("a.pcd", header + "binary_compressed\n" +
-                          packed(std::uint32_t{48}, std::uint32_t{46}) + compressed));
+  check(read_file_of("a.pcd", header + "binary_compressed\n" +
+                                  packed(std::uint32_t{48}, std::uint32_t{46}) + compressed));
 }
 
 TEST_CASE("Empty clouds") {
-  CHECK(read("a.ply", "ply\nformat ascii 1.0\nelement vertex 0\n" + kPlyXyz).positions.empty());
-  CHECK(read("a.pcd", pcd_header("0", "ascii")).positions.empty());
-  CHECK(read("a.pcd", pcd_header("0", "binary")).positions.empty());
-  CHECK(
-      read("a.pcd", pcd_header("0", "binary_compressed") + std::string(8, '\0')).positions.empty());
+  CHECK(read_file_of("a.ply", "ply\nformat ascii 1.0\nelement vertex 0\n" + kPlyXyz)
+            .positions.empty());
+  CHECK(read_file_of("a.pcd", pcd_header("0", "ascii")).positions.empty());
+  CHECK(read_file_of("a.pcd", pcd_header("0", "binary")).positions.empty());
+  const std::string no_sizes(8, '\0');
+  CHECK(read_file_of("a.pcd", pcd_header("0", "binary_compressed") + no_sizes).positions.empty());
 }
 
 TEST_CASE("Malformed point files are refused with position and expectation") {
@@ -226,7 +217,7 @@ TEST_CASE("Malformed point files are refused with position and expectation") {
   const auto check = [](const std::string& name, const Cases& cases) {
     for (const auto& [content, expected] : cases) {
       CAPTURE(content.substr(0, 200));
-      CHECK_THAT(error(name, content), ContainsSubstring(expected));
+      CHECK_THAT(refusal_of(name, content), ContainsSubstring(expected));
     }
   };
   const std::string ply = "ply\nformat ascii 1.0\n";

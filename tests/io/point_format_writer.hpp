@@ -1,10 +1,39 @@
-// Point files of LAS and NumPy for tests, byte by byte.
+// Point files of LAS and NumPy for tests, byte by byte, and what their reader says.
 #pragma once
 
-#include "ros_writer.hpp"
+#include "dynains/errors.hpp"
+#include "dynains/io/point_file.hpp"
+#include "files.hpp"
+#include "support/catch.hpp"
 #include "support/standard.hpp"
 
 namespace dynains::test {
+
+/// The points of a file with this content; its header must announce them.
+inline PointFile read_file_of(const std::string& name, const std::string& content) {
+  const TemporaryFolder folder;
+  write_text(folder / name, content);
+  PointFile points = read_points(folder / name);
+  const PointFileHeader header = read_point_file_header(folder / name);
+  CHECK(header.point_count == points.positions.size());
+  if (points.positions.empty()) return points;
+  CHECK(header.columns.intensity == !points.intensity.empty());
+  CHECK(header.columns.ring == !points.ring.empty());
+  CHECK(header.columns.time == !points.time.empty());
+  CHECK(header.columns.label == !points.label.empty());
+  return points;
+}
+
+/// The message, which begins with the path, that refuses a file with this content.
+inline std::string refusal_of(const std::string& name, const std::string& content) {
+  const TemporaryFolder folder;
+  write_text(folder / name, content);
+  const std::string text = message_of<IoError>([&] { read_points(folder / name); });
+  CHECK_THAT(text, StartsWith((folder / name).string()));
+  return text;
+}
+
+inline std::string zeros(std::size_t count) { return std::string(count, '\0'); }
 
 /// An array of NumPy. `shape` as in the header, for example "(2, 3)".
 inline std::string npy_file(const std::string& descr, const std::string& shape,
@@ -13,11 +42,8 @@ inline std::string npy_file(const std::string& descr, const std::string& shape,
       "{'descr': " + descr + ", 'fortran_order': " + order + ", 'shape': " + shape + ", }";
   while ((10 + header.size() + 1) % 64 != 0) header += ' ';
   header += '\n';
-  return ByteWriter()
-      .raw(std::string("\x93NUMPY\1\0", 8))
-      .number(static_cast<std::uint16_t>(header.size()))
-      .raw(header + data)
-      .bytes();
+  return packed(std::string("\x93NUMPY\1\0", 8), static_cast<std::uint16_t>(header.size()), header,
+                data);
 }
 
 struct LasParts {
@@ -29,35 +55,24 @@ struct LasParts {
 };
 
 inline std::string extra_bytes(const std::string& name, std::uint8_t type) {
-  return ByteWriter()
-      .raw(std::string(2, '\0'))
-      .number(type)
-      .raw(std::string(1, '\0') + name + std::string(32 - name.size(), '\0'))
-      .raw(std::string(156, '\0'))
-      .bytes();
+  return packed(zeros(2), type, '\0', name, zeros(32 - name.size() + 156));
 }
 
 /// LAS with scale 0.01 and offset 100, 200, 300.
 inline std::string las_file(const LasParts& parts, const std::string& points) {
   const std::uint16_t header_size = parts.minor < 4 ? 227 : 375;
-  ByteWriter vlr;
+  std::string vlr;
   if (!parts.extra_bytes.empty()) {
-    vlr.raw(std::string(2, '\0') + "LASF_Spec" + std::string(7, '\0'));
-    vlr.number(std::uint16_t{4}).number(static_cast<std::uint16_t>(parts.extra_bytes.size()));
-    vlr.raw(std::string(32, '\0') + parts.extra_bytes);
+    const auto size = static_cast<std::uint16_t>(parts.extra_bytes.size());
+    vlr = packed(zeros(2), "LASF_Spec", zeros(7), std::uint16_t{4}, size, zeros(32),
+                 parts.extra_bytes);
   }
-  ByteWriter out;
-  out.raw("LASF" + std::string(20, '\0')).number(std::uint8_t{1}).number(parts.minor);
-  out.raw(std::string(68, '\0')).number(header_size);
-  out.number(static_cast<std::uint32_t>(header_size + vlr.bytes().size()));
-  out.number(parts.extra_bytes.empty() ? 0U : 1U).number(parts.format).number(parts.point_size);
-  out.number(parts.minor < 4 ? parts.count : 0U).raw(std::string(20, '\0'));
-  for (const double value : {0.01, 0.01, 0.01, 100.0, 200.0, 300.0}) out.number(value);
-  out.raw(std::string(48, '\0'));
-  if (parts.minor == 4) {
-    out.raw(std::string(20, '\0')).number(std::uint64_t{parts.count}).raw(std::string(120, '\0'));
-  }
-  return out.raw(vlr.bytes() + points).bytes();
+  std::string out = packed("LASF", zeros(20), std::uint8_t{1}, parts.minor, zeros(68), header_size);
+  out += packed(static_cast<std::uint32_t>(header_size + vlr.size()), vlr.empty() ? 0U : 1U);
+  out += packed(parts.format, parts.point_size, parts.minor < 4 ? parts.count : 0U, zeros(20));
+  out += bytes_of<double>({0.01, 0.01, 0.01, 100.0, 200.0, 300.0}) + zeros(48);
+  if (parts.minor == 4) out += packed(zeros(20), std::uint64_t{parts.count}, zeros(120));
+  return out + vlr + points;
 }
 
 }  // namespace dynains::test

@@ -16,28 +16,6 @@ namespace {
 
 using Position = Eigen::Vector3d;
 
-PointFile read(const std::string& name, const std::string& content) {
-  const TemporaryFolder folder;
-  const fs::path path = folder / name;
-  write_text(path, content);
-  PointFile points = read_points(path);
-  const PointFileHeader header = read_point_file_header(path);
-  CHECK(header.point_count == points.positions.size());
-  CHECK(header.columns.intensity == !points.intensity.empty());
-  CHECK(header.columns.ring == !points.ring.empty());
-  CHECK(header.columns.time == !points.time.empty());
-  CHECK(header.columns.label == !points.label.empty());
-  return points;
-}
-
-std::string error(const std::string& name, const std::string& content) {
-  const TemporaryFolder folder;
-  write_text(folder / name, content);
-  const std::string text = message_of<IoError>([&] { read_points(folder / name); });
-  CHECK_THAT(text, StartsWith((folder / name).string()));
-  return text;
-}
-
 const std::string kTwoPoints = bytes_of<float>({1, 2, 3, 0.5F, 4, 5, 6, 0.25F});
 const std::string kFields =
     "[('x', '<f8'), ('y', '<f8'), ('z', '<f8'), ('name', '<U2'), "
@@ -45,14 +23,7 @@ const std::string kFields =
     "('label', '|u1')]";
 
 std::string structured_point(double x, char ring, std::int64_t time, std::uint8_t label) {
-  return ByteWriter()
-      .number(x)
-      .number(2.0)
-      .number(3.0)
-      .raw(std::string(16, '\0') + '\0' + ring)
-      .number(time)
-      .number(label)
-      .bytes();
+  return packed(x, 2.0, 3.0, zeros(17), ring, time, label);
 }
 
 void check_two_points(const PointFile& points) {
@@ -63,34 +34,30 @@ void check_two_points(const PointFile& points) {
 }
 
 std::string las_points(const LasParts& parts, std::uint8_t label) {
-  std::string record = ByteWriter()
-                           .number(std::int32_t{150})
-                           .number(std::int32_t{-1})
-                           .number(std::int32_t{2000000000})
-                           .number(std::uint16_t{700})
-                           .bytes();
+  std::string record =
+      packed(std::int32_t{150}, std::int32_t{-1}, std::int32_t{2000000000}, std::uint16_t{700});
   record.resize(parts.format < 6 ? 20 : 22, '\0');
-  record += ByteWriter().number(1234.5).bytes();
+  record += packed(1234.5);
   record.resize(parts.point_size - 3U, '\0');
-  return record + ByteWriter().number(std::uint16_t{17}).number(label).bytes();
+  return record + packed(std::uint16_t{17}, label);
 }
 
 }  // namespace
 
 TEST_CASE("NumPy: rows of x y z and intensity") {
-  check_two_points(read("a.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)));
+  check_two_points(read_file_of("a.npy", npy_file("'<f4'", "(2, 4)", kTwoPoints)));
   const std::string columns = bytes_of<double>({1, 4, 2, 5, 3, 6, 0.5, 0.25});
-  check_two_points(read("a.NPY", npy_file("'<f8'", "(2, 4)", columns, "True")));
+  check_two_points(read_file_of("a.NPY", npy_file("'<f8'", "(2, 4)", columns, "True")));
   // An image of points, and integers.
-  const PointFile image = read("a.npy", npy_file("'|i1'", "(2, 1, 3)", "\1\2\3\4\5\6"));
+  const PointFile image = read_file_of("a.npy", npy_file("'|i1'", "(2, 1, 3)", "\1\2\3\4\5\6"));
   CHECK(image.positions[1] == Position(4, 5, 6));
   CHECK(image.intensity.empty());
-  CHECK(read("a.npy", npy_file("'<f4'", "(0, 3)", "")).positions.empty());
+  CHECK(read_file_of("a.npy", npy_file("'<f4'", "(0, 3)", "")).positions.empty());
 }
 
 TEST_CASE("NumPy: a structured array has columns by name") {
   const std::string data = structured_point(1e7, 5, -3, 9) + structured_point(1.5, 6, 1LL << 52, 0);
-  const PointFile points = read("a.npy", npy_file(kFields, "(2,)", data));
+  const PointFile points = read_file_of("a.npy", npy_file(kFields, "(2,)", data));
   CHECK(points.positions[0] == Position(1e7, 2, 3));
   CHECK(points.ring == std::vector<std::uint16_t>{5, 6});
   CHECK(points.time == std::vector<double>{-3.0, 4503599627370496.0});
@@ -99,7 +66,7 @@ TEST_CASE("NumPy: a structured array has columns by name") {
 
 TEST_CASE("NumPy: malformed arrays are refused with the reason") {
   const auto check = [](const std::string& content, const std::string& expected) {
-    CHECK_THAT(error("a.npy", content), ContainsSubstring(expected));
+    CHECK_THAT(refusal_of("a.npy", content), ContainsSubstring(expected));
   };
   const std::string xyz = std::string(24, '\0');
   check("", "magic bytes of an array");
@@ -141,7 +108,7 @@ TEST_CASE("LAS: versions and point formats with scale, offset, time and extra by
         LasParts{4, 6, "", 40, 1},
         LasParts{4, 7, extra_bytes("ring", 3) + extra_bytes("label", 1), 39, 1}}) {
     CAPTURE(int(parts.format));
-    const PointFile points = read("a.las", las_file(parts, las_points(parts, 9)));
+    const PointFile points = read_file_of("a.las", las_file(parts, las_points(parts, 9)));
     REQUIRE(points.positions.size() == 1);
     CHECK(points.positions[0].isApprox(Position(101.5, 199.99, 20000300.0), 1e-12));
     if (parts.point_size > 22) CHECK(points.intensity[0] == 700.0F);
@@ -156,12 +123,13 @@ TEST_CASE("LAS: malformed files are refused with position and reason") {
   const LasParts good;
   const std::string whole = las_file(good, las_points(good, 9));
   const auto check = [](LasParts parts, const std::string& points, const std::string& expected) {
-    CHECK_THAT(error("a.las", las_file(parts, points)), ContainsSubstring(expected));
+    CHECK_THAT(refusal_of("a.las", las_file(parts, points)), ContainsSubstring(expected));
   };
-  CHECK_THAT(error("a.las", "LASX"), ContainsSubstring("byte 0: expected LASF"));
-  CHECK_THAT(error("a.las", whole.substr(0, 100)),
+  CHECK_THAT(refusal_of("a.las", "LASX"), ContainsSubstring("byte 0: expected LASF"));
+  CHECK_THAT(refusal_of("a.las", whole.substr(0, 100)),
              ContainsSubstring("a.las: byte 100: expected 4 bytes"));
-  for (std::size_t size = 0; size < whole.size(); ++size) error("a.las", whole.substr(0, size));
+  for (std::size_t size = 0; size < whole.size(); ++size)
+    refusal_of("a.las", whole.substr(0, size));
   check({5, 1, "", 28, 1}, "", "found 1.5");
   check({4, 11, "", 28, 1}, "", "point format from 0 to 10");
   check({4, 0x86, "", 30, 1}, "", "pdal translate IN.laz OUT.las");
@@ -175,26 +143,26 @@ TEST_CASE("LAS: malformed files are refused with position and reason") {
 }
 
 TEST_CASE("Text: columns by order or by name, with any separator") {
-  check_two_points(read("a.xyz", "1 2 3 0.5\n\n4 5 6 .25\n"));
-  check_two_points(read("a.csv", "1,2,3,0.5,9\r\n4, 5, 6, 0.25, 9"));
-  check_two_points(
-      read("a.csv", "\"X\";\"Y\";\"Z\";\"colour\";\"Intensity\"\n1;2;3;9;0.5\n4;5;6;9;0.25\n"));
-  check_two_points(read(
+  check_two_points(read_file_of("a.xyz", "1 2 3 0.5\n\n4 5 6 .25\n"));
+  check_two_points(read_file_of("a.csv", "1,2,3,0.5,9\r\n4, 5, 6, 0.25, 9"));
+  check_two_points(read_file_of(
+      "a.csv", "\"X\";\"Y\";\"Z\";\"colour\";\"Intensity\"\n1;2;3;9;0.5\n4;5;6;9;0.25\n"));
+  check_two_points(read_file_of(
       "a.csv", "Points_m_XYZ:0,Points_m_XYZ:1,Points_m_XYZ:2,intensity\n1,2,3,0.5\n4,5,6,0.25\n"));
-  check_two_points(read("a.xyz", "# x y z i\n# a comment\n1 2 3 0.5\n4 5 6 0.25\n"));
-  check_two_points(read("a.xyz", "//X Y Z intensity\n1 2 3 0.5\n4 5 6 0.25\n"));
-  check_two_points(read("a.xyz", "# from a scanner\n1 2 3 0.5\n4 5 6 0.25\n"));
-  const PointFile points = read("a.csv", "time,label,ring,z,y,x\n1e9,251,7,3,2,1\n");
+  check_two_points(read_file_of("a.xyz", "# x y z i\n# a comment\n1 2 3 0.5\n4 5 6 0.25\n"));
+  check_two_points(read_file_of("a.xyz", "//X Y Z intensity\n1 2 3 0.5\n4 5 6 0.25\n"));
+  check_two_points(read_file_of("a.xyz", "# from a scanner\n1 2 3 0.5\n4 5 6 0.25\n"));
+  const PointFile points = read_file_of("a.csv", "time,label,ring,z,y,x\n1e9,251,7,3,2,1\n");
   CHECK(points.positions[0] == Position(1, 2, 3));
   CHECK(points.time == std::vector<double>{1e9});
   CHECK(points.label == std::vector<std::uint32_t>{251});
   CHECK(points.ring == std::vector<std::uint16_t>{7});
-  CHECK(read("a.csv", "x,y,z\n").positions.empty());
+  CHECK(read_file_of("a.csv", "x,y,z\n").positions.empty());
 }
 
 TEST_CASE("Text: malformed lines are refused with their number") {
   const auto check = [](const std::string& content, const std::string& expected) {
-    CHECK_THAT(error("a.csv", content), ContainsSubstring(expected));
+    CHECK_THAT(refusal_of("a.csv", content), ContainsSubstring(expected));
   };
   check("", "expected at least one point");
   check("# nothing\n", "expected at least one point");
@@ -244,7 +212,7 @@ TEST_CASE("A known format that is not read gets its name and the way to convert 
     CHECK_THAT(of_folder, ContainsSubstring(name + ": ") && ContainsSubstring(expected));
     const auto of_file = message_of<IoError>([&] { Recording recording(folder / name); });
     CHECK_THAT(of_file, StartsWith((folder / name).string()) && ContainsSubstring(expected));
-    CHECK_THAT(error(name, ""), ContainsSubstring(expected));
+    CHECK_THAT(refusal_of(name, ""), ContainsSubstring(expected));
   }
   const TemporaryFolder dump;
   write_text(dump / "000000" / "points_compact.bin", std::string(24, '\0'));

@@ -11,14 +11,17 @@ using namespace dynains::test;
 namespace {
 
 /// A scan of points around `centre`, as PCD; `viewpoint` is the line after the keyword.
-std::string pcd(const Eigen::Vector3d& centre, const std::string& viewpoint = "0 0 0 1 0 0 0") {
+std::string pcd(const Eigen::Vector3d& centre, const std::string& viewpoint = "0 0 0 1 0 0 0",
+                const std::vector<double>& intensities = {0.5, 0.5, 0.5}) {
   std::string text =
       "VERSION 0.7\nFIELDS x y z intensity ring time\nSIZE 8 8 8 4 2 8\nTYPE F F F F U F\n"
       "COUNT 1 1 1 1 1 1\nWIDTH 3\nHEIGHT 1\nVIEWPOINT " +
       viewpoint + "\nPOINTS 3\nDATA ascii\n";
   for (const int i : {1, 2, 3}) {
     text += std::to_string(centre.x() + i) + ' ' + std::to_string(centre.y()) + ' ' +
-            std::to_string(centre.z()) + " 0.5 " + std::to_string(i) + " 7.25\n";
+            std::to_string(centre.z()) + ' ' +
+            std::to_string(intensities[static_cast<std::size_t>(i - 1)]) + ' ' + std::to_string(i) +
+            " 7.25\n";
   }
   return text;
 }
@@ -77,39 +80,30 @@ TEST_CASE("Scans in the world frame with VIEWPOINT come back in the sensor frame
   const RecordedScan scan = recording.read_scan(1);
   REQUIRE(scan.size() == 3);
   // One metre along x of the world is one metre along -y of the sensor.
-  CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
-            .isApprox(Eigen::Vector3f(0.0F, -1.0F, 0.0F), 1e-5F));
+  CHECK(scan.point(0).position.isApprox(Eigen::Vector3d(0, -1, 0), 1e-5));
   CHECK(scan.xyzi[3] == 0.5F);
   CHECK(scan.ring == std::vector<std::uint16_t>{1, 2, 3});
   CHECK(scan.time == std::vector<double>{7.25, 7.25, 7.25});
 }
 
 TEST_CASE("Intensities 0 and 1 of scans with VIEWPOINT are labels, others are not") {
-  const auto labelled = [](const std::string& intensities, const std::string& viewpoint) {
-    std::string text =
-        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH "
-        "3\nHEIGHT 1\nVIEWPOINT " +
-        viewpoint + "\nPOINTS 3\nDATA ascii\n";
-    std::istringstream values(intensities);
-    for (std::string value; values >> value;) text += "100 0 0 " + value + '\n';
-    return text;
-  };
+  using Intensities = std::vector<double>;
   const std::string placed = "100 0 0 1 0 0 0";
-  const auto labels_of = [&](const std::string& first, const std::string& second) {
+  const auto labels_of = [&](const Intensities& first, const Intensities& second) {
     const TemporaryFolder folder;
-    write_text(folder / "pcd/1.pcd", labelled(first, placed));
-    write_text(folder / "pcd/2.pcd", labelled(second, placed));
+    write_text(folder / "pcd/1.pcd", pcd({100, 0, 0}, placed, first));
+    write_text(folder / "pcd/2.pcd", pcd({100, 0, 0}, placed, second));
     const Recording recording(folder.path());
     return recording.has_labels() ? recording.read_labels(1) : std::vector<std::uint32_t>();
   };
-  CHECK(labels_of("0 0 0", "0 1 0") == std::vector<std::uint32_t>{99, 259, 99});
-  CHECK(labels_of("0 0 0", "0 0.5 1").empty());
-  CHECK(labels_of("0 0 0", "0 0 0").empty());
-  CHECK(labels_of("1 1 1", "1 1 1").empty());
+  CHECK(labels_of({0, 0, 0}, {0, 1, 0}) == std::vector<std::uint32_t>{99, 259, 99});
+  CHECK(labels_of({0, 0, 0}, {0, 0.5, 1}).empty());
+  CHECK(labels_of({0, 0, 0}, {0, 0, 0}).empty());
+  CHECK(labels_of({1, 1, 1}, {1, 1, 1}).empty());
 
   const TemporaryFolder folder;
-  write_text(folder / "pcd/1.pcd", labelled("0 1 0", "0 0 0 1 0 0 0"));
-  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "pcd/1.pcd", pcd({100, 0, 0}, "0 0 0 1 0 0 0", {0, 1, 0}));
+  write_text(folder / "poses.txt", pose_row());
   CHECK_FALSE(Recording(folder.path()).has_labels());
 }
 
@@ -151,9 +145,8 @@ TEST_CASE(
     write_text(folder / "a1.pcd", pcd({4, 5, 6}));
     write_text(folder / "poses.txt", "0 -1 0 10 1 0 0 20 0 0 1 30\n");
     const Recording recording(folder.path(), options);
-    const RecordedScan scan = recording.read_scan(0);
-    CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
-              .isApprox(Eigen::Vector3f(4.0F, 5.0F, 4.5F)));
+    const Eigen::Vector3d first = recording.read_scan(0).point(0).position;
+    CHECK(first.isApprox(Eigen::Vector3d(4.0, 5.0, 4.5), 1e-5));
     CHECK(recording.T_world_sensor(0).translation().isApprox(Eigen::Vector3d(10.0, 21.0, 31.5)));
     CHECK(tells(recording, "the sensor is at (1 0 1.5) m in the frame of the clouds"));
   }
@@ -161,9 +154,8 @@ TEST_CASE(
     write_text(folder / "a1.pcd", pcd({100, 0, 0}, "100 0 0 1 0 0 0"));
     options.frame = PointFrame::kWorld;
     const Recording recording(folder.path(), options);
-    const RecordedScan scan = recording.read_scan(0);
-    CHECK(Eigen::Vector3f(scan.xyzi[0], scan.xyzi[1], scan.xyzi[2])
-              .isApprox(Eigen::Vector3f(0.0F, 0.0F, -1.5F)));
+    const Eigen::Vector3d first = recording.read_scan(0).point(0).position;
+    CHECK(first.isApprox(Eigen::Vector3d(0.0, 0.0, -1.5), 1e-5));
   }
   SECTION("a position that no sensor has") {
     write_text(folder / "a1.pcd", pcd({4, 5, 6}, "1 0 0 1 0 0 0"));
@@ -179,7 +171,7 @@ TEST_CASE(
 TEST_CASE("Options of another kind of recording are refused") {
   const TemporaryFolder folder;
   write_text(folder / "a1.ply", ply());
-  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "poses.txt", pose_row());
   const auto refusal = [&](auto&& set) {
     RecordingOptions options;
     set(options);
@@ -249,9 +241,8 @@ TEST_CASE("A pose that no map can take is refused with its file and scan") {
   write_text(folder / "a.pcd", pcd({0, 0, 0}));
   write_text(folder / "b.pcd", pcd({0, 0, 0}));
   for (const bool is_far : {false, true}) {
-    write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 " +
-                                         std::string(is_far ? "1e300" : "2e7") +
-                                         " 0 1 0 0 0 0 1 0\n");
+    const std::string far_row = "1 0 0 1e300 0 1 0 0 0 0 1 0\n";
+    write_text(folder / "poses.txt", pose_row() + (is_far ? far_row : pose_row(2e7)));
     const std::string error = error_of(folder.path());
     if (is_far) {
       CHECK_THAT(error, StartsWith((folder / "poses.txt").string() + ": pose of scan b: ") &&
@@ -280,9 +271,7 @@ TEST_CASE("A shift gives every scan the pose of a neighbour") {
 TEST_CASE("calib.txt and times.txt are beside the poses or in the folder") {
   const TemporaryFolder folder;
   const fs::path scans = folder / "velodyne";
-  for (const char* name : {"000000", "000001"}) {
-    write_text(scans / (std::string(name) + ".bin"), std::string(32, 'a'));
-  }
+  write_scans(scans, {"000000", "000001"});
   write_text(folder / "calib.txt", "Tr: 0 -1 0 0.1 0 0 -1 -0.5 1 0 0 0\n");
   write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 2\n");
   write_text(folder / "times.txt", "0\n0.25\n");
@@ -328,7 +317,7 @@ TEST_CASE("A calib.txt that cannot be read is an error for poses of a camera onl
   RecordingOptions options;
   options.convention.frame = PoseFrame::kCamera;
   CHECK_THAT(error_of(folder.path(), options), ContainsSubstring("calib.txt"));
-  write_text(folder / "poses.txt", "1 0 0 7 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "poses.txt", pose_row(7));
   CHECK_THAT(error_of(folder.path()), ContainsSubstring("calib.txt"));
   options.convention.frame = PoseFrame::kLidar;
   CHECK(Recording(folder.path(), options).T_world_sensor(0).translation().x() == 7.0);
@@ -435,13 +424,11 @@ std::string raw_scan(int columns, int points = 300) {
   return bytes;
 }
 
-std::string row12(double x) { return "1 0 0 " + std::to_string(x) + " 0 1 0 0 0 0 1 0\n"; }
-
 }  // namespace
 
 TEST_CASE("Raw scans with other columns are refused with the option, and read with it") {
   const TemporaryFolder folder;
-  write_text(folder / "poses.txt", row12(0));
+  write_text(folder / "poses.txt", pose_row(0));
   const fs::path file = folder / "velodyne/000000.bin";
   struct Case {
     std::string bytes;
@@ -506,7 +493,7 @@ TEST_CASE("Files of scans that are cut off are left out on demand") {
   for (const char* name : {"1.pcd", "2.pcd", "3.pcd"}) {
     write_text(folder / name, pcd({-0.5, 0, 0}, std::string("10") + name[0] + " 0 0 1 0 0 0"));
   }
-  fs::resize_file(folder / "2.pcd", fs::file_size(folder / "2.pcd") - 90);
+  fs::resize_file(folder / "2.pcd", fs::file_size(folder / "2.pcd") - 100);
   CHECK_THAT(error_of(folder.path()), ContainsSubstring("2.pcd"));
   RecordingOptions options;
   options.accept_missing = true;
@@ -556,15 +543,14 @@ TEST_CASE("Coordinates in millimetres become metres, also in the world frame") {
 
 TEST_CASE("Poses may begin with a mark of UTF-8") {
   const TemporaryFolder folder;
-  write_text(folder / "velodyne/000000.bin", std::string(16, 'B'));
-  for (const std::string& rows : {row12(7), tum(1, 7)}) {
-    write_text(folder / "poses.txt", "\xEF\xBB\xBF" + rows);
+  const std::string kMark = "\xEF\xBB\xBF";
+  write_scans(folder / "velodyne", {"000000"});
+  for (const std::string& rows : {pose_row(7), tum(1, 7)}) {
+    write_text(folder / "poses.txt", kMark + rows);
     CHECK(Recording(folder.path()).T_world_sensor(0).translation().x() == 7.0);
   }
-  write_text(folder / "poses.txt", row12(7));
-  write_text(folder / "times.txt",
-             "\xEF\xBB\xBF"
-             "2.5\n");
+  write_text(folder / "poses.txt", pose_row(7));
+  write_text(folder / "times.txt", kMark + "2.5\n");
   CHECK(Recording(folder.path()).time(0) == 2.5);
 }
 
@@ -572,14 +558,15 @@ TEST_CASE("Rows of KITTI-360 belong to the scans of their number") {
   const TemporaryFolder folder;
   const std::string scans = GENERATE("velodyne", "velodyne_points/data");
   write_scans(folder / scans, {"0000000001", "0000000002", "0000000004"});
-  write_text(folder / "poses.txt", "1 " + row12(10) + "3 " + row12(30) + "4 " + row12(40));
+  write_text(folder / "poses.txt", "1 " + pose_row(10) + "3 " + pose_row(30) + "4 " + pose_row(40));
   const Recording recording(folder.path());
   REQUIRE(recording.size() == 2);
   CHECK(recording.T_world_sensor(1).translation().x() == 40.0);
   CHECK(recording.time(1) - recording.time(0) == Approx(0.3));
   CHECK(recording.missing_pose_count() == 1);
   // Times of a matrix are no numbers of scans.
-  write_text(folder / "poses.txt", "0.5 " + row12(10) + "1.5 " + row12(30) + "4 " + row12(40));
+  write_text(folder / "poses.txt",
+             "0.5 " + pose_row(10) + "1.5 " + pose_row(30) + "4 " + pose_row(40));
   CHECK(Recording(folder.path()).time(2) == 4.0);
 }
 
@@ -619,7 +606,7 @@ TEST_CASE("Names of 19 digits are times") {
   const TemporaryFolder folder;
   write_scans(folder / "velodyne", {"1566535940000000000", "1566535940100000000"});
   write_text(folder / "poses.txt",
-             "1566535940000000000 " + row12(1) + "1566535940100000000 " + row12(2));
+             "1566535940000000000 " + pose_row(1) + "1566535940100000000 " + pose_row(2));
   const Recording recording(folder.path());
   REQUIRE(recording.size() == 2);
   CHECK(recording.time(1) - recording.time(0) == Approx(0.1));
@@ -629,10 +616,10 @@ TEST_CASE("Names of 19 digits are times") {
 TEST_CASE("Folders of SC-LIO-SAM and KITTI raw are read") {
   const TemporaryFolder folder;
   write_text(folder / "sc/Scans/000000.pcd", pcd({1, 0, 0}));
-  write_text(folder / "sc/optimized_poses.txt", row12(3));
+  write_text(folder / "sc/optimized_poses.txt", pose_row(3));
   CHECK(Recording(folder / "sc").T_world_sensor(0).translation().x() == 3.0);
 
   write_text(folder / "raw/velodyne_points/data/0000000000.bin", std::string(16, 'B'));
-  write_text(folder / "raw/poses.txt", row12(4));
+  write_text(folder / "raw/poses.txt", pose_row(4));
   CHECK(Recording(folder / "raw").T_world_sensor(0).translation().x() == 4.0);
 }

@@ -14,13 +14,9 @@ namespace {
 
 constexpr MessageEncoding kBoth[] = {MessageEncoding::kRos1, MessageEncoding::kCdr};
 
-SerialisedMessage view(const std::string& bytes, MessageEncoding encoding) {
-  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), encoding, "log: /t"};
-}
-
 RecordedScan decode(const std::string& bytes, MessageEncoding encoding) {
   RecordedScan scan;
-  read_cloud("sensor_msgs/PointCloud2", view(bytes, encoding), scan);
+  read_cloud("sensor_msgs/PointCloud2", serialised(bytes, encoding), scan);
   return scan;
 }
 
@@ -28,19 +24,19 @@ RecordedScan decode(const std::string& bytes, MessageEncoding encoding) {
 
 TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
   for (const MessageEncoding encoding : kBoth) {
-    ByteWriter data;
+    std::string data;
     for (int i = 0; i < 3; ++i) {
-      data.number(1.5 + i).number(2.5).number(-3.5);         // double x y z
-      data.number(static_cast<std::uint16_t>(40 + i));       // ring
-      data.number(static_cast<std::uint8_t>(200));           // intensity
-      data.number(static_cast<std::uint32_t>(1000000 * i));  // offset in ns
-      data.raw("?");                                         // padding
+      data += packed(1.5 + i, 2.5, -3.5,                        // double x y z
+                     static_cast<std::uint16_t>(40 + i),        // ring
+                     static_cast<std::uint8_t>(200),            // intensity
+                     static_cast<std::uint32_t>(1000000 * i));  // offset in ns
+      data += '?';                                              // padding
     }
     const std::vector<CloudField> fields = {
         {"z", 16, 8}, {"y", 8, 8},       {"x", 0, 8}, {"ring", 24, 4}, {"reflectivity", 26, 2},
         {"t", 27, 6}, {"unknown", 31, 2}};
-    const std::string message = cloud_message(encoding, 12.25, "/lidar", fields, 32, data.bytes());
-    const CloudInfo info = inspect_cloud("sensor_msgs/PointCloud2", view(message, encoding));
+    const std::string message = cloud_message(encoding, 12.25, "/lidar", fields, 32, data);
+    const CloudInfo info = inspect_cloud("sensor_msgs/PointCloud2", serialised(message, encoding));
     CHECK(info.time == 12.25);
     CHECK(info.frame == "lidar");
     CHECK(info.points == 3);
@@ -60,17 +56,8 @@ TEST_CASE("Clouds of any layout are read, from ROS 1 and ROS 2") {
 TEST_CASE("Clouds may be big-endian, and their row step may be that of another cloud") {
   const auto message = [](std::uint8_t is_big_endian, std::uint32_t row_step, std::uint32_t rows,
                           const std::string& data) {
-    MessageWriter out(MessageEncoding::kRos1);
-    out.header(nanoseconds(1.0), "l")
-        .number(rows)
-        .number(std::uint32_t{2})
-        .number(std::uint32_t{3});
-    for (const CloudField& field : kXyz) {
-      out.string(field.name).number(field.offset).number(field.type).number(std::uint32_t{1});
-    }
-    out.number(is_big_endian).number(std::uint32_t{12}).number(row_step);
-    out.number(static_cast<std::uint32_t>(data.size())).raw(data).number(std::uint8_t{1});
-    return out.bytes();
+    return cloud_message(MessageEncoding::kRos1, 1.0, "l", kXyz,
+                         {rows, 2, 12, row_step, is_big_endian}, data);
   };
   const std::vector<float> values = {1, 2, 3, 4, 5, 6};
   std::string swapped;
@@ -94,18 +81,15 @@ TEST_CASE("Clouds may be big-endian, and their row step may be that of another c
 TEST_CASE("Livox messages are read as clouds") {
   for (const MessageEncoding encoding : kBoth) {
     MessageWriter out(encoding);
-    out.header(nanoseconds(5.0), "livox")
-        .number(std::uint64_t{5000000000})
-        .number(std::uint32_t{2});
-    out.number(std::uint8_t{1}).raw(std::string(3, '\0'));
-    out.number(std::uint32_t{2});
+    out.header(nanoseconds(5.0), "livox").number(std::uint64_t{5000000000}).number(2U);
+    out.number(std::uint8_t{1}).raw(std::string(3, '\0')).number(2U);
     for (int i = 0; i < 2; ++i) {
       out.number(static_cast<std::uint32_t>(50000000 * i));
       for (const float value : {1.0F, 2.0F, 3.0F + static_cast<float>(i)}) out.number(value);
       out.number(std::uint8_t{99}).number(std::uint8_t{0}).number(static_cast<std::uint8_t>(i));
     }
     RecordedScan scan;
-    read_cloud("livox_ros_driver/CustomMsg", view(out.bytes(), encoding), scan);
+    read_cloud("livox_ros_driver/CustomMsg", serialised(out.bytes(), encoding), scan);
     REQUIRE(scan.size() == 2);
     CHECK(scan.xyzi[6] == 4.0F);
     CHECK(scan.xyzi[7] == 99.0F);
@@ -141,13 +125,13 @@ TEST_CASE("Malformed clouds are refused with their place") {
 TEST_CASE("Poses are read from every type") {
   const Eigen::Isometry3d T = pose_at(3.0, 0.5);
   for (const MessageEncoding encoding : kBoth) {
-    const std::string odometry = MessageWriter(encoding)
-                                     .header(nanoseconds(2.5), "/odom")
-                                     .string("base")
-                                     .pose(T)
-                                     .raw("rest")
-                                     .bytes();
-    const auto poses = read_poses("nav_msgs/Odometry", view(odometry, encoding));
+    const std::string message = MessageWriter(encoding)
+                                    .header(nanoseconds(2.5), "/odom")
+                                    .string("base")
+                                    .pose(T)
+                                    .raw("rest")
+                                    .bytes();
+    const auto poses = read_poses("nav_msgs/Odometry", serialised(message, encoding));
     REQUIRE(poses.size() == 1);
     CHECK(poses[0].time == 2.5);
     CHECK(poses[0].frame == "odom");
@@ -156,19 +140,20 @@ TEST_CASE("Poses are read from every type") {
 
     const std::string stamped =
         MessageWriter(encoding).header(nanoseconds(2.5), "map").pose(T).bytes();
-    CHECK(read_poses("geometry_msgs/PoseStamped", view(stamped, encoding))[0].child.empty());
+    CHECK(read_poses("geometry_msgs/PoseStamped", serialised(stamped, encoding))[0].child.empty());
 
     MessageWriter tf(encoding);
     tf.number(std::uint32_t{2});
     for (const char* const child : {"a", "b"})
       tf.header(nanoseconds(1.0), "map").string(child).pose(T);
-    CHECK(read_poses("tf2_msgs/TFMessage", view(tf.bytes(), encoding))[1].child == "b");
+    CHECK(read_poses("tf2_msgs/TFMessage", serialised(tf.bytes(), encoding))[1].child == "b");
   }
   Eigen::Isometry3d bad = T;
   bad.translation().x() = std::numeric_limits<double>::quiet_NaN();
   const std::string message = odometry(1, "base", bad);
-  CHECK_THAT(message_of<IoError>(
-                 [&] { read_poses("nav_msgs/Odometry", view(message, MessageEncoding::kCdr)); }),
+  CHECK_THAT(message_of<IoError>([&] {
+               read_poses("nav_msgs/Odometry", serialised(message, MessageEncoding::kCdr));
+             }),
              ContainsSubstring("a finite position and a quaternion of length 1"));
 }
 

@@ -19,23 +19,48 @@ struct CloudField {
   std::uint32_t count = 1;
 };
 
-/// sensor_msgs/PointCloud2 with one row of points.
+/// Size and order of the data of a cloud.
+struct CloudShape {
+  std::uint32_t rows, columns, point_step, row_step;
+  std::uint8_t is_big_endian = 0;
+};
+
+/// sensor_msgs/PointCloud2, with whatever its data has.
 inline std::string cloud_message(MessageEncoding encoding, double time, const std::string& frame,
-                                 const std::vector<CloudField>& fields, std::uint32_t point_step,
+                                 const std::vector<CloudField>& fields, const CloudShape& shape,
                                  const std::string& data) {
-  const auto points = static_cast<std::uint32_t>(data.size() / point_step);
   MessageWriter out(encoding);
-  out.header(nanoseconds(time), frame).number(std::uint32_t{1}).number(points);
+  out.header(nanoseconds(time), frame).number(shape.rows).number(shape.columns);
   out.number(static_cast<std::uint32_t>(fields.size()));
   for (const CloudField& field : fields) {
     out.string(field.name).number(field.offset).number(field.type).number(field.count);
   }
-  out.number(std::uint8_t{0}).number(point_step).number(points * point_step);
+  out.number(shape.is_big_endian).number(shape.point_step).number(shape.row_step);
   out.number(static_cast<std::uint32_t>(data.size())).raw(data).number(std::uint8_t{1});
   return out.bytes();
 }
 
+/// With one row of points.
+inline std::string cloud_message(MessageEncoding encoding, double time, const std::string& frame,
+                                 const std::vector<CloudField>& fields, std::uint32_t point_step,
+                                 const std::string& data) {
+  const auto points = static_cast<std::uint32_t>(data.size() / point_step);
+  return cloud_message(encoding, time, frame, fields, {1, points, point_step, points * point_step},
+                       data);
+}
+
 inline const std::vector<CloudField> kXyz = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}};
+
+/// Fields x y z of float32, and more.
+inline std::vector<CloudField> xyz_and(const std::vector<CloudField>& more) {
+  std::vector<CloudField> fields = kXyz;
+  fields.insert(fields.end(), more.begin(), more.end());
+  return fields;
+}
+
+inline SerialisedMessage serialised(const std::string& bytes, MessageEncoding encoding) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), encoding, "log: /t"};
+}
 
 inline Eigen::Isometry3d pose_at(double x, double yaw) {
   return Eigen::Translation3d(x, 1, 2) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ());
