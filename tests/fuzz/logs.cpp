@@ -20,18 +20,17 @@ const char* const kLogNames[] = {"log.mcap", "log.bag", "log.db3"};
 
 /// Two clouds with all fields, and their poses as transforms or odometry.
 std::vector<WrittenMessage> drive(MessageEncoding encoding, bool by_transforms) {
-  const std::vector<test::CloudField> fields = {{"x", 0, 7},      {"y", 4, 7},     {"z", 8, 7},
-                                                {"label", 12, 6}, {"ring", 16, 4}, {"t", 18, 6}};
-  ByteWriter points;
+  const std::vector<test::CloudField> fields =
+      test::xyz_and({{"label", 12, 6}, {"ring", 16, 4}, {"t", 18, 6}});
+  std::string points;
   for (const float x : {1.0F, 2.0F}) {
-    points.number(x).number(2.0F).number(3.0F).number(9U).number(std::uint16_t{1}).number(50U);
+    points += test::packed(x, 2.0F, 3.0F, 9U, std::uint16_t{1}, 50U);
   }
   std::vector<WrittenMessage> messages;
   for (const double time : {1.0, 1.5}) {
     const std::uint64_t at = test::nanoseconds(time);
     const Eigen::Isometry3d pose = test::pose_at(time, 0.5);
-    messages.push_back(
-        {0, at, test::cloud_message(encoding, time, "lidar", fields, 22, points.bytes())});
+    messages.push_back({0, at, test::cloud_message(encoding, time, "lidar", fields, 22, points)});
     messages.push_back({1, at,
                         by_transforms ? test::transform(time, "odom", "lidar", pose, encoding)
                                       : test::odometry(time, "lidar", pose, encoding)});

@@ -1,7 +1,7 @@
 #include "dynains/io/point_file.hpp"
 
 #include "dynains/errors.hpp"
-#include "point_format_writer.hpp"
+#include "point_file_of.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;

@@ -3,8 +3,8 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
-#include "files.hpp"
 #include "io/points/point_sink.hpp"
+#include "point_file_of.hpp"
 #include "point_format_writer.hpp"
 #include "support/catch.hpp"
 

@@ -14,16 +14,14 @@ namespace dynains::test {
 inline void write_rig_log(const Recording& rig, const std::vector<double>& delays,
                           const std::vector<Pose>& T_body_sensor,
                           const std::filesystem::path& file) {
-  std::vector<LogChannel> channels = {{"/tf", "tf2_msgs/msg/TFMessage"},
-                                      {"/tf_static", "tf2_msgs/msg/TFMessage"}};
+  std::vector<LogChannel> channels = {kTf, kStaticTf};
   std::vector<WrittenMessage> messages;
   for (std::size_t k = 0; k < delays.size(); ++k) {
     const std::string name = "lidar" + std::to_string(k);
-    channels.push_back({"/" + name, "sensor_msgs/msg/PointCloud2"});
+    channels.push_back({"/" + name, kClouds.type});
     messages.push_back({1, 0, transform(0.0, "base", name, T_body_sensor[k])});
   }
-  std::vector<CloudField> fields = kXyz;
-  fields.push_back({"label", 12, 6});
+  const std::vector<CloudField> fields = xyz_and({{"label", 12, 6}});
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const Pose& T_world_body = rig.T_world_sensor(i);
     messages.push_back(
@@ -36,18 +34,17 @@ inline void write_rig_log(const Recording& rig, const std::vector<double>& delay
       const Pose T_world_then =
           interpolate(T_world_body, rig.T_world_sensor(i + 1), delays[k] / period);
       const Pose T_sensor_body = rig.sensors()[k].inverse() * T_world_then.inverse() * T_world_body;
-      ByteWriter points;
+      std::string points;
       for (std::size_t p = 0; p < scan.size(); ++p) {
         if (scan.sensor[p] != k) continue;
         const Eigen::Vector3f xyz(scan.xyzi.data() + 4 * p);
         const Eigen::Vector3f measured = (T_sensor_body * xyz.cast<double>()).cast<float>();
-        for (const float value : measured) points.number(value);
-        points.number(labels[p]);
+        points += packed(measured.x(), measured.y(), measured.z(), labels[p]);
       }
       const double time = rig.time(i) + delays[k];
       messages.push_back({static_cast<std::uint16_t>(2 + k), nanoseconds(time),
                           cloud_message(MessageEncoding::kCdr, time, "lidar" + std::to_string(k),
-                                        fields, 16, points.bytes())});
+                                        fields, 16, points)});
     }
   }
   write_text(file, mcap_file(channels, messages, {}));
