@@ -203,7 +203,7 @@ class VoxelPlanes {
   void add(const Placed& placed, std::size_t begin, std::size_t end, std::uint32_t number) {
     const VoxelKey key = placed.keys[begin];
     const double x = centre(key, 0), y = centre(key, 1), z = centre(key, 2);
-    Moments& moments = moments_[number];
+    Moments moments = moments_[number];  // a copy that is not reloaded after stores
     for (std::size_t i = begin; i < end; ++i) {
       moments.sums.add(placed.along[0][i] - x, placed.along[1][i] - y, placed.along[2][i] - z, 1.0);
       for (std::size_t k = 0; k < kSensorErrors; ++k) {
@@ -213,6 +213,7 @@ class VoxelPlanes {
       }
     }
     moments.last_scan = scans_;
+    moments_[number] = moments;
     planes_[number].is_fitted = false;
   }
 
