@@ -11,11 +11,8 @@ namespace {
 using simulation::SimulatedScan;
 
 const std::vector<SimulatedScan>& street() {
-  static const std::vector<SimulatedScan> scans = [] {
-    const simulation::Config config =
-        drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 33);
-    return simulate(config);
-  }();
+  static const std::vector<SimulatedScan> scans =
+      simulate(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 33));
   return scans;
 }
 
@@ -96,11 +93,6 @@ struct Epochs {
 
 constexpr std::size_t kJump = 20;
 
-bool is_moving(const SimulatedScan& scan, std::size_t point) {
-  const std::uint32_t kind = scan.labels[point] & 0xFFFFU;
-  return kind >= 252 && kind <= 259;
-}
-
 Epochs epochs_of(const std::vector<SimulatedScan>& scans) {
   Epochs epochs;
   DynaInsRemover::Config config;
@@ -110,7 +102,8 @@ Epochs epochs_of(const std::vector<SimulatedScan>& scans) {
   const auto count = [&](const ScanVerdict& verdict) {
     if (verdict.scan + 5 >= kJump && verdict.scan <= kJump + 5) return;
     for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-      if (verdict.labels[i] == PointLabel::kInvalid || is_moving(scans[verdict.scan], i)) continue;
+      const std::uint32_t truth = scans[verdict.scan].labels[i];
+      if (verdict.labels[i] == PointLabel::kInvalid || is_moving(truth)) continue;
       still += 1.0;
       kept += is_static(verdict.labels[i]) ? 1.0 : 0.0;
     }
@@ -172,8 +165,7 @@ TEST_CASE("exact poses begin no epoch: sparse sensors, two scans a second, lost 
                                                               {Scene::kGarage, Sensor::kVlp16},
                                                               {Scene::kHighway, Sensor::kVlp16},
                                                               {Scene::kUrban, Sensor::kLivox}}));
-  const simulation::Config config = drive_of(scene, sensor, 40, 61);
-  const std::vector<SimulatedScan> all = simulate(config);
+  const std::vector<SimulatedScan> all = simulate(drive_of(scene, sensor, 40, 61));
   std::vector<SimulatedScan> slow, lossy;
   Random random(4);
   for (std::size_t i = 0; i < all.size(); ++i) {

@@ -113,9 +113,8 @@ TEST_CASE("shares of too few samples tell nothing, and neither does less than a 
 }
 
 TEST_CASE("right poses of a drive are plausible, inverse and turned ones are not") {
-  const simulation::Config config =
-      drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12);
-  const std::vector<simulation::SimulatedScan> scans = simulate(config);
+  const std::vector<simulation::SimulatedScan> scans =
+      simulate(drive_of(simulation::Scene::kUrban, simulation::Sensor::kVlp16, 30, 12));
   const auto first_doubt = [&](auto&& pose_of) {
     DynaInsRemover remover;
     for (const simulation::SimulatedScan& scan : scans) {

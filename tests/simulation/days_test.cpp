@@ -1,33 +1,27 @@
 // One place on several days.
 
 #include "dynains/errors.hpp"
-#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 
 namespace dynains::simulation {
 namespace {
 
 Config config_of(int day) {
-  Config config;
-  config.sensor = Sensor::kVlp16;
-  config.scans = 60;
-  config.seed = 2;
+  Config config = test::exact_drive_of(Scene::kUrban, Sensor::kVlp16, 60, 2);
   config.day = day;
-  config.range_noise = 0;
-  config.dropout = 0;
   return config;
 }
 
 /// Ranges of the buildings in the first scan by direction, in steps of 1e-4.
-std::map<std::array<long, 3>, float> building_ranges(Simulator& simulator) {
+std::map<std::array<long, 3>, double> building_ranges(Simulator& simulator) {
   const SimulatedScan scan = simulator.scan(0);
-  std::map<std::array<long, 3>, float> ranges;
+  std::map<std::array<long, 3>, double> ranges;
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
     if (scan.labels[i] != 50) continue;
-    const float* const p = &scan.xyzi[4 * i];
-    const float range = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-    const auto step = [&](float value) { return std::lround(1e4F * value / range); };
-    ranges[{step(p[0]), step(p[1]), step(p[2])}] = range;
+    const Eigen::Vector3d p = test::point_of(scan, i);
+    const auto step = [&](double value) { return std::lround(1e4 * value / p.norm()); };
+    ranges[{step(p.x()), step(p.y()), step(p.z())}] = p.norm();
   }
   return ranges;
 }
@@ -55,7 +49,7 @@ TEST_CASE("days: the static world is that of all days, objects are of one day") 
       const auto found = walls.find(direction);
       if (found == walls.end()) continue;
       ++common;
-      equal += std::abs(found->second - range) < 1e-3F ? 1U : 0U;
+      equal += std::abs(found->second - range) < 1e-3 ? 1U : 0U;
     }
     // Some windows let a beam pass at random, by the seed of the scan.
     CHECK(common > 300);

@@ -1,6 +1,5 @@
 // Rooms, corridors and tunnels.
 
-#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 
@@ -14,10 +13,7 @@ struct Seen {
 };
 
 Seen look(Scene scene, std::uint64_t seed, int scans) {
-  Config config = test::drive_of(scene, Sensor::kVlp16, scans, seed);
-  config.dropout = 0;
-  config.range_noise = 0;
-  Simulator simulator(config);
+  Simulator simulator(test::exact_drive_of(scene, Sensor::kVlp16, scans, seed));
   Seen seen;
   Eigen::Vector3d last = simulator.scan(0).T_world_sensor.translation();
   for (std::size_t i = 0; i < simulator.size(); i += 5) {
@@ -26,11 +22,9 @@ Seen look(Scene scene, std::uint64_t seed, int scans) {
     last = scan.T_world_sensor.translation();
     if (i == 0) seen.beams = scan.labels.size();
     for (std::size_t k = 0; k < scan.labels.size(); ++k) {
-      seen.moving += (scan.labels[k] & 0xffff) > 250;
-      const float x = scan.xyzi[4 * k], y = scan.xyzi[4 * k + 1];
-      if (i == 0 && std::abs(x) < 2) {
-        seen.farthest = std::max(seen.farthest, static_cast<double>(std::abs(y)));
-      }
+      seen.moving += test::class_of(scan.labels[k]) > 250;
+      const Eigen::Vector3d p = test::point_of(scan, k);
+      if (i == 0 && std::abs(p.x()) < 2) seen.farthest = std::max(seen.farthest, std::abs(p.y()));
     }
   }
   return seen;

@@ -1,17 +1,16 @@
-#include "simulation/config.hpp"
-#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 
 namespace dynains::simulation {
 namespace {
 
-std::uint32_t kind_of(std::uint32_t label) { return label & 0xffff; }
-std::uint32_t instance_of(std::uint32_t label) { return label >> 16; }
+using test::class_of;
+using test::instance_of;
+using test::point_of;
 
 double elevation_of(const SimulatedScan& scan, std::size_t i) {
-  const float* p = &scan.xyzi[4 * i];
-  return std::atan2(static_cast<double>(p[2]), std::hypot(p[0], p[1])) * 57.29578;
+  const Eigen::Vector3d p = point_of(scan, i);
+  return std::atan2(p.z(), p.head<2>().norm()) * 57.29578;
 }
 
 TEST_CASE("worlds differ in scene, sensor and carrier") {
@@ -43,10 +42,10 @@ TEST_CASE("static things have lasting instance ids if asked, and are otherwise t
   std::map<std::uint32_t, std::set<std::uint32_t>> instances;  // of a class
   REQUIRE(with.labels.size() == without.labels.size());
   for (std::size_t i = 0; i < with.labels.size(); ++i) {
-    CHECK_FALSE(kind_of(with.labels[i]) != kind_of(without.labels[i]));
+    CHECK_FALSE(class_of(with.labels[i]) != class_of(without.labels[i]));
     const std::uint32_t instance = instance_of(with.labels[i]);
     if (instance >= kFirstStatic) CHECK_FALSE(instance_of(without.labels[i]) != 0);
-    instances[kind_of(with.labels[i])].insert(instance);
+    instances[class_of(with.labels[i])].insert(instance);
   }
   CHECK(instances[50].size() + instances[51].size() + instances[70].size() > 10);
   CHECK(instances[40] == std::set<std::uint32_t>{0});  // the ground has none
@@ -54,7 +53,7 @@ TEST_CASE("static things have lasting instance ids if asked, and are otherwise t
   std::size_t again = 0;
   for (const std::uint32_t label : later.labels) {
     again += instance_of(label) >= kFirstStatic &&
-             instances[kind_of(label)].count(instance_of(label)) > 0;
+             instances[class_of(label)].count(instance_of(label)) > 0;
   }
   CHECK(again > later.labels.size() / 20);
 }
@@ -85,9 +84,7 @@ TEST_CASE("lost packets take their share of the columns, whole columns each") {
 }
 
 TEST_CASE("each beam has its own constant range error") {
-  Config config = test::drive_of(Scene::kHall, Sensor::kVlp16, 2, 5);
-  config.dropout = 0;
-  config.range_noise = 0;
+  Config config = test::exact_drive_of(Scene::kHall, Sensor::kVlp16, 2, 5);
   Simulator exact(config);
   config.beam_bias = 0.03;
   Simulator biased(config);
@@ -96,12 +93,9 @@ TEST_CASE("each beam has its own constant range error") {
     const SimulatedScan a = exact.scan(k), b = biased.scan(k);
     REQUIRE(a.labels.size() == b.labels.size());
     for (std::size_t i = 0; i < a.labels.size(); ++i) {
-      const auto range = [i](const SimulatedScan& s) {
-        const float* p = &s.xyzi[4 * i];
-        return std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-      };
+      const double error = point_of(b, i).norm() - point_of(a, i).norm();
       errors[static_cast<int>(std::floor(elevation_of(a, i) / 2 + 8))].insert(
-          static_cast<int>(std::lround(1e4F * (range(b) - range(a)))));
+          static_cast<int>(std::lround(1e4 * error)));
     }
   }
   CHECK(errors.size() == 16);
@@ -114,19 +108,16 @@ TEST_CASE("each beam has its own constant range error") {
 }
 
 TEST_CASE("a wide beam mixes surfaces at edges only") {
-  Config config = test::drive_of(Scene::kStatic, Sensor::kOs1_64, 1, 5);
-  config.dropout = 0;
-  config.range_noise = 0;
+  Config config = test::exact_drive_of(Scene::kStatic, Sensor::kOs1_64, 1, 5);
   const SimulatedScan thin = Simulator(config).scan(0);
   config.divergence = 0.35;  // as wide as a column
   const SimulatedScan wide = Simulator(config).scan(0);
   REQUIRE(thin.labels.size() == wide.labels.size());
   std::size_t mixed = 0, between = 0;
   for (std::size_t i = 0; i < thin.labels.size(); ++i) {
-    const float* p = &thin.xyzi[4 * i];
-    const float* q = &wide.xyzi[4 * i];
-    mixed += std::hypot(p[0] - q[0], p[1] - q[1]) + std::abs(p[2] - q[2]) > 0.2F;
-    between += kind_of(wide.labels[i]) == 1 && kind_of(thin.labels[i]) != 1;
+    const Eigen::Vector3d off = point_of(thin, i) - point_of(wide, i);
+    mixed += off.head<2>().norm() + std::abs(off.z()) > 0.2;
+    between += class_of(wide.labels[i]) == 1 && class_of(thin.labels[i]) != 1;
   }
   CHECK(mixed > thin.labels.size() / 200);
   CHECK(mixed < thin.labels.size() / 5);
@@ -138,9 +129,8 @@ TEST_CASE("a wide beam mixes surfaces at edges only") {
 std::map<std::uint32_t, Eigen::Vector2d> poles_of(const SimulatedScan& scan) {
   std::map<std::uint32_t, Eigen::Vector3d> sums;
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    if (kind_of(scan.labels[i]) != 80 && kind_of(scan.labels[i]) != 71) continue;
-    const Eigen::Vector3d p =
-        scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>();
+    if (class_of(scan.labels[i]) != 80 && class_of(scan.labels[i]) != 71) continue;
+    const Eigen::Vector3d p = scan.T_world_sensor * point_of(scan, i);
     const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
     sums.emplace(instance_of(scan.labels[i]), zero).first->second +=
         Eigen::Vector3d(p.x(), p.y(), 1);

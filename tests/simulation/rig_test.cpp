@@ -2,7 +2,6 @@
 
 #include "dynains/errors.hpp"
 #include "io/files.hpp"
-#include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
@@ -11,10 +10,8 @@ namespace dynains::simulation {
 namespace {
 
 Config corners(int scans) {
-  Config config = test::drive_of(Scene::kUrban, Sensor::kVlp16, scans, 3);
+  Config config = test::exact_drive_of(Scene::kUrban, Sensor::kVlp16, scans, 3);
   config.rig = Rig::kCorners;
-  config.range_noise = 0;
-  config.dropout = 0;
   return config;
 }
 
@@ -30,13 +27,13 @@ TEST_CASE("rig: points are in the frame of the body, and rings of one clock thos
   std::set<long> rings[2];
   std::size_t count[2] = {0, 0}, near_ground = 0, level = 0;
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    const Eigen::Vector3d p = Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>();
+    const Eigen::Vector3d p = test::point_of(scan, i);
     const std::size_t k = scan.sensors[i];
     REQUIRE(k < 2);
     ++count[k];
     const Eigen::Vector3d q = mounts[k].inverse() * p;
     rings[k].insert(std::lround(10 * std::asin(q.z() / q.norm()) * 57.29578));
-    if ((scan.labels[i] & 0xffff) != 40 || p.norm() > 8) continue;
+    if (test::class_of(scan.labels[i]) != 40 || p.norm() > 8) continue;
     ++near_ground;
     level += std::abs(p.z()) < 0.15;  // the body stands on the street
   }

@@ -1,12 +1,13 @@
-#include "simulation/simulator.hpp"
-
 #include "io/fingerprint.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 
 namespace dynains::simulation {
 
+using test::class_of;
 using test::drive_of;
+using test::is_moving;
+using test::point_of;
 
 namespace {
 
@@ -18,9 +19,6 @@ std::uint64_t hash_of(const SimulatedScan& scan) {
   hash.add(scan.T_world_sensor_noisy.matrix().data(), 16 * sizeof(double));
   return hash.value();
 }
-
-std::uint32_t class_of(std::uint32_t label) { return label & 0xffff; }
-bool is_moving(std::uint32_t label) { return class_of(label) >= 252 && class_of(label) <= 259; }
 
 }  // namespace
 
@@ -40,9 +38,7 @@ TEST_CASE("one configuration gives equal bits, in any order of scans") {
 
 TEST_CASE(
     "with a rolling shutter, the points of a scan have increasing times and own sensor poses") {
-  Config config = drive_of(Scene::kHighway, Sensor::kVlp16, 2, 3);
-  config.range_noise = 0;
-  config.dropout = 0;
+  Config config = test::exact_drive_of(Scene::kHighway, Sensor::kVlp16, 2, 3);
   config.rolling_shutter = true;
   Simulator simulator(config);
   REQUIRE(simulator.size() == 2);
@@ -79,9 +75,9 @@ TEST_CASE("every scene and every sensor gives points") {
     CHECK(scan.xyzi.size() == 4 * scan.labels.size());
     std::size_t bad = 0;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-      const float* p = &scan.xyzi[4 * i];
-      const float range = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-      bad += !(range > 0.29F && range < 150.1F && p[3] >= 0 && p[3] <= 1);
+      const double range = point_of(scan, i).norm();
+      const float intensity = scan.xyzi[4 * i + 3];
+      bad += !(range > 0.29 && range < 150.1 && intensity >= 0 && intensity <= 1);
       bad += class_of(scan.labels[i]) == 0;
     }
     CHECK(bad == 0);
@@ -152,12 +148,10 @@ TEST_CASE("movers have their stated speed") {
     for (const ObjectState& state : simulator.scan(i).objects) {
       const auto found = last.find(state.instance);
       if (found != last.end()) {
-        const double step =
-            (state.T_world_object.translation() - found->second.T_world_object.translation())
-                .head<2>()
-                .norm();
+        const Eigen::Vector3d step =
+            state.T_world_object.translation() - found->second.T_world_object.translation();
         const double speed = 0.5 * (state.speed + found->second.speed);
-        CHECK(step / 0.1 == Approx(speed).margin(0.8));
+        CHECK(step.head<2>().norm() / 0.1 == Approx(speed).margin(0.8));
         compared += speed > 1;
       }
       last[state.instance] = state;
@@ -186,14 +180,13 @@ TEST_CASE("vehicles keep a distance from one another and from the ego vehicle") 
       for (const ObjectState& state : scan.objects) {
         if (class_of(state.label) == 254 || class_of(state.label) == 30) continue;
         // The centre of one vehicle is outside the rectangle of the other.
-        const Eigen::Vector3d ego =
-            state.T_world_object.inverse() * scan.T_world_sensor.translation();
-        CHECK_FALSE((std::abs(ego.x()) < state.length / 2 && std::abs(ego.y()) < state.width / 2));
-        for (const ObjectState& other : scan.objects) {
-          if (&other == &state) continue;
-          const Eigen::Vector3d p =
-              state.T_world_object.inverse() * other.T_world_object.translation();
+        const auto check = [&state](const Eigen::Isometry3d& T_world_other) {
+          const Eigen::Vector3d p = state.T_world_object.inverse() * T_world_other.translation();
           CHECK_FALSE((std::abs(p.x()) < state.length / 2 && std::abs(p.y()) < state.width / 2));
+        };
+        check(scan.T_world_sensor);
+        for (const ObjectState& other : scan.objects) {
+          if (&other != &state) check(other.T_world_object);
         }
       }
     }
@@ -210,8 +203,7 @@ TEST_CASE("points of an object lie within its box") {
     if (scan.labels[i] >> 16 == 0) continue;
     const ObjectState& state = *states.at(scan.labels[i] >> 16);
     const Eigen::Vector3d p =
-        state.T_world_object.inverse() *
-        (scan.T_world_sensor * Eigen::Map<const Eigen::Vector3f>(&scan.xyzi[4 * i]).cast<double>());
+        state.T_world_object.inverse() * (scan.T_world_sensor * point_of(scan, i));
     // Limbs swing, ranges are noisy, and wheels may stand in a bump.
     const bool in = std::abs(p.x()) < state.length / 2 + 0.45 &&
                     std::abs(p.y()) < state.width / 2 + 0.35 && p.z() > -0.3 &&
@@ -223,22 +215,17 @@ TEST_CASE("points of an object lie within its box") {
 }
 
 TEST_CASE("range noise has the configured deviation") {
-  Config config = drive_of(Scene::kStatic, Sensor::kVlp16, 1, 4);
-  config.dropout = 0;
-  config.range_noise = 0;
+  Config config = test::exact_drive_of(Scene::kStatic, Sensor::kVlp16, 1, 4);
   const SimulatedScan exact = Simulator(config).scan(0);
   config.range_noise = 0.05;
   const SimulatedScan noisy = Simulator(config).scan(0);
   // Without losses, equal beams return, except at the end of the range.
   double sum = 0, squares = 0;
   std::size_t count = 0;
-  std::size_t j = 0;
-  for (std::size_t i = 0; i < exact.labels.size() && j < noisy.labels.size(); ++i) {
-    const Eigen::Vector3f a = Eigen::Map<const Eigen::Vector3f>(&exact.xyzi[4 * i]);
-    const Eigen::Vector3f b = Eigen::Map<const Eigen::Vector3f>(&noisy.xyzi[4 * j]);
-    if (a.normalized().dot(b.normalized()) < 0.999999F) continue;
-    ++j;
-    const auto error = static_cast<double>(b.norm() - a.norm());
+  for (std::size_t i = 0; i < exact.labels.size() && count < noisy.labels.size(); ++i) {
+    const Eigen::Vector3d a = point_of(exact, i), b = point_of(noisy, count);
+    if (a.normalized().dot(b.normalized()) < 0.999999) continue;
+    const double error = b.norm() - a.norm();
     sum += error;
     squares += error * error;
     ++count;
@@ -322,9 +309,9 @@ TEST_CASE("direction noise moves points across their beams by its deviation") {
   REQUIRE(exact.labels == noisy.labels);
   double sum = 0;
   for (std::size_t i = 0; i < exact.labels.size(); ++i) {
-    const Eigen::Vector3f a = Eigen::Map<const Eigen::Vector3f>(&exact.xyzi[4 * i]).normalized();
-    const Eigen::Vector3f b = Eigen::Map<const Eigen::Vector3f>(&noisy.xyzi[4 * i]).normalized();
-    sum += (a - b).cast<double>().squaredNorm() / 2;  // two directions across the beam
+    const Eigen::Vector3d a = point_of(exact, i), b = point_of(noisy, i);
+    // Two directions across the beam.
+    sum += (a.normalized() - b.normalized()).squaredNorm() / 2;
   }
   const double deviation = std::sqrt(sum / static_cast<double>(exact.labels.size()));
   CHECK(deviation * 57.29578 == Approx(0.1).epsilon(0.03));
