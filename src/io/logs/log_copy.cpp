@@ -10,8 +10,8 @@
 #include "../scalar.hpp"
 #include "log_scans.hpp"
 #include "mcap_writer.hpp"
+#include "message_cloud.hpp"
 #include "message_fields.hpp"
-#include "point_cloud2.hpp"
 
 namespace dynains {
 namespace {
@@ -19,9 +19,10 @@ namespace {
 constexpr const char* kLabelField = "label";
 constexpr std::uint32_t kLabelBytes = 4;  // of a point, for a label and padding
 
-void check_count(const MessageReader& in, std::size_t points, std::size_t values) {
-  if (points == values) return;
-  in.fail("expected " + std::to_string(values) + " points, found " + std::to_string(points));
+void check_count(const MessageCloud& cloud, std::size_t values) {
+  if (cloud.size() == values) return;
+  cloud.fail("expected " + std::to_string(values) + " points, found " +
+             std::to_string(cloud.size()));
 }
 
 /// Replaces the number at byte `at`.
@@ -33,66 +34,48 @@ std::string part(const SerialisedMessage& message, std::size_t begin, std::size_
   return std::string(reinterpret_cast<const char*>(message.data) + begin, end - begin);
 }
 
-/// The message with other points, behind their steps and the number of their bytes.
-std::string with_points(const SerialisedMessage& message, const PointCloud2& cloud,
-                        const std::string& points, std::uint32_t point_step, std::size_t row_step) {
-  const PointCloud2::Places& at = cloud.places();
-  std::string bytes = part(message, 0, at.data);
-  put(at.data - 12, point_step, bytes);
-  put(at.data - 8, static_cast<std::uint32_t>(row_step), bytes);
-  put(at.data - 4, static_cast<std::uint32_t>(points.size()), bytes);
-  return bytes + points + part(message, at.data_end, message.size);
+/// The message with other points.
+std::string with_points(const SerialisedMessage& message, const MessageCloud& cloud,
+                        const std::string& points) {
+  const MessageCloud::Places& at = cloud.places();
+  return part(message, 0, at.data) + points + part(message, at.data_end, message.size);
 }
 
-std::string without_points_of_cloud(const SerialisedMessage& message,
-                                    Span<const std::uint8_t> keep) {
-  MessageReader in(message);
-  in.header();
-  const PointCloud2 cloud(in);
-  check_count(in, cloud.size(), keep.size());
-  std::string points;
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i] == 0) continue;
-    points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_step());
-    ++count;
-  }
-  std::string result = with_points(message, cloud, points, cloud.point_step(), points.size());
-  put(cloud.places().height, 1, result);
-  put(cloud.places().height + 4, count, result);
-  return result;
-}
-
-std::string without_points_of_livox(const SerialisedMessage& message,
-                                    Span<const std::uint8_t> keep) {
-  MessageReader in(message);
-  in.header();
-  check_count(in, read_livox_head(in).points, keep.size());
-  const std::size_t begin = in.position();
-  std::string result = part(message, 0, begin);
-  std::uint32_t count = 0;
-  for (std::size_t i = 0; i < keep.size(); ++i) {
-    in.number<std::uint32_t>("an offset time");
-    const std::size_t point = in.position() - 4;
-    in.take(kLivoxPoint - 4, "a point");
-    if (keep[i] == 0) continue;
-    while (!in.is_ros1() && (result.size() - begin) % 4 != 0) result += '\0';
-    result += part(message, point, in.position());
-    ++count;
-  }
-  put(begin - 12, count, result);  // the number of points, before a lidar id and reserved bytes
-  put(begin - 4, count, result);
-  return result + part(message, in.position(), message.size);
+/// Sets what lies before the points of a PointCloud2: steps and the number of their bytes.
+void put_steps(const MessageCloud& cloud, std::uint32_t point_step, std::size_t row_step,
+               std::size_t size, std::string& bytes) {
+  const std::size_t at = cloud.places().data;
+  put(at - 12, point_step, bytes);
+  put(at - 8, static_cast<std::uint32_t>(row_step), bytes);
+  put(at - 4, static_cast<std::uint32_t>(size), bytes);
 }
 
 }  // namespace
 
-bool can_have_labels(const std::string& type) { return type == "sensor_msgs/PointCloud2"; }
+bool can_have_labels(const std::string& type) { return type == kPointCloud2; }
 
-std::string without_points(const std::string& type, const SerialisedMessage& cloud,
+std::string without_points(const std::string& type, const SerialisedMessage& message,
                            Span<const std::uint8_t> keep) {
-  return can_have_labels(type) ? without_points_of_cloud(cloud, keep)
-                               : without_points_of_livox(cloud, keep);
+  const MessageCloud cloud(type, message);
+  check_count(cloud, keep.size());
+  std::string points;
+  std::uint32_t count = 0;
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i] == 0) continue;
+    if (count++ > 0) points.append(cloud.padding(), '\0');
+    points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_size());
+  }
+  std::string result = with_points(message, cloud, points);
+  const MessageCloud::Places& at = cloud.places();
+  if (is_livox(type)) {
+    put(at.data - 12, count, result);  // before a lidar id and reserved bytes
+    put(at.data - 4, count, result);
+  } else {
+    put_steps(cloud, cloud.point_size(), points.size(), points.size(), result);
+    put(at.height, 1, result);
+    put(at.height + 4, count, result);
+  }
+  return result;
 }
 
 std::string with_labels(const std::string& type, const SerialisedMessage& message,
@@ -100,25 +83,24 @@ std::string with_labels(const std::string& type, const SerialisedMessage& messag
   if (!can_have_labels(type)) {
     fail(message.place, "expected a PointCloud2, for other types have no labels");
   }
-  MessageReader in(message);
-  in.header();
-  const PointCloud2 cloud(in);
-  check_count(in, cloud.size(), labels.size());
+  const MessageCloud cloud(type, message);
+  check_count(cloud, labels.size());
   const std::vector<std::string>& names = cloud.field_names();
   if (std::find(names.begin(), names.end(), kLabelField) != names.end()) {
-    in.fail("expected no field \"label\", which is to be added");
+    cloud.fail("expected no field \"label\", which is to be added");
   }
   std::string points;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_step());
+    points.append(reinterpret_cast<const char*>(cloud.point(i)), cloud.point_size());
     append_number(labels[i], points);
     points.append(kLabelBytes - 1, '\0');
   }
-  const std::uint32_t step = cloud.point_step() + kLabelBytes;
-  std::string result = with_points(message, cloud, points, step, cloud.width() * step);
+  const std::uint32_t step = cloud.point_size() + kLabelBytes;
+  std::string result = with_points(message, cloud, points);
+  put_steps(cloud, step, cloud.width() * step, points.size(), result);
   MessageWriter field(message.encoding);
   const std::size_t begin = field.bytes().size();
-  field.string(kLabelField).number(cloud.point_step()).number(datatype_of(Scalar::kUint8));
+  field.string(kLabelField).number(cloud.point_size()).number(datatype_of(Scalar::kUint8));
   field.number(std::uint32_t{1});
   put(cloud.places().height + 8, static_cast<std::uint32_t>(names.size() + 1), result);
   return result.insert(cloud.places().fields_end, field.bytes(), begin);

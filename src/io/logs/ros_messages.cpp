@@ -4,8 +4,8 @@
 #include <iterator>
 
 #include "../poses/kitti_files.hpp"
+#include "message_cloud.hpp"
 #include "message_fields.hpp"
-#include "point_cloud2.hpp"
 
 namespace dynains {
 namespace {
@@ -26,58 +26,6 @@ StampedPose read_stamped(MessageReader& in, bool has_child) {
   const MessageHeader header = in.header();
   std::string child = has_child ? in.frame("a child frame id") : std::string();
   return {header.time, header.frame, std::move(child), read_pose(in)};
-}
-
-void resize(RecordedScan& scan, std::size_t points, const PointColumns& columns) {
-  scan.xyzi.resize(4 * points);
-  scan.ring.resize(columns.ring ? points : 0);
-  scan.time.resize(columns.time ? points : 0);
-}
-
-void read_point_cloud2(MessageReader& in, RecordedScan& scan) {
-  const PointCloud2 cloud(in);
-  resize(scan, cloud.size(), cloud.columns());
-  const PointCloud2::Field& sensor = cloud.field(Role::kSensor);
-  scan.sensor.resize(sensor.is_there ? cloud.size() : 0);
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const std::uint8_t* const point = cloud.point(i);
-    float* const xyzi = scan.xyzi.data() + 4 * i;
-    for (std::size_t k = 0; k < std::size(kUsualRoles); ++k) {
-      const PointCloud2::Field& field = cloud.field(kUsualRoles[k]);
-      xyzi[k] = field.is_there ? static_cast<float>(field.value(point)) : 0.0F;
-    }
-    const PointCloud2::Field &ring = cloud.field(Role::kRing), &time = cloud.field(Role::kTime);
-    if (ring.is_there) scan.ring[i] = ring_number(ring.value(point));
-    if (time.is_there) scan.time[i] = time.value(point);
-    if (sensor.is_there) scan.sensor[i] = sensor_number(sensor.value(point));
-  }
-}
-
-PointColumns livox_columns() {
-  PointColumns columns;
-  columns.intensity = true;
-  columns.ring = true;
-  columns.time = true;
-  return columns;
-}
-
-void read_livox(MessageReader& in, RecordedScan& scan) {
-  const auto [lidar, points] = read_livox_head(in);
-  scan.sensor.assign(points, lidar);
-  resize(scan, points, livox_columns());
-  for (std::uint32_t i = 0; i < points; ++i) {
-    scan.time[i] = in.number<std::uint32_t>("an offset time");
-    float* const xyzi = scan.xyzi.data() + 4 * std::size_t{i};
-    for (int axis = 0; axis < 3; ++axis) xyzi[axis] = in.number<float>("a coordinate");
-    xyzi[3] = static_cast<float>(in.number<std::uint8_t>("a reflectivity"));
-    in.number<std::uint8_t>("a tag");
-    scan.ring[i] = in.number<std::uint8_t>("a line");
-  }
-}
-
-bool is_livox(const std::string& type) {
-  return type == "livox_ros_driver/CustomMsg" || type == "livox_ros_driver2/CustomMsg" ||
-         type == "livox_interfaces/CustomMsg";
 }
 
 constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
@@ -127,19 +75,7 @@ LogTopic ros2_topic(const std::string& name, const char* type) {
 
 }  // namespace
 
-LivoxHead read_livox_head(MessageReader& in) {
-  LivoxHead head;
-  in.number<std::uint64_t>("a time base");
-  in.number<std::uint32_t>("a number of points");
-  head.lidar = in.number<std::uint8_t>("a lidar id");
-  in.take(3, "reserved bytes");
-  head.points = in.length(kLivoxPoint, "points");
-  return head;
-}
-
-bool is_cloud_type(const std::string& type) {
-  return type == "sensor_msgs/PointCloud2" || is_livox(type);
-}
+bool is_cloud_type(const std::string& type) { return type == kPointCloud2 || is_livox(type); }
 
 bool is_transform_type(const std::string& type) {
   return type == "tf2_msgs/TFMessage" || type == "tf/tfMessage";
@@ -161,33 +97,42 @@ bool is_pose_type(const std::string& type) {
 }
 
 CloudInfo inspect_cloud(const std::string& type, const SerialisedMessage& message) {
-  MessageReader in(message);
-  const MessageHeader header = in.header();
-  if (is_livox(type)) {
-    return {header.time, header.frame, read_livox_head(in).points, livox_columns()};
-  }
-  const PointCloud2 cloud(in);
-  return {header.time, header.frame, cloud.size(), cloud.columns()};
+  const MessageCloud cloud(type, message);
+  return {cloud.header().time, cloud.header().frame, cloud.size(), cloud.columns()};
 }
 
 void read_cloud(const std::string& type, const SerialisedMessage& message, RecordedScan& scan) {
-  MessageReader in(message);
-  in.header();
-  is_livox(type) ? read_livox(in, scan) : read_point_cloud2(in, scan);
+  const MessageCloud cloud(type, message);
+  const MessageCloud::Field &ring = cloud.field(Role::kRing), &time = cloud.field(Role::kTime),
+                            &sensor = cloud.field(Role::kSensor);
+  scan.xyzi.resize(4 * cloud.size());
+  scan.ring.resize(ring.is_there ? cloud.size() : 0);
+  scan.time.resize(time.is_there ? cloud.size() : 0);
+  scan.sensor.assign(sensor.is_there || cloud.sensor() ? cloud.size() : 0,
+                     cloud.sensor().value_or(0));
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::uint8_t* const point = cloud.point(i);
+    float* const xyzi = scan.xyzi.data() + 4 * i;
+    for (std::size_t k = 0; k < std::size(kUsualRoles); ++k) {
+      const MessageCloud::Field& field = cloud.field(kUsualRoles[k]);
+      xyzi[k] = field.is_there ? static_cast<float>(field.value(point)) : 0.0F;
+    }
+    if (ring.is_there) scan.ring[i] = ring_number(ring.value(point));
+    if (time.is_there) scan.time[i] = time.value(point);
+    if (sensor.is_there) scan.sensor[i] = sensor_number(sensor.value(point));
+  }
 }
 
 std::vector<std::uint32_t> read_cloud_labels(const std::string& type,
                                              const SerialisedMessage& message) {
-  MessageReader in(message);
-  in.header();
-  if (is_livox(type)) in.fail("expected a field \"label\", which CustomMsg cannot have");
-  const PointCloud2 cloud(in);
-  const PointCloud2::Field& label_field = cloud.field(Role::kLabel);
-  if (!label_field.is_there) in.fail("expected a field \"label\", as in the first cloud");
+  const MessageCloud cloud(type, message);
+  if (is_livox(type)) cloud.fail("expected a field \"label\", which CustomMsg cannot have");
+  const MessageCloud::Field& label_field = cloud.field(Role::kLabel);
+  if (!label_field.is_there) cloud.fail("expected a field \"label\", as in the first cloud");
   std::vector<std::uint32_t> labels(cloud.size());
   for (std::size_t i = 0; i < labels.size(); ++i) {
     const double label = label_field.value(cloud.point(i));
-    if (!(label >= 0.0 && label < 4294967296.0)) in.fail("expected labels from 0 to 4294967295");
+    if (!(label >= 0.0 && label < 4294967296.0)) cloud.fail("expected labels from 0 to 4294967295");
     labels[i] = static_cast<std::uint32_t>(label);
   }
   return labels;

@@ -48,18 +48,6 @@ struct Concatenation {
   std::vector<Part> parts;
 };
 
-/// A point of CustomMsg of Livox, bytes, without the padding between points of CDR.
-inline constexpr std::size_t kLivoxPoint = 19;
-
-class MessageReader;
-
-/// The part of a CustomMsg of Livox between its header and its points.
-struct LivoxHead {
-  std::uint8_t lidar = 0;
-  std::uint32_t points = 0;  ///< for which the message has room
-};
-LivoxHead read_livox_head(MessageReader& in);
-
 /// Whether read_cloud() decodes the type: sensor_msgs/PointCloud2, and CustomMsg of Livox.
 bool is_cloud_type(const std::string& type);
 
