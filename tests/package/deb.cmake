@@ -1,11 +1,11 @@
 # Packs BUILD_DIR, installs the package into an empty root and starts the installed program.
+include(${CMAKE_CURRENT_LIST_DIR}/../support/call.cmake)
 file(REMOVE_RECURSE ${WORK_DIR}/deb ${WORK_DIR}/deb_root)
-execute_process(
-  COMMAND ${CPACK} -G DEB -C "${CONFIG}" -B ${WORK_DIR}/deb --config ${BUILD_DIR}/CPackConfig.cmake
-  RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+call("cpack"
+  ${CPACK} -G DEB -C "${CONFIG}" -B ${WORK_DIR}/deb --config ${BUILD_DIR}/CPackConfig.cmake)
 file(GLOB packages ${WORK_DIR}/deb/dynains_${VERSION}_*.deb)
 list(LENGTH packages count)
-if(NOT result EQUAL 0 OR NOT count EQUAL 1)
+if(NOT count EQUAL 1)
   message(FATAL_ERROR "cpack made ${count} packages:\n${output}")
 endif()
 
@@ -13,18 +13,11 @@ endif()
 set(root ${WORK_DIR}/deb_root)
 file(MAKE_DIRECTORY ${root}/var/lib/dpkg/info ${root}/var/lib/dpkg/updates)
 file(WRITE ${root}/var/lib/dpkg/status "")
-execute_process(COMMAND ${DPKG} --root=${root} --force-depends -i ${packages}
-  RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-if(NOT result EQUAL 0)
-  message(FATAL_ERROR "dpkg failed:\n${output}")
-endif()
+call("dpkg" ${DPKG} --root=${root} --force-depends -i ${packages})
 
-execute_process(COMMAND ${DPKG} --root=${root} --status dynains OUTPUT_VARIABLE status)
-foreach(line "Status: install ok installed" "Version: ${VERSION}" "Depends: [^\n]*libeigen3-dev")
-  if(NOT status MATCHES "${line}")
-    message(SEND_ERROR "the package should have '${line}':\n${status}")
-  endif()
-endforeach()
+call("the status" ${DPKG} --root=${root} --status dynains)
+expect("the package" "Status: install ok installed" "Version: ${VERSION}"
+  "Depends: [^\n]*libeigen3-dev")
 foreach(name doc/dynains/copyright doc/dynains/changelog.gz)
   if(NOT EXISTS ${root}/usr/share/${name})
     message(SEND_ERROR "the package should have /usr/share/${name}")
@@ -32,8 +25,6 @@ foreach(name doc/dynains/copyright doc/dynains/changelog.gz)
 endforeach()
 
 if(PROGRAM)
-  execute_process(COMMAND ${root}/usr/${BIN_DIR}/${PROGRAM} --version OUTPUT_VARIABLE output)
-  if(NOT output MATCHES "${VERSION}")
-    message(SEND_ERROR "the installed program says '${output}'")
-  endif()
+  call("the installed program" ${root}/usr/${BIN_DIR}/${PROGRAM} --version)
+  expect("the installed program" ${VERSION})
 endif()

@@ -1,15 +1,12 @@
 # Installs BUILD_DIR into WORK_DIR, moves the result and searches it for the original paths.
+include(${CMAKE_CURRENT_LIST_DIR}/../support/call.cmake)
 
 # install_tree(<name> <option>...) installs to a temporary place and moves it to WORK_DIR/<name>.
 function(install_tree name)
   set(passing ${WORK_DIR}/passing_${name})
   file(REMOVE_RECURSE ${passing} ${WORK_DIR}/${name})
-  execute_process(
-    COMMAND ${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${passing} --config "${CONFIG}" ${ARGN}
-    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "install failed:\n${output}")
-  endif()
+  call("install"
+    ${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${passing} --config "${CONFIG}" ${ARGN})
   file(RENAME ${passing} ${WORK_DIR}/${name})
 
   # Debug information and instrumentation contain paths of source files.

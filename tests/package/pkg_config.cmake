@@ -4,28 +4,30 @@ if(NOT PKG_CONFIG)
   return()
 endif()
 
+include(${CMAKE_CURRENT_LIST_DIR}/../support/call.cmake)
+# flags_of(<package>): sets `flags`.
+function(flags_of package)
+  call("pkg-config" ${PKG_CONFIG} --cflags --libs --print-errors ${package})
+  string(STRIP "${output}" flags)
+  separate_arguments(flags)
+  set(flags "${flags}" PARENT_SCOPE)
+endfunction()
+
 set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${DATA_DIR}/pkgconfig)
-execute_process(COMMAND ${PKG_CONFIG} --exact-version=${VERSION} --print-errors dynains
-  RESULT_VARIABLE result)
+call("pkg-config of ${VERSION}" ${PKG_CONFIG} --exact-version=${VERSION} --print-errors dynains)
 execute_process(COMMAND ${PKG_CONFIG} --atleast-version=99 dynains RESULT_VARIABLE too_new)
-if(NOT result EQUAL 0 OR too_new EQUAL 0)
-  message(FATAL_ERROR "pkg-config does not report version ${VERSION}")
+if(too_new EQUAL 0)
+  message(FATAL_ERROR "pkg-config reports a version above ${VERSION}")
 endif()
 
-execute_process(COMMAND ${PKG_CONFIG} --cflags --libs dynains
-  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE)
-separate_arguments(flags)
+flags_of(dynains)
 foreach(flag IN LISTS flags)
   if(NOT flag MATCHES "^(-I|-pthread$)")
     message(FATAL_ERROR "the package forces the flag ${flag} on its users")
   endif()
 endforeach()
 
-execute_process(COMMAND ${COMPILER} -std=c++17 -fsyntax-only ${SOURCE} ${flags}
-  RESULT_VARIABLE result)
-if(NOT result EQUAL 0)
-  message(FATAL_ERROR "does not compile with: ${flags}")
-endif()
+call("compiling with ${flags}" ${COMPILER} -std=c++17 -fsyntax-only ${SOURCE} ${flags})
 
 # Compiled components, where they are installed.
 set(ENV{PKG_CONFIG_PATH} ${PREFIX}/${DATA_DIR}/pkgconfig:${PREFIX}/${LIB_DIR}/pkgconfig)
@@ -42,21 +44,12 @@ foreach(component remover odometry)
   if(NOT EXISTS ${PREFIX}/${LIB_DIR}/pkgconfig/dynains-${component}.pc)
     continue()
   endif()
-  execute_process(COMMAND ${PKG_CONFIG} --cflags --libs --print-errors dynains-${component}
-    OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE)
-  separate_arguments(flags)
+  flags_of(dynains-${component})
   set(program ${WORK_DIR}/pkg_config_${component})
   file(REMOVE ${program})
   file(WRITE ${program}.cpp "${${component}}")
-  execute_process(
-    COMMAND ${COMPILER} -std=c++17 ${program}.cpp ${INSTRUMENTED} ${flags} -o ${program}
-    RESULT_VARIABLE result)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "the ${component} does not link with: ${flags}")
-  endif()
-  execute_process(COMMAND ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=${PREFIX}/${LIB_DIR} ${program}
-    RESULT_VARIABLE result)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "the program of the ${component} ended with ${result}")
-  endif()
+  call("linking the ${component} with ${flags}"
+    ${COMPILER} -std=c++17 ${program}.cpp ${INSTRUMENTED} ${flags} -o ${program})
+  call("the program of the ${component}"
+    ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=${PREFIX}/${LIB_DIR} ${program})
 endforeach()

@@ -1,5 +1,6 @@
 # VERSION of the project, the header, the installed package files, the program and the recipes of
 # packagers have one version.
+include(${CMAKE_CURRENT_LIST_DIR}/../support/call.cmake)
 
 function(expect_version where found)
   if(NOT found STREQUAL VERSION)
@@ -27,13 +28,9 @@ string(REPLACE "Version: " "" line "${line}")
 expect_version("dynains.pc" "${line}")
 
 if(PROGRAM)
-  execute_process(COMMAND ${PREFIX}/${BIN_DIR}/${PROGRAM} --version
-    OUTPUT_VARIABLE output RESULT_VARIABLE result)
+  call("${PROGRAM} --version" ${PREFIX}/${BIN_DIR}/${PROGRAM} --version)
   string(REGEX MATCH "[0-9]+\\.[0-9]+\\.[0-9]+" found "${output}")
   expect_version("${PROGRAM} --version" "${found}")
-  if(NOT result EQUAL 0)
-    message(SEND_ERROR "${PROGRAM} --version ended with ${result}")
-  endif()
 endif()
 
 if(PYTHON)

@@ -4,7 +4,7 @@ foreach(folder IN LISTS SYSTEM_INCLUDE_DIRS)
   list(APPEND system -isystem ${folder})
 endforeach()
 execute_process(
-  COMMAND ${COMPILER} -std=c++17 -fsyntax-only -I${INCLUDE_DIR} ${system} ${SOURCE}
+  COMMAND ${COMPILER} -std=c++17 -fsyntax-only -I${SOURCE_DIR}/include ${system} ${CMAKE_CURRENT_LIST_DIR}/wrong_cloud.cpp
   OUTPUT_VARIABLE output ERROR_VARIABLE output)
 string(REPLACE ";" "," output "${output}")
 string(REGEX MATCHALL "error:[^\n]*" errors "${output}")

@@ -2,22 +2,13 @@
 # environment, all without network. Then checks the build that pip starts where no build folder is
 # given: make goes through all its targets, but touches the files instead of compiling them, which
 # would take minutes.
+include(${CMAKE_CURRENT_LIST_DIR}/../support/call.cmake)
 execute_process(COMMAND ${PYTHON} -c "import setuptools, wheel, pip, venv" RESULT_VARIABLE absent
   OUTPUT_QUIET ERROR_QUIET)
 if(absent)
   message("SKIPPED: pip, setuptools, wheel or venv are not installed")
   return()
 endif()
-
-# call(<what> <command>...): a failure ends the test.
-function(call what)
-  execute_process(COMMAND ${ARGN} WORKING_DIRECTORY ${WORK_DIR}
-    RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "${what} failed:\n${output}")
-  endif()
-  set(output "${output}" PARENT_SCOPE)
-endfunction()
 
 set(wheels ${WORK_DIR}/wheels)
 set(environment ${WORK_DIR}/venv)
@@ -65,8 +56,5 @@ call("pip wheel of the sources" ${PYTHON} -m pip wheel --no-build-isolation --no
   --wheel-dir ${WORK_DIR}/touched ${SOURCE_DIR}/src/python)
 file(GLOB touched ${WORK_DIR}/touched/*.whl)
 call("list the wheel" ${PYTHON} -m zipfile --list ${touched})
-foreach(expected IN ITEMS __init__.py __init__.pyi py.typed _dynains.cpython)
-  if(NOT output MATCHES "dynains/${expected}")
-    message(FATAL_ERROR "the wheel of the sources lacks ${expected}:\n${output}")
-  endif()
-endforeach()
+expect("the wheel of the sources" dynains/__init__.py dynains/__init__.pyi dynains/py.typed
+  dynains/_dynains.cpython)
