@@ -1,58 +1,17 @@
 #include "ros_common/messages.hpp"
 
-#include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
+#include "stubs/message_stubs.hpp"
 #include "support/catch.hpp"
 
 namespace dynains_ros {
 namespace {
 
-using dynains::test::LookAlike;
-
-struct LookAlikePose {
-  decltype(LookAlike::header) header;
-  struct {
-    struct {
-      struct {
-        double x, y, z;
-      } position;
-      struct {
-        double x, y, z, w;
-      } orientation;
-    } pose;
-    std::array<double, 36> covariance;
-  } pose;
-};
-
-struct LookAlikeMarker {
-  decltype(LookAlike::header) header;
-  std::string ns;
-  std::int32_t id = 0, type = 0, action = 0;
-  decltype(LookAlikePose().pose.pose) pose;
-  struct {
-    double x, y, z;
-  } scale;
-  struct {
-    float r, g, b, a;
-  } color;
-};
-struct LookAlikeMarkers {
-  std::vector<LookAlikeMarker> markers;
-};
-
-struct LookAlikeDetection {
-  decltype(LookAlike::header) header;
-  struct {
-    decltype(LookAlikePose().pose.pose) center;
-    decltype(LookAlikeMarker::scale) size;
-  } bbox;
-  std::string id;
-};
-struct LookAlikeDetections {
-  decltype(LookAlike::header) header;
-  std::vector<LookAlikeDetection> detections;
-};
+using geometry_msgs::msg::PoseWithCovarianceStamped;
+using sensor_msgs::msg::PointCloud2;
+using vision_msgs::msg::Detection3DArray;
+using visualization_msgs::msg::MarkerArray;
 
 TEST_CASE("a map becomes a message with its points") {
   dynains::PointBuffer points;
@@ -60,14 +19,14 @@ TEST_CASE("a map becomes a message with its points") {
   points.push_back(-4.0F, 5.0F, 0.5F);
   dynains::StaticMapAccumulator map;
   map.insert(points, {}, dynains::Pose::Identity());
-  const auto message = map_message<LookAlike>(map, "odom");
+  const auto message = map_message<PointCloud2>(map, "odom");
   CHECK(message.header.frame_id == "odom");
   const dynains::PointCloud2View view(message);
   REQUIRE(view.size() == 2);
   CHECK(view.point(0).x() + view.point(1).x() == Approx(-3.0F));
   CHECK(message.data.size() == 24);
 
-  const auto nothing = map_message<LookAlike>(dynains::StaticMapAccumulator(), "odom");
+  const auto nothing = map_message<PointCloud2>(dynains::StaticMapAccumulator(), "odom");
   CHECK(nothing.width == 0);
   CHECK(nothing.data.empty());
   CHECK(nothing.fields.size() == 3);
@@ -81,9 +40,9 @@ TEST_CASE("a residual becomes a pose whose covariance has the axes of the previo
   residual.covariance[0] = 4.0;                            // x of the newest scan
   residual.covariance[7 * 3] = 9.0;                        // about x
   residual.covariance[3] = residual.covariance[18] = 5.0;  // x and about x
-  LookAlike cloud;
-  cloud.header.frame_id = "lidar";
-  const auto message = residual_message<LookAlikePose>(residual, cloud.header);
+  std_msgs::msg::Header header;
+  header.frame_id = "lidar";
+  const auto message = residual_message<PoseWithCovarianceStamped>(residual, header);
   CHECK(message.header.frame_id == "lidar");
   CHECK(message.pose.pose.position.y == 2.0);
   CHECK(message.pose.pose.orientation.z == Approx(std::sqrt(0.5)));
@@ -109,9 +68,9 @@ TEST_CASE("objects become boxes in the fixed frame that replace the last ones") 
   object.yaw = M_PI / 2.0;
   const dynains::Pose T_fixed_world =
       Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitZ());
-  decltype(LookAlike::header) header;
+  std_msgs::msg::Header header;
   header.frame_id = "map";
-  const auto message = objects_message<LookAlikeMarkers>(
+  const auto message = objects_message<MarkerArray>(
       dynains::Span<const dynains::MovingObject>(&object, 1), T_fixed_world, header);
   REQUIRE(message.markers.size() == 2);
   CHECK(message.markers[0].action == 3);
@@ -124,9 +83,9 @@ TEST_CASE("objects become boxes in the fixed frame that replace the last ones") 
   CHECK(std::abs(marker.pose.orientation.z) == Approx(1.0));
   CHECK(marker.scale.x == 4.0);
   CHECK(marker.scale.y == 1.8);
-  CHECK(objects_message<LookAlikeMarkers>({}, T_fixed_world, header).markers.size() == 1);
+  CHECK(objects_message<MarkerArray>({}, T_fixed_world, header).markers.size() == 1);
 
-  const auto detections = detections_message<LookAlikeDetections>(
+  const auto detections = detections_message<Detection3DArray>(
       dynains::Span<const dynains::MovingObject>(&object, 1), T_fixed_world, header);
   CHECK(detections.header.frame_id == "map");
   REQUIRE(detections.detections.size() == 1);
