@@ -1,9 +1,7 @@
 // Logs of ROS: any bytes give scans with poses and a copy, or an IoError that names the log.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/db3_writer.hpp"
-#include "io/files.hpp"
 #include "io/log_writer.hpp"
 #include "io/logs/log_copy.hpp"
 #include "support/standard.hpp"

@@ -1,8 +1,6 @@
 // Tables of nuScenes: any bytes give sweeps with poses, or an IoError that names a file.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
-#include "io/files.hpp"
 #include "io/nuscenes_writer.hpp"
 #include "support/standard.hpp"
 #include "targets.hpp"

@@ -2,11 +2,9 @@
 
 #include "city/session_file.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/pose.hpp"
-#include "io/files.hpp"
 #include "io/point_format_writer.hpp"
 #include "io/poses/kitti_files.hpp"
 #include "run/settings/parameter_values.hpp"

@@ -1,7 +1,6 @@
 // Trajectories and folders of scans: any contents and any file names give valid poses and points,
 // or an IoError that names the place.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"

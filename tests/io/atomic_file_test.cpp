@@ -4,7 +4,6 @@
 
 #include <csignal>
 
-#include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

@@ -1,10 +1,8 @@
 // Removal of the distortion by the motion of the sensor during a scan.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
-#include "files.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"
 

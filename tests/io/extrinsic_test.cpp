@@ -1,4 +1,3 @@
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "io/files.hpp"

@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include "dynains/errors.hpp"
 #include "support/standard.hpp"
 
 namespace dynains::test {

@@ -5,7 +5,6 @@
 
 #include <csignal>
 
-#include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

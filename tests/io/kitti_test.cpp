@@ -1,6 +1,5 @@
 #include "dynains/io/kitti.hpp"
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"

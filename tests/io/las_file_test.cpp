@@ -1,6 +1,5 @@
 // Maps in LAS files, and coordinate reference systems.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "files.hpp"
 #include "support/catch.hpp"

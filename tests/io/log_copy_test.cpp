@@ -2,7 +2,6 @@
 #include "io/logs/log_copy.hpp"
 
 #include "db3_writer.hpp"
-#include "files.hpp"
 #include "io/logs/log_file.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"

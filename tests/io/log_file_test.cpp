@@ -1,8 +1,6 @@
 #include "io/logs/log_file.hpp"
 
 #include "db3_writer.hpp"
-#include "dynains/errors.hpp"
-#include "files.hpp"
 #include "io/logs/decompress.hpp"
 #include "io/logs/log_copy.hpp"
 #include "log_writer.hpp"

@@ -1,9 +1,7 @@
 // Logs as recordings: topics, poses, labels, files.
 
 #include "db3_writer.hpp"
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
-#include "files.hpp"
 #include "io/logs/decompress.hpp"
 #include "log_writer.hpp"
 #include "support/catch.hpp"

@@ -1,6 +1,5 @@
 // Sweeps of nuScenes as recordings.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/recording.hpp"
 #include "nuscenes_writer.hpp"
 #include "support/catch.hpp"

@@ -1,8 +1,6 @@
 // Units and outliers of the times of points.
 #include "io/points/point_clock.hpp"
 
-#include "dynains/errors.hpp"
-#include "files.hpp"
 #include "ros_writer.hpp"
 #include "support/catch.hpp"
 

@@ -1,7 +1,6 @@
 // What the reader of point files says about some content.
 #pragma once
 
-#include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "files.hpp"
 #include "support/catch.hpp"

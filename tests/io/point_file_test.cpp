@@ -1,6 +1,5 @@
 #include "dynains/io/point_file.hpp"
 
-#include "dynains/errors.hpp"
 #include "point_file_of.hpp"
 #include "support/catch.hpp"
 

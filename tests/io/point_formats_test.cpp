@@ -1,6 +1,5 @@
 // Points in files of LAS, NumPy and text.
 
-#include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "io/points/point_sink.hpp"

@@ -1,7 +1,5 @@
 #include "io/logs/ros_messages.hpp"
 
-#include "dynains/errors.hpp"
-#include "files.hpp"
 #include "io/logs/transform_tree.hpp"
 #include "ros_writer.hpp"
 #include "support/catch.hpp"
