@@ -5,13 +5,9 @@ import assert from "node:assert";
 import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 
-import { openMcap, packages, require } from "../support/node_check.mjs";
+import { logPackages, openMcap } from "../support/node_check.mjs";
 
-const { core, rosmsg, serialization } = await packages(() => ({
-  core: require("@mcap/core"),
-  rosmsg: require("@foxglove/rosmsg"),
-  serialization: require("@foxglove/rosmsg2-serialization"),
-}));
+const { core, rosmsg, serialization } = await logPackages();
 
 const [log, copy, folder] = process.argv.slice(2);
 

@@ -8,6 +8,7 @@ import pathlib
 import sys
 
 try:
+    import numpy as np
     import rosbag
     import rospy
     from geometry_msgs.msg import TransformStamped
@@ -22,33 +23,26 @@ LEVER = (0.5, 0.0, 1.5)  # of the lidar in base_link, m
 
 
 def matrix_of(numbers):
-    """Rows of a 4x4 matrix from the 12 numbers of a line."""
-    values = [float(number) for number in numbers]
-    return [values[0:4], values[4:8], values[8:12], [0.0, 0.0, 0.0, 1.0]]
-
-
-def product(a, b):
-    return [[sum(a[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
-
-
-def inverse(pose):
-    rows = [[pose[j][i] for j in range(3)] for i in range(3)]
-    shift = [-sum(rows[i][k] * pose[k][3] for k in range(3)) for i in range(3)]
-    return [rows[i] + [shift[i]] for i in range(3)] + [[0.0, 0.0, 0.0, 1.0]]
+    """A 4x4 matrix from the 12 numbers of a line."""
+    return np.vstack([np.array(numbers, float).reshape(3, 4), [0, 0, 0, 1]])
 
 
 def set_pose(position, rotation, pose):
-    position.x, position.y, position.z = (pose[i][3] for i in range(3))
-    w = 0.5 * (1.0 + pose[0][0] + pose[1][1] + pose[2][2]) ** 0.5
+    position.x, position.y, position.z = pose[:3, 3]
+    w = 0.5 * np.trace(pose) ** 0.5
     assert w > 0.1, "the vehicle turns around"
     rotation.w = w
-    rotation.x = (pose[2][1] - pose[1][2]) / (4.0 * w)
-    rotation.y = (pose[0][2] - pose[2][0]) / (4.0 * w)
-    rotation.z = (pose[1][0] - pose[0][1]) / (4.0 * w)
+    rotation.x = (pose[2, 1] - pose[1, 2]) / (4.0 * w)
+    rotation.y = (pose[0, 2] - pose[2, 0]) / (4.0 * w)
+    rotation.z = (pose[1, 0] - pose[0, 1]) / (4.0 * w)
 
 
-def lines_of(path):
-    return [line.split() for line in path.read_text().splitlines()]
+def stamped(kind, frame, child, stamp=None):
+    message = kind()
+    message.header.stamp = stamp or rospy.Time()
+    message.header.frame_id = frame
+    message.child_frame_id = child
+    return message
 
 
 def cloud_of(file, stamp):
@@ -66,33 +60,25 @@ def cloud_of(file, stamp):
 
 
 def main(sequence, bag_file, compression):
-    camera_from_lidar = [matrix_of(line[1:]) for line in lines_of(sequence / "calib.txt")
-                         if line[0] == "Tr:"][0]
-    lidar_from_base = matrix_of([1, 0, 0, -LEVER[0], 0, 1, 0, -LEVER[1], 0, 0, 1, -LEVER[2]])
-    poses = [matrix_of(line) for line in lines_of(sequence / "poses.txt")]
-    times = [float(line[0]) for line in lines_of(sequence / "times.txt")]
+    lines = [line.split() for line in (sequence / "calib.txt").read_text().splitlines()]
+    (camera_from_lidar,) = [matrix_of(line[1:]) for line in lines if line[0] == "Tr:"]
+    base_from_lidar = np.eye(4)
+    base_from_lidar[:3, 3] = LEVER
+    poses = [matrix_of(row) for row in np.loadtxt(sequence / "poses.txt")]
+    times = np.loadtxt(sequence / "times.txt")
     with rosbag.Bag(str(bag_file), "w", compression=compression, chunk_threshold=200000) as bag:
-        extrinsic = TransformStamped()
-        extrinsic.header.frame_id = "base_link"
-        extrinsic.child_frame_id = "velodyne"
-        set_pose(extrinsic.transform.translation, extrinsic.transform.rotation,
-                 inverse(lidar_from_base))
+        extrinsic = stamped(TransformStamped, "base_link", "velodyne")
+        set_pose(extrinsic.transform.translation, extrinsic.transform.rotation, base_from_lidar)
         bag.write("/tf_static", TFMessage([extrinsic]), rospy.Time(1))
         for i, pose in enumerate(poses):
             stamp = rospy.Time.from_sec(1.0 + times[i])
-            odometry = Odometry()
-            odometry.header.stamp = stamp
-            odometry.header.frame_id = "odom"
-            odometry.child_frame_id = "base_link"
-            world_from_lidar = product(product(inverse(camera_from_lidar), pose), camera_from_lidar)
-            set_pose(odometry.pose.pose.position, odometry.pose.pose.orientation,
-                     product(world_from_lidar, lidar_from_base))
+            world_from_lidar = np.linalg.inv(camera_from_lidar) @ pose @ camera_from_lidar
+            world_from_base = world_from_lidar @ np.linalg.inv(base_from_lidar)
+            odometry = stamped(Odometry, "odom", "base_link", stamp)
+            set_pose(odometry.pose.pose.position, odometry.pose.pose.orientation, world_from_base)
             bag.write("/odom", odometry, stamp)
-            transform = TransformStamped()
-            transform.header = odometry.header
-            transform.child_frame_id = "base_link"
-            set_pose(transform.transform.translation, transform.transform.rotation,
-                     product(world_from_lidar, lidar_from_base))
+            transform = stamped(TransformStamped, "odom", "base_link", stamp)
+            set_pose(transform.transform.translation, transform.transform.rotation, world_from_base)
             bag.write("/tf", TFMessage([transform]), stamp)
             bag.write("/velodyne", cloud_of(sequence / "velodyne" / ("%06d.bin" % i), stamp), stamp)
 

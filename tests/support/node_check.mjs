@@ -14,6 +14,14 @@ export async function packages(load) {
   }
 }
 
+/// Packages that read and write logs of ROS 2.
+export const logPackages = () =>
+  packages(() => ({
+    core: require("@mcap/core"),
+    rosmsg: require("@foxglove/rosmsg"),
+    serialization: require("@foxglove/rosmsg2-serialization"),
+  }));
+
 export function expect(condition, message) {
   if (condition) return;
   console.log("FAILED: " + message);
