@@ -17,16 +17,6 @@ using Config = DynaInsRemover::Config;
 
 std::vector<Scan> passing_van() { return drive(oncoming(), 6, 5.0); }
 
-FrameResult push(DynaInsRemover& remover, const Scan& scan) {
-  return remover.push(scan.points, scan.T_world_sensor, scan.time);
-}
-
-std::vector<Eigen::Vector3d> map_points(const DynaInsRemover& remover) {
-  std::vector<Eigen::Vector3d> points;
-  remover.map().for_each([&](const Eigen::Vector3d& point) { points.push_back(point); });
-  return points;
-}
-
 TEST_CASE("with a lock of the caller, the map is read while another thread pushes") {
   const Config config = GENERATE(Config::paper(), Config());
   const std::vector<Scan> scans = passing_van();
@@ -119,8 +109,7 @@ TEST_CASE("a call during another call is refused and changes nothing") {
 TEST_CASE("threads that push into one object at once get answers or UsageError, no data race") {
   const std::vector<Scan> scans = drive(yard(), 1, 0.0);
   DynaInsRemover remover(Config::paper());
-  std::atomic<std::size_t> answers{0};
-  std::atomic<std::size_t> refusals{0};
+  std::atomic<std::size_t> answers{0}, refusals{0};
   const auto work = [&] {
     for (int i = 0; i < 10; ++i) {
       try {

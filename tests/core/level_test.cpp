@@ -11,13 +11,6 @@ namespace {
 
 using Config = DynaInsRemover::Config;
 
-Eigen::Matrix3d slant(double pitch, double roll) {
-  constexpr double kRadians = M_PI / 180.0;
-  return (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
-          Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
 // A drive at 5 m/s.
 std::vector<Scan> drive_slanted(double pitch, double roll) {
   const Scene scene = oncoming();
@@ -57,14 +50,10 @@ TEST_CASE("poses and map stay in the user's frames") {
   const auto check = [&](const ScanVerdict& verdict) {
     CHECK(verdict.T_world_sensor.isApprox(scans[verdict.scan].T_world_sensor, 1e-12));
   };
-  for (const Scan& scan : scans) {
-    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
-    check(frame.newest());
-  }
+  for (const Scan& scan : scans) check(push(remover, scan).newest());
   remover.flush(check);
   CHECK_FALSE(remover.sensor().is_level());
-  std::size_t count = 0;
-  std::size_t off = 0;
+  std::size_t count = 0, off = 0;
   remover.map().for_each([&](const Eigen::Vector3d& p) {
     ++count;
     bool on_pillar = false;
@@ -131,8 +120,7 @@ TEST_CASE("a given tilt is used without estimation") {
 
 TEST_CASE("the range of points is that of the sensor frame, tilted or not") {
   std::vector<Scan> scans = drive_slanted(25.0, 0.0);
-  const std::vector<Verdict> verdicts = run(Config(), scans).final;
-  for (const Verdict& verdict : verdicts) {
+  for (const Verdict& verdict : run(Config(), scans).final) {
     const Scan& scan = scans[verdict.scan];
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
       const bool is_near = std::hypot(scan.points[i].x(), scan.points[i].y()) < 2.7;

@@ -45,7 +45,7 @@ Listed list_objects(const std::vector<Scan>& scans, int threads) {
     }
   };
   for (const Scan& scan : scans) {
-    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    const FrameResult frame = push(remover, scan);
     keep(frame.newest(), listed.newest);
     if (frame.finished) keep(*frame.finished, listed.final);
   }

@@ -87,8 +87,7 @@ TEST_CASE("an invalid pose or time is refused with its reason, and the state doe
       CHECK_THROWS_WITH(remover.push(scans[s].points, scans[s].T_world_sensor, time),
                         StartsWith("time = ") && ContainsSubstring("greater than"));
     }
-    const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
-    REQUIRE((Verdict(frame.newest()) == expected.newest[s]));
+    REQUIRE((Verdict(push(remover, scans[s]).newest()) == expected.newest[s]));
   }
   remover.flush([&](const ScanVerdict& verdict) {
     REQUIRE((Verdict(verdict) == expected.final.at(verdict.scan)));
@@ -185,25 +184,19 @@ TEST_CASE("bad points do not change the labels of good points") {
                                             Eigen::Vector3f::Zero(),
                                             {std::numeric_limits<float>::infinity(), 1.0F, 2.0F},
                                             {1e20F, 1e20F, 1e20F}};
-  std::vector<std::vector<bool>> is_bad;
   for (Scan& scan : scans) {
     std::vector<Eigen::Vector3f> mixed;
-    is_bad.emplace_back();
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
-      if (i % 5 == 0) {
-        mixed.push_back(bad[i / 5 % bad.size()]);
-        is_bad.back().push_back(true);
-      }
+      if (i % 5 == 0) mixed.push_back(bad[i / 5 % bad.size()]);
       mixed.push_back(scan.points[i]);
-      is_bad.back().push_back(false);
     }
     scan.points = mixed;
   }
   const Run result = run(config, scans);
   for (std::size_t s = 0; s < scans.size(); ++s) {
     std::vector<PointLabel> good;
-    for (std::size_t i = 0; i < is_bad[s].size(); ++i) {
-      if (is_bad[s][i]) {
+    for (std::size_t i = 0; i < scans[s].points.size(); ++i) {
+      if (i % 6 == 0) {  // a bad point before each five
         REQUIRE(result.final[s].labels[i] <= PointLabel::kOutOfRange);
         REQUIRE(result.final[s].instances[i] == kNoInstance);
         REQUIRE(result.final[s].beliefs[i] == 0.0F);
@@ -251,12 +244,10 @@ TEST_CASE("any cloud can come between good ones") {
       REQUIRE(frame.newest().labels.size() == c.points.size());
     }
     for (std::size_t s = 0; s < scans.size(); ++s) {
-      const FrameResult frame =
-          remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+      const Verdict newest(push(remover, scans[s]).newest());
       // The default preset would derive the sensor model from the cloud of many points.
       if (config.decision == Decision::kFreeSpace && c.points.size() == 500000) continue;
-      REQUIRE((std::vector<PointLabel>(frame.newest().labels.begin(),
-                                       frame.newest().labels.end()) == expected.newest[s].labels));
+      REQUIRE((newest.labels == expected.newest[s].labels));
     }
   }
 }
@@ -270,7 +261,7 @@ TEST_CASE("a cloud that throws is not taken, and the state does not change") {
   for (const Scan& scan : scans) {
     CHECK_THROWS_WITH(remover.push(BrokenCloud{scan.points}, scan.T_world_sensor, scan.time),
                       "lost");
-    const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+    const FrameResult frame = push(remover, scan);
     result.newest.emplace_back(frame.newest());
     if (frame.finished) result.final.emplace_back(*frame.finished);
   }
@@ -299,8 +290,7 @@ struct FaintingClustererStages : DefaultStages {
 TEST_CASE("a remover that failed to adapt to its sensor adapts at the next scan") {
   BasicDynaInsRemover<FaintingClustererStages> remover;
   const std::vector<Scan> scans = good_scans();
-  const Scan& first = scans.front();
-  CHECK_THROWS_AS(remover.push(first.points, first.T_world_sensor, first.time), std::bad_alloc);
+  CHECK_THROWS_AS(push(remover, scans.front()), std::bad_alloc);
   CHECK_FALSE(remover.sensor().known());
   const Run expected = run(Config(), scans);
   const Run result = run(remover, scans);
@@ -312,13 +302,13 @@ TEST_CASE("a remover that failed to adapt to its sensor adapts at the next scan"
 TEST_CASE("a moved-from remover throws, and can be assigned to") {
   const std::vector<Scan> scans = drive(yard(), 3, 5.0);
   DynaInsRemover first;
-  first.push(scans[0].points, scans[0].T_world_sensor);
+  push(first, scans[0]);
   DynaInsRemover second = std::move(first);
-  CHECK_THROWS_AS(first.push(scans[1].points, scans[1].T_world_sensor), UsageError);
+  CHECK_THROWS_AS(push(first, scans[1]), UsageError);
   CHECK_THROWS_AS(first.flush([](const ScanVerdict&) {}), UsageError);
-  CHECK(second.push(scans[1].points, scans[1].T_world_sensor).newest().scan == 1);
+  CHECK(push(second, scans[1]).newest().scan == 1);
   first = std::move(second);
-  CHECK(first.push(scans[2].points, scans[2].T_world_sensor).newest().scan == 2);
+  CHECK(push(first, scans[2]).newest().scan == 2);
 }
 
 }  // namespace

@@ -81,26 +81,21 @@ TEST_CASE("the map is exactly the points with a static final label, each once") 
   const std::vector<Scan> scans = drive(oncoming(), 7, 5.0, 0.4);
   DynaInsRemover remover(config);
   const Run result = run(remover, scans);
-  std::array<std::vector<double>, 3> expected, found;  // coordinates
-  const auto add = [](const Eigen::Vector3d& p, auto& axes) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      axes[axis].push_back(p[static_cast<Eigen::Index>(axis)]);
-    }
-  };
+  std::vector<Eigen::Vector3d> expected, found = map_points(remover);
   for (const Verdict& verdict : result.final) {
     const Scan& scan = scans[verdict.scan];
     for (std::size_t i = 0; i < scan.points.size(); ++i) {
       if (!is_static(verdict.labels[i])) continue;
-      add(scan.T_world_sensor * scan.points[i].cast<double>(), expected);
+      expected.emplace_back(scan.T_world_sensor * scan.points[i].cast<double>());
     }
   }
-  remover.map().for_each([&](const Eigen::Vector3d& p) { add(p, found); });
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    REQUIRE(found[axis].size() == expected[axis].size());
-    std::sort(found[axis].begin(), found[axis].end());
-    std::sort(expected[axis].begin(), expected[axis].end());
-    for (std::size_t i = 0; i < found[axis].size(); ++i) {
-      REQUIRE(std::abs(found[axis][i] - expected[axis][i]) < 1e-4);
+  REQUIRE(found.size() == expected.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto by_axis = [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; };
+    std::sort(found.begin(), found.end(), by_axis);
+    std::sort(expected.begin(), expected.end(), by_axis);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      REQUIRE(std::abs(found[i][axis] - expected[i][axis]) < 1e-4);
     }
   }
 }
@@ -277,7 +272,7 @@ TEST_CASE("verdicts on newest scans are the same whether or not those before wer
   std::vector<Verdict> finals;
   const auto take = [&](const ScanVerdict& verdict) { finals.emplace_back(verdict); };
   for (std::size_t s = 0; s < scans.size(); ++s) {
-    const FrameResult frame = remover.push(scans[s].points, scans[s].T_world_sensor, scans[s].time);
+    const FrameResult frame = push(remover, scans[s]);
     if (frame.finished) take(*frame.finished);
     CHECK(frame.newest().time == scans[s].time);
     if (s % 3 == 0) CHECK((Verdict(frame.newest()) == all.newest[s]));
@@ -486,7 +481,7 @@ TEST_CASE("the corrected motion is that of the pushed frame, wherever the sensor
     std::size_t count = 0;
     for (std::size_t i = 0; i < scans.size(); ++i) {
       const Scan& scan = scans[i];
-      const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+      const FrameResult frame = push(remover, scan);
       CHECK((frame.newest().T_world_sensor.matrix() - scan.T_world_sensor.matrix()).norm() < 1e-9);
       if (!frame.pose_residual) continue;
       ++count;

@@ -80,7 +80,7 @@ Answers answers(FaintingConfig config, int threads, const std::vector<Scan>& sca
   for (const Scan& scan : scans) {
     try {
       ++pushes;
-      const FrameResult frame = remover.push(scan.points, scan.T_world_sensor, scan.time);
+      const FrameResult frame = push(remover, scan);
       result.verdicts.newest.emplace_back(frame.newest());
       result.epochs += frame.began_epoch ? 1 : 0;
       if (frame.pose_residual) result.residuals.push_back(frame.pose_residual->translation);
@@ -152,9 +152,8 @@ TEST_CASE("two threads give the same answers where poses are corrected") {
   std::vector<Scan> scans = one_passing_van();
   Random random(7);
   for (Scan& scan : scans) {
-    for (int i = 0; i < 3; ++i) {
-      scan.T_world_sensor.translation()[i] += random.uniform_float(-0.05, 0.05);
-    }
+    const Eigen::Vector3d most = Eigen::Vector3d::Constant(0.05);
+    scan.T_world_sensor.translation() += random.vector(-most, most);
   }
   const Answers one = check_equal(with_lookahead(8), scans);
   REQUIRE_FALSE(one.residuals.empty());
@@ -220,9 +219,7 @@ TEST_CASE("with two threads, one more scan than with one is open, and flush() gi
     config.map.failing_insert = static_cast<int>(one_passing_van().size()) - 1;
     FaintingRemover remover(config);
     CHECK(remover.latency() == latency + 1);
-    for (const Scan& scan : one_passing_van()) {
-      remover.push(scan.points, scan.T_world_sensor, scan.time);
-    }
+    for (const Scan& scan : one_passing_van()) push(remover, scan);
     std::size_t flushed = 0;
     const auto count = [&](const ScanVerdict&) { ++flushed; };
     CHECK_THROWS_AS(remover.flush(count), std::bad_alloc);

@@ -6,9 +6,16 @@
 
 namespace dynains::test {
 
+/// Adds a point of floats or doubles.
+template <class Derived>
+void add_point(PointBuffer& points, const Eigen::MatrixBase<Derived>& point) {
+  const Eigen::Vector3f p = point.template cast<float>();
+  points.push_back(p.x(), p.y(), p.z());
+}
+
 inline PointBuffer buffer_of(const std::vector<Eigen::Vector3f>& points) {
   PointBuffer result;
-  for (const Eigen::Vector3f& p : points) result.push_back(p.x(), p.y(), p.z());
+  for (const Eigen::Vector3f& p : points) add_point(result, p);
   return result;
 }
 

@@ -31,6 +31,17 @@ struct Verdict {
   }
 };
 
+template <class Stages>
+FrameResult push(BasicDynaInsRemover<Stages>& remover, const Scan& scan) {
+  return remover.push(scan.points, scan.T_world_sensor, scan.time);
+}
+
+inline std::vector<Eigen::Vector3d> map_points(const DynaInsRemover& remover) {
+  std::vector<Eigen::Vector3d> points;
+  remover.map().for_each([&](const Eigen::Vector3d& point) { points.push_back(point); });
+  return points;
+}
+
 struct Run {
   std::vector<Verdict> newest;  // verdicts without latency
   std::vector<Verdict> final;   // in the order of their calls

@@ -15,6 +15,14 @@ inline Eigen::Vector3d ray_of(double elevation, double azimuth) {
           std::sin(elevation)};
 }
 
+/// Rotation by a pitch and a roll, deg.
+inline Eigen::Matrix3d slant(double pitch, double roll) {
+  constexpr double kRadians = M_PI / 180.0;
+  return (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
 /// Distance (m) along `ray` from `place` to the wall of a room with the corners `low` and `high`.
 inline double range_to_wall(const Eigen::Vector3d& place, const Eigen::Vector3d& ray,
                             const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
