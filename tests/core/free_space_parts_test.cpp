@@ -104,7 +104,7 @@ std::vector<std::size_t> find_under(const GroundFootprint& footprint, const Poin
   std::vector<std::size_t> found;
   for (std::size_t begin = 0; begin < ground.size(); begin += kWordBits) {
     const std::uint64_t under =
-        footprint.find_under(GroundFootprint::block_of(ground, begin), clearance);
+        footprint.find_under(GroundFootprint::block_of(ground, begin / kWordBits), clearance);
     for (std::size_t i = 0; i < kWordBits; ++i) {
       if ((under >> i & 1U) != 0) found.push_back(begin + i);
     }

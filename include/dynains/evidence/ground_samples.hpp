@@ -29,8 +29,9 @@ struct Clearance {
 /// of each cell. All points are in the sensor frame (m).
 class GroundFootprint {
  public:
-  /// The block of `points` from index `begin` on; the last block may be shorter.
-  static PointsView block_of(PointsView points, std::size_t begin) {
+  /// Block number `block` of `points`; the last block may be shorter.
+  static PointsView block_of(PointsView points, std::size_t block) {
+    const std::size_t begin = block * kWordBits;
     return points.subview(begin, std::min(kWordBits, points.size() - begin));
   }
   static std::size_t block_count(std::size_t points) {
@@ -164,7 +165,7 @@ class GroundSampler {
     out.run_begins.assign(blocks, 0);
     std::size_t runs = 0;
     for (std::size_t i = 0; i < blocks; ++i) {
-      const PointsView block = GroundFootprint::block_of(ground, i * kWordBits);
+      const PointsView block = GroundFootprint::block_of(ground, i);
       out.run_begins[i] = sampler_.find_changes(block);
       firsts_.grow(runs + kWordBits);
       for_each_bit(out.run_begins[i], [&](std::size_t k) { firsts_.set(runs++, block, k); });

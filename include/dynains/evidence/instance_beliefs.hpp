@@ -28,17 +28,14 @@ class InstanceViews {
  public:
   /// Forgets all references. Computes the centres of the instances of a new scan.
   void begin(const InstanceSamples& samples) {
-    views_.resize(samples.instance_count());
-    std::uint32_t at = 0;
+    views_.assign(samples.instance_count(), View());
+    std::uint32_t i = 0;
     for (std::size_t instance = 0; instance < views_.size(); ++instance) {
-      const std::uint32_t begin = at;
-      at += samples.count(instance);
-      views_[instance] = View();
-      for (std::uint32_t i = begin; i < at; ++i) {
-        views_[instance].sum +=
-            Eigen::Vector3f(samples.points.x[i], samples.points.y[i], samples.points.z[i]);
+      View& view = views_[instance];
+      view.count = static_cast<float>(samples.count(instance));
+      for (const std::uint32_t end = i + samples.count(instance); i < end; ++i) {
+        view.sum += Eigen::Vector3f(samples.points.x[i], samples.points.y[i], samples.points.z[i]);
       }
-      views_[instance].count = static_cast<float>(at - begin);
     }
   }
 

@@ -42,10 +42,8 @@ struct TrackedInstances {
   };
   std::vector<Instance> instances;
 
-  /// Extent and overlap of an instance. Separate from Instance, which sums along tracks read.
+  /// Size and overlap of an instance. Separate from Instance, which sums along tracks read.
   struct Shape {
-    float length = 0.0F;            ///< m, horizontal diagonal
-    float height = 0.0F;            ///< m
     std::uint32_t cells = 0;        ///< number of its cells
     std::uint32_t age = 0;          ///< number of scans of its track before this one
     float previous_overlap = 0.0F;  ///< ratio of common to all cells, with Instance::past
@@ -80,7 +78,7 @@ class InstanceLinker {
       TrackedInstances::Shape& shape = out.shapes[i];
       const std::uint32_t begin = samples.sample_begin[samples.supervoxel_begin[i]];
       const std::uint32_t end = samples.sample_begin[samples.supervoxel_begin[i + 1]];
-      measure_extent(samples.points, begin, end, shape);
+      shape.carried = is_carried(samples.points, begin, end);
       if (!shape.carried) continue;
       for (std::uint32_t p = begin; p < end; ++p) {
         if (p > begin && place_[p] == place_[p - 1]) continue;
@@ -132,18 +130,15 @@ class InstanceLinker {
     return voxel_hash(cell.place) >> 8 & (kTable - 1);
   }
 
-  void measure_extent(const PointBuffer& points, std::uint32_t begin, std::uint32_t end,
-                      TrackedInstances::Shape& shape) const {
-    if (begin == end) return;
+  // Whether samples [begin, end) are small enough to be one object.
+  bool is_carried(const PointBuffer& points, std::uint32_t begin, std::uint32_t end) const {
+    if (end - begin < kMinSamples) return false;
     Eigen::AlignedBox3f box;
     for (std::uint32_t p = begin; p < end; ++p) {
       box.extend(Eigen::Vector3f(points.x[p], points.y[p], points.z[p]));
     }
     const Eigen::Vector3f size = box.sizes();
-    shape.length = std::hypot(size.x(), size.y());
-    shape.height = size.z();
-    shape.carried =
-        end - begin >= kMinSamples && shape.length <= max_length_ && shape.height <= max_height_;
+    return std::hypot(size.x(), size.y()) <= max_length_ && size.z() <= max_height_;
   }
 
   void connect(TrackedInstances& before, std::uint32_t from, TrackedInstances& now,

@@ -127,11 +127,11 @@ class MovedGround {
     if (!any) return;
     const std::uint8_t* const moved = moved_.data();
     const std::uint32_t* const group = group_of.data();
-    for (std::size_t begin = 0; begin < points.size(); begin += kWordBits) {
-      const PointsView block = GroundFootprint::block_of(points, begin);
+    for (std::size_t i = 0; i < GroundFootprint::block_count(points.size()); ++i) {
+      const PointsView block = GroundFootprint::block_of(points, i);
       std::uint64_t which = 0;
-      for (std::size_t i = 0; i < block.size(); ++i) {
-        which |= std::uint64_t{moved[group[begin + i]]} << i;
+      for (std::size_t k = 0; k < block.size(); ++k) {
+        which |= std::uint64_t{moved[group[i * kWordBits + k]]} << k;
       }
       if (which != 0) footprint_.add(block, which);
     }
@@ -146,7 +146,7 @@ class MovedGround {
     if (!footprint_.empty() && removes_footprint_) {
       with_packs([&](auto) {
         for (std::size_t i = 0; i < under_.size(); ++i) {
-          under_[i] = footprint_.find_under(block_of(ground, i), clearance_);
+          under_[i] = footprint_.find_under(GroundFootprint::block_of(ground, i), clearance_);
           any |= under_[i] != 0;
         }
       });
@@ -172,7 +172,7 @@ class MovedGround {
   void find_surroundings(PointsView ground, const GroundSamples& samples) {
     std::size_t count = 0;
     for (std::size_t i = 0; samples.size() > 0 && i < under_.size(); ++i) {
-      const PointsView block = block_of(ground, i);
+      const PointsView block = GroundFootprint::block_of(ground, i);
       const std::uint64_t beside = ~under_[i] & all_of(block);
       around_points_.grow(count + kWordBits);
       const std::uint64_t first = beside & (samples.run_begins[i] | ~(beside << 1U));
@@ -203,7 +203,7 @@ class MovedGround {
     const auto lowest = [](std::uint64_t bits) { return bits & (~bits + 1); };
     const std::uint32_t* group = samples.group_of.data();
     for (std::size_t i = 0; i < under_.size(); ++i) {
-      const PointsView block = block_of(ground, i);
+      const PointsView block = GroundFootprint::block_of(ground, i);
       const std::uint64_t runs = samples.size() > 0 ? samples.run_begins[i] : 0;
       std::uint64_t rising = rise_ > 0.0F ? find_rising(block, under_[i]) : under_[i];
       std::uint64_t moved = 0;
@@ -245,10 +245,6 @@ class MovedGround {
       bits |= std::uint64_t{is_seen} << k;
     });
     return bits;
-  }
-
-  static PointsView block_of(PointsView ground, std::size_t block) {
-    return GroundFootprint::block_of(ground, block * kWordBits);
   }
 
   static std::uint64_t all_of(PointsView block) {
