@@ -95,7 +95,7 @@ TEST_CASE("a moving van is one object with its place, size and velocity") {
   CHECK(listed.newest.front().object.id == listed.final.front().object.id);
 }
 
-/// Observes a scan of moving clusters: points from the corner `low` on, 10 x 10 in a rectangle.
+/// Observes a scan of moving clusters: points from the corner `low` on, 20 x 10 in a rectangle.
 struct Rectangle {
   Eigen::Vector2f low, size;  // m
   Cause cause = Cause::kFreeSpace;
@@ -111,9 +111,9 @@ Span<const MovingObject> observe(std::uint64_t i, const std::vector<Rectangle>& 
     scan.ids.push_back(c + 1);
     groups.push_back({clusters[c].cause, 1.0F});
     cluster_of.push_back(c);
-    for (int k = 0; k < 100; ++k) {
-      const Eigen::Array2f share(static_cast<float>(k % 10) / 9.0F,
-                                 static_cast<float>(k / 10) / 9.0F);
+    for (int k = 0; k < 200; ++k) {
+      const Eigen::Array2f share(static_cast<float>(k % 20) / 19.0F,
+                                 static_cast<float>(k / 20) / 9.0F);
       const Eigen::Array2f point = clusters[c].low.array() + share * clusters[c].size.array();
       scan.split.points.push_back(point.x(), point.y(), 0.0F);
       group_of.push_back(c + 1);
@@ -168,6 +168,39 @@ TEST_CASE("a car that comes out from behind another one is not faster than it dr
     }
   }
   CHECK(listed > 15);
+}
+
+TEST_CASE("parts that later scans know as one van are one object in final verdicts") {
+  detail::ObjectTracks newest(18.0, 4.5, 10, nullptr), final(18.0, 4.5, 10, &newest);
+  const auto seen = [](std::uint64_t i) -> std::vector<Rectangle> {
+    const float rear = 2.0F + 0.8F * static_cast<float>(i);
+    if (i >= 6) return {{{rear, 2.0F}, {4.2F, 1.8F}}};
+    return {{{rear, 2.0F}, {1.2F, 1.8F}}, {{rear + 2.4F, 2.0F}, {1.8F, 1.8F}}};
+  };
+  for (std::uint64_t i = 0; i < 30; ++i) {
+    observe(i, seen(i), newest);
+    if (i < 10) continue;
+    const auto objects = observe(i - 10, seen(i - 10), final);
+    REQUIRE(objects.size() == 1);
+    CHECK(objects[0].id == 1);
+    const double centre = 4.1 + 0.8 * static_cast<double>(i - 10);
+    CHECK(objects[0].centre.x() == Approx(centre).margin(0.5));
+  }
+}
+
+TEST_CASE("parts that move alike are one object where beams are as far apart as they are") {
+  const auto listed_at = [](float y) {
+    detail::ObjectTracks tracks(18.0, 4.5, 10, nullptr);
+    std::size_t listed = 0;
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      const float rear = -8.0F + 0.8F * static_cast<float>(i);
+      const Eigen::Vector2f size(1.8F, 1.8F);  // m; 0.5 m lie between both parts
+      listed = observe(i, {{{rear, y}, size}, {{rear + 2.3F, y}, size}}, tracks).size();
+    }
+    return listed;
+  };
+  CHECK(listed_at(25.0F) == 1);
+  CHECK(listed_at(3.0F) == 2);
 }
 
 TEST_CASE("points that were removed for others neither begin nor widen objects") {

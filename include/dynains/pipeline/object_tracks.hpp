@@ -43,7 +43,6 @@ class ObjectTracks {
     sensor_ = scan.T_world_level.translation();
     for (Track& track : tracks_) predict(scan.time - time_, track);
     time_ = scan.time;
-    begin_parts(scan);
     follow_points(scan, evidence);
     begin_tracks(scan);
     measure_extents(scan, evidence);
@@ -67,7 +66,8 @@ class ObjectTracks {
   static constexpr double kDeviations = 2.0;    // of usual errors
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
   static constexpr std::size_t kAxes = 9;  // directions that a box may have
-  // Distances between points of an object, m. Those between rings grow with the range.
+  // Distances between points and between parts of an object, m. They grow with the range as those
+  // between beams.
   static constexpr float kGap = 0.3F, kGapOfRange = 0.02F;
   static constexpr float kGapOfInstance = 0.2F;  // m, added for points of an instance of the object
   static constexpr float kAtSide = 0.1F;  // m: points nearer to a side of a box count equally
@@ -99,11 +99,6 @@ class ObjectTracks {
     Eigen::AlignedBox3f box;
     std::uint32_t points = 0;
     std::uint32_t begun = kNoIndex;  // their track
-
-    void vote(std::uint32_t t) {
-      if (lead == 0) track = t;
-      lead += track == t ? 1U : -1U;
-    }
   };
 
   // An instance that was part of an object.
@@ -146,6 +141,8 @@ class ObjectTracks {
   Eigen::Vector2d from_sensor(const MovingObject& object) const {
     return (object.centre - sensor_).head<2>();
   }
+  // `range`: m.
+  static float max_gap(float range) { return kGap + kGapOfRange * range; }
   bool is_followed(const Track& track) const { return time_ - track.seen <= kMaxUnseen; }
 
   static void predict(double dt, Track& track) {
@@ -156,15 +153,7 @@ class ObjectTracks {
     track.pv += dt * track.vv + 0.5 * dt * noise;
     track.vv += noise;
     const double turn = kTurnRate * dt;
-    track.yaw_variance = std::min(M_PI * M_PI, track.yaw_variance + turn * turn);
-  }
-
-  void begin_parts(const ScanSlot& scan) {
-    parts_.assign(scan.ids.size(), Part());
-    for (std::size_t p = 0; p < parts_.size(); ++p) {
-      const Track* const track = find(object_of(scan.ids[p]));
-      if (track != nullptr) parts_[p].named = static_cast<std::uint32_t>(track - tracks_.data());
-    }
+    track.yaw_variance += turn * turn;
   }
 
   // Points continue the nearest track, if its box is near enough.
@@ -174,13 +163,16 @@ class ObjectTracks {
       track.place = along(track.along, from_sensor(track.object).cast<float>());
       track.half = 0.5F * size_of(track.object).cast<float>().array();
     }
+    parts_.assign(scan.ids.size(), Part());
+    for (std::size_t p = 0; p < parts_.size(); ++p) parts_[p].named = find(object_of(scan.ids[p]));
     track_of_.clear();
     for_each_dynamic(scan, evidence, [&](std::uint32_t p, const auto& point, bool certain) {
       const std::uint32_t t = track_around(point, certain, parts_[p].named);
       track_of_.push_back(t);
       if (t != kNoIndex) {
         ++tracks_[t].points;
-        parts_[p].vote(t);
+        if (parts_[p].lead == 0) parts_[p].track = t;
+        parts_[p].lead += parts_[p].track == t ? 1U : -1U;
       } else if (certain) {
         parts_[p].box.extend(point);
         ++parts_[p].points;
@@ -191,7 +183,7 @@ class ObjectTracks {
   std::uint32_t track_around(const Eigen::Vector3f& point, bool certain,
                              std::uint32_t named) const {
     std::uint32_t around = kNoIndex;
-    float least = kGap + kGapOfRange * point.head<2>().norm();
+    float least = max_gap(point.head<2>().norm());
     for (std::uint32_t t = 0; t < tracks_.size(); ++t) {
       const Track& track = tracks_[t];
       if (!is_followed(track)) continue;
@@ -212,32 +204,45 @@ class ObjectTracks {
     for (std::size_t p = 0; p < parts_.size(); ++p) {
       Part& part = parts_[p];
       if (part.points < kMinPoints) continue;
-      const Eigen::Vector3d size = part.box.sizes().cast<double>();
-      if (size.head<2>().norm() > max_length_ || size.z() > max_height_) continue;
       MovingObject object;
       object.centre = sensor_ + part.box.center().cast<double>();
-      object.length = size.x();
-      object.width = size.y();
-      part.begun = static_cast<std::uint32_t>(tracks_.size());
-      begin_track(scan, scan.ids[p], object);
-      tracks_.back().points = part.points;
+      object.length = static_cast<double>(part.box.sizes().x());
+      object.width = static_cast<double>(part.box.sizes().y());
+      const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(scan.ids[p]);
+      part.begun = track_that_holds(object, id);
+      if (part.begun == tracks_.size()) begin_track(scan, object, id);
+      tracks_[part.begun].points += part.points;
       if (part.track == kNoIndex) part.track = part.begun;
     }
   }
 
-  // The box of two objects along the axes of the first one, from its centre, m. None if they are
-  // not beside each other, or too large for one object.
+  // The track of a part that later scans know to be of this object: the one that it has, if both
+  // fit into the size that is known by then, or else a new one.
+  std::uint32_t track_that_holds(const MovingObject& part, std::uint32_t id) const {
+    const auto begun = static_cast<std::uint32_t>(tracks_.size());
+    const std::uint32_t t = find(id);
+    if (t == kNoIndex || !is_followed(tracks_[t])) return begun;
+    const auto box = common_box(tracks_[t].object, part, max_length_);
+    const Track* const known = known_later(id);
+    const bool is_size_known = known != nullptr && known->is_directed;
+    if (is_size_known && box && (box->sizes() - size_of(known->object)).maxCoeff() > kGap) {
+      return begun;
+    }
+    return box ? t : begun;
+  }
+
+  // The box of two objects along the axes of the first one, from its centre, m. None if the gap
+  // between them, or their box, is too large.
   std::optional<Eigen::AlignedBox2d> common_box(const MovingObject& first,
-                                                const MovingObject& second) const {
+                                                const MovingObject& second, double reach) const {
     const Eigen::Matrix2d R = axes_of(first.yaw).transpose();
     const Eigen::Vector2d half = 0.5 * size_of(first);
     const Eigen::Vector2d other = 0.5 * (R * axes_of(second.yaw)).cwiseAbs() * size_of(second);
     const Eigen::Vector2d offset = R * (second.centre - first.centre).head<2>();
     const double gap = (offset.cwiseAbs() - half - other).cwiseMax(0.0).norm();
-    if (gap > std::min<double>(kGap, std::max(half.norm(), other.norm()))) return std::nullopt;
     Eigen::AlignedBox2d box(-half, half);
     box.extend(Eigen::AlignedBox2d(offset - other, offset + other));
-    if (!is_size_of_object(box.sizes())) return std::nullopt;
+    if (gap > reach || !is_size_of_object(box.sizes())) return std::nullopt;
     return box;
   }
 
@@ -246,13 +251,13 @@ class ObjectTracks {
     return size.norm() <= max_length_ && size.minCoeff() <= max_height_;
   }
 
-  void begin_track(const ScanSlot& scan, std::uint32_t instance, const MovingObject& object) {
+  void begin_track(const ScanSlot& scan, const MovingObject& object, std::uint32_t id) {
     Track track;
     track.axes.fill(Eigen::Vector2f::Zero());
-    const std::uint32_t id = later_ == nullptr ? 0 : later_->object_of(instance);
-    const Track* const known = find(id) != nullptr ? nullptr : known_later(id);
+    const Track* const known = find(id) != kNoIndex ? nullptr : known_later(id);
     track.object = object;
-    track.object.id = known != nullptr ? id : next_id();
+    std::uint32_t& last_id = later_ != nullptr ? later_->last_id_ : last_id_;
+    track.object.id = known != nullptr ? id : ++last_id;
     track.object.first_scan = scan.scan;
     track.pp = kError * kError;
     track.vv = kSpeed * kSpeed;
@@ -267,8 +272,6 @@ class ObjectTracks {
     tracks_.push_back(track);
   }
 
-  std::uint32_t next_id() { return later_ != nullptr ? later_->next_id() : ++last_id_; }
-
   // The place of an instance in named_, or the place behind it.
   std::size_t place_of(std::uint32_t instance) const {
     std::size_t i = 0;
@@ -280,13 +283,15 @@ class ObjectTracks {
     const std::size_t i = place_of(instance);
     return i < named_.size() ? named_[i].object : 0;
   }
-  const Track* find(std::uint32_t id) const {
-    const auto found = std::find_if(tracks_.begin(), tracks_.end(),
-                                    [&](const Track& track) { return track.object.id == id; });
-    return found == tracks_.end() ? nullptr : &*found;
+  // The index of the track of an object, or kNoIndex.
+  std::uint32_t find(std::uint32_t id) const {
+    std::uint32_t t = 0;
+    while (t < tracks_.size() && tracks_[t].object.id != id) ++t;
+    return t < tracks_.size() ? t : kNoIndex;
   }
   const Track* known_later(std::uint32_t id) const {
-    return later_ == nullptr ? nullptr : later_->find(id);
+    const std::uint32_t t = later_ == nullptr ? kNoIndex : later_->find(id);
+    return t == kNoIndex ? nullptr : &later_->tracks_[t];
   }
 
   // Yaws that a box may have, as far as that of the track is uncertain.
@@ -461,7 +466,8 @@ class ObjectTracks {
         const bool move_alike = (to.velocity - from.velocity).squaredNorm() <=
                                 kUnlikely * (tracks_[a].vv + tracks_[b].vv);
         if (!is_directed_now(tracks_[a]) || !is_directed_now(tracks_[b]) || !move_alike) continue;
-        const auto box = common_box(to, from);
+        const float range = static_cast<float>(from_sensor(to).norm());
+        const auto box = common_box(to, from, max_gap(range));
         if (!box) continue;
         to.centre.head<2>() += axes_of(to.yaw) * box->center();
         to.length = box->sizes().x();
@@ -499,9 +505,7 @@ class ObjectTracks {
              (!is_followed(track) && scan > track.object.last_scan + memory_);
     };
     tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), is_lost), tracks_.end());
-    const auto is_old = [&](const Named& named) {
-      return scan > named.scan + memory_ && find(named.object) == nullptr;
-    };
+    const auto is_old = [&](const Named& named) { return scan > named.scan + memory_; };
     named_.erase(std::remove_if(named_.begin(), named_.end(), is_old), named_.end());
   }
 
