@@ -145,14 +145,10 @@ class ScanSample {
 
 using Pairs = std::vector<Pair>;
 
-RegisteredMotion motion_of_pair(const Pair& pair) {
-  return {0, pair.first, pair.second, Pose::Identity(), {}, 0.0};
-}
-
 Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs) {
   Agreement mean{0.0, 0.0, 0};  // weighted by points
   for (const Pair& pair : pairs) {
-    const auto T_a_b = motion(motion_of_pair(pair));
+    const auto T_a_b = motion(pair.first, pair.second);
     if (!T_a_b) continue;
     const Agreement one = pair.a.compare(pair.b, *T_a_b);
     const auto points = static_cast<double>(one.points);
@@ -165,19 +161,17 @@ Agreement agreement_under(const BodyMotion& motion, const Pairs& pairs) {
   return {mean.share / points, mean.gap / points, mean.points};
 }
 
-std::optional<Pose> no_motion(const RegisteredMotion& /*motion*/) { return Pose::Identity(); }
+std::optional<Pose> no_motion(std::size_t /*first*/, std::size_t /*second*/) {
+  return Pose::Identity();
+}
 
 /// The turns of a motion without its ways.
 BodyMotion turns_of(const BodyMotion& motion) {
-  return [motion](const RegisteredMotion& pair) {
-    auto T = motion(pair);
+  return [motion](std::size_t first, std::size_t second) {
+    auto T = motion(first, second);
     if (T) T->translation().setZero();
     return T;
   };
-}
-
-BodyMotion given_motion(const Recording& recording) {
-  return motion_under(recording, Reading{recording.convention(), recording.time_offset(), 0});
 }
 
 struct SampledPairs {
@@ -255,7 +249,7 @@ bool miss_motion(const std::vector<RegisteredMotion>& motions, const BodyMotion&
   constexpr double kMaxRatio = 0.7;  // ratio
   std::size_t moving = 0, missed = 0;
   for (const RegisteredMotion& motion : motions) {
-    const auto T = given(motion);
+    const auto T = given(motion.first, motion.second);
     if (!T) continue;
     const double by_poses = extent_of(*T);
     const double by_scans = extent_of(motion.T_first_second);
@@ -298,10 +292,10 @@ struct Evidence {
   Evidence where_known(const BodyMotion& motion) const {
     Evidence known{recording, {}, {}, as_given, standing, overlaps};
     for (const Pair& pair : pairs) {
-      if (motion(motion_of_pair(pair))) known.pairs.push_back(pair);
+      if (motion(pair.first, pair.second)) known.pairs.push_back(pair);
     }
     for (const RegisteredMotion& one : motions) {
-      if (motion(one)) known.motions.push_back(one);
+      if (motion(one.first, one.second)) known.motions.push_back(one);
     }
     if (known.pairs.size() < pairs.size()) {
       known.as_given = agreement_under(given_motion(recording), known.pairs);
@@ -420,7 +414,7 @@ bool are_refuted(const Evidence& evidence) {
   const BodyMotion given = given_motion(evidence.recording);
   std::size_t refuted = 0;
   for (const Pair& pair : evidence.pairs) {
-    const auto T_given = given(motion_of_pair(pair));
+    const auto T_given = given(pair.first, pair.second);
     if (!T_given) continue;
     const auto fit_under = [&](const Pose& T) {
       return fit_of(pair.a.surfaces(), pair.b.points(), T);

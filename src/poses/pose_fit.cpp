@@ -9,7 +9,6 @@
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/surfaces/landmarks.hpp"
 #include "dynains/surfaces/motion_size.hpp"
-#include "dynains/surfaces/scan_registration.hpp"
 #include "dynains/surfaces/way_search.hpp"
 #include "dynains/threads/in_two_threads.hpp"
 #include "io/points/finite_points.hpp"
@@ -75,19 +74,13 @@ Vector6 residual(const Pose& body, const Pose& sensor, const Pose& T_body_sensor
 }
 
 /// A motion by two registrations, forth and back.
-struct CheckedMotion {
-  Pose T_a_b;
-  Vector6 difference;
-  double deviation;  // m
-};
-
-std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
-                                     const std::optional<Registration>& back, double deviation) {
+std::optional<RegisteredMotion> checked(const std::optional<Registration>& forth,
+                                        const std::optional<Registration>& back, double deviation) {
   constexpr double kNoisy = 0.25;  // m, 10 m from the sensor
   if (!is_certain(forth) || !is_certain(back)) return std::nullopt;
   const Vector6 difference = residual(forth->T_a_b, back->T_a_b.inverse(), Pose::Identity());
   if (difference.norm() > kNoisy) return std::nullopt;
-  return CheckedMotion{forth->T_a_b, difference, deviation};
+  return RegisteredMotion{forth->T_a_b, difference, deviation};
 }
 
 /// Completes a registration by planes that leaves a direction open: landmarks determine the motion
@@ -95,9 +88,9 @@ std::optional<CheckedMotion> checked(const std::optional<Registration>& forth,
 /// always the open one: the back of a vehicle ahead is a plane, too. Empty if landmarks agree
 /// better without motion along it, or with the distant motion `given`: they can meet by oncoming
 /// traffic.
-std::optional<CheckedMotion> complete(const ChainScan& a, const ChainScan& b,
-                                      const Registration& by_planes, const Pose& given,
-                                      double farthest) {
+std::optional<RegisteredMotion> complete(const ChainScan& a, const ChainScan& b,
+                                         const Registration& by_planes, const Pose& given,
+                                         double farthest) {
   std::optional<Registration> best;
   double min_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
@@ -143,9 +136,10 @@ bool differ_along(const Eigen::Vector3d& direction, const Pose& T, const Pose& o
 /// Registers b to a. Empty if the motion is uncertain, or if landmarks meet better under the
 /// `given` one: planes also meet that move with the sensor, as traffic, rails and the rings of
 /// beams do.
-std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainScan& b,
-                                                const Pose& given, const std::vector<Pose>& guesses,
-                                                double farthest) {
+std::optional<RegisteredMotion> register_both_ways(const ChainScan& a, const ChainScan& b,
+                                                   const Pose& given,
+                                                   const std::vector<Pose>& guesses,
+                                                   double farthest) {
   constexpr double kWorse = 1.02;  // ratio of gaps
   // Poses that are exact need no other guesses, unless they stand, as those of another recording.
   auto forth = register_near(a.surfaces(), b.points(), given);
@@ -161,7 +155,8 @@ std::optional<CheckedMotion> register_both_ways(const ChainScan& a, const ChainS
     found = checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
   }
   const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
-  return found && gap_under(found->T_a_b) < kWorse * gap_under(given) ? found : std::nullopt;
+  return found && gap_under(found->T_first_second) < kWorse * gap_under(given) ? found
+                                                                               : std::nullopt;
 }
 
 struct BothMotions {
@@ -269,11 +264,13 @@ std::vector<RegisteredMotion> chain_at(const Recording& recording, std::size_t n
   const ChainScan a(recording, first);
   std::vector<RegisteredMotion> motions;
   const auto add = [&](std::size_t second, const std::vector<Pose>& guesses, double farthest) {
-    const auto found =
-        register_both_ways(a, ChainScan(recording, second),
-                           motion_between(recording, first, second), guesses, farthest);
+    auto found = register_both_ways(a, ChainScan(recording, second),
+                                    motion_between(recording, first, second), guesses, farthest);
     if (!found) return false;
-    motions.push_back({number, first, second, found->T_a_b, found->difference, found->deviation});
+    found->first = first;
+    found->second = second;
+    found->chain = number;
+    motions.push_back(*found);
     return true;
   };
   const double farthest = longest_way(recording.time(first + 1) - recording.time(first));
@@ -344,7 +341,7 @@ std::vector<RegisteredMotion> by_other_ways(const Recording& recording,
     };
     const auto first = motion_to(motion.first), second = motion_to(motion.second);
     if (!first || !second) return std::nullopt;
-    const Pose T_other = first->T_a_b.inverse() * second->T_a_b;
+    const Pose T_other = first->T_first_second.inverse() * second->T_first_second;
     motion.difference = residual(motion.T_first_second, T_other, Pose::Identity());
     motion.T_first_second = T_other;
     return motion;
@@ -389,30 +386,24 @@ bool are_poses_exact(const Recording& recording) {
 
 MotionError motion_error(const std::vector<RegisteredMotion>& motions, const BodyMotion& body,
                          const Pose& T_body_sensor, std::size_t gap) {
-  std::vector<double> translations, rotations, translation_noise, rotation_noise, both, noise;
+  std::array<std::vector<double>, 6> columns;  // in the order of MotionError
   const Vector6 weights = weights_of_axes(motions);
   for (const RegisteredMotion& motion : motions) {
     if (gap > 0 && motion.second != motion.first + gap) continue;
-    const auto T_body = body(motion);
+    const auto T_body = body(motion.first, motion.second);
     if (!T_body) continue;
     const Vector6 r = residual(*T_body, motion.T_first_second, T_body_sensor);
     const Vector6& d = motion.difference;
-    translations.push_back(r.head<3>().norm());
-    rotations.push_back(r.tail<3>().norm() / kLever);
-    translation_noise.push_back(std::hypot(d.head<3>().norm(), motion.deviation));
-    rotation_noise.push_back(d.tail<3>().norm() / kLever);
-    both.push_back(r.cwiseProduct(weights).norm());
-    noise.push_back(std::hypot(d.cwiseProduct(weights).norm(), motion.deviation));
+    const double row[] = {r.head<3>().norm(),
+                          r.tail<3>().norm() / kLever,
+                          std::hypot(d.head<3>().norm(), motion.deviation),
+                          d.tail<3>().norm() / kLever,
+                          r.cwiseProduct(weights).norm(),
+                          std::hypot(d.cwiseProduct(weights).norm(), motion.deviation)};
+    for (std::size_t k = 0; k < columns.size(); ++k) columns[k].push_back(row[k]);
   }
-  MotionError error;
-  error.pairs = both.size();
-  error.translation = median(std::move(translations));
-  error.rotation = median(std::move(rotations));
-  error.translation_noise = median(std::move(translation_noise));
-  error.rotation_noise = median(std::move(rotation_noise));
-  error.at_points = median(std::move(both));
-  error.noise = median(std::move(noise));
-  return error;
+  const auto middle = [&](std::size_t k) { return median(columns[k]); };
+  return {middle(0), middle(1), middle(2), middle(3), middle(4), middle(5), columns[0].size()};
 }
 
 double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyMotion& body) {
@@ -420,24 +411,22 @@ double error_at_points(const std::vector<RegisteredMotion>& motions, const BodyM
 }
 
 BodyMotion with_drift(const BodyMotion& body, const std::vector<RegisteredMotion>& motions) {
-  const auto scans = [](const RegisteredMotion& motion) {
-    return static_cast<double>(motion.second - motion.first);
-  };
   std::array<std::vector<double>, 3> turns;  // from scan to scan, rad times kLever
   for (const RegisteredMotion& motion : motions) {
-    const auto T = body(motion);
+    const auto T = body(motion.first, motion.second);
     if (!T) continue;
     const Vector6 r = residual(*T, motion.T_first_second, Pose::Identity());
+    const auto scans = static_cast<double>(motion.second - motion.first);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      turns[axis].push_back(r[static_cast<Eigen::Index>(3 + axis)] / scans(motion));
+      turns[axis].push_back(r[static_cast<Eigen::Index>(3 + axis)] / scans);
     }
   }
   detail::PoseStep drift = {};
   for (std::size_t axis = 0; axis < 3; ++axis) drift[3 + axis] = median(turns[axis]) / kLever;
   const Pose T_drift = detail::moved(Pose::Identity(), drift);
-  return [=](const RegisteredMotion& motion) {
-    auto T = body(motion);
-    if (T) *T = *T * detail::scaled_motion(T_drift, scans(motion));
+  return [=](std::size_t first, std::size_t second) {
+    auto T = body(first, second);
+    if (T) *T = *T * detail::scaled_motion(T_drift, static_cast<double>(second - first));
     return T;
   };
 }
@@ -447,7 +436,7 @@ std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registere
   constexpr std::size_t kMin = 4;
   std::vector<BothMotions> motions;
   for (const RegisteredMotion& motion : registered) {
-    const auto T_body = body(motion);
+    const auto T_body = body(motion.first, motion.second);
     if (T_body) motions.push_back({*T_body, motion.T_first_second});
   }
   if (motions.size() < kMin) return std::nullopt;
@@ -464,15 +453,6 @@ std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registere
     least = cost;
   }
   return best;
-}
-
-std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,
-                                      std::size_t which) {
-  std::vector<RegisteredMotion> half;
-  for (const RegisteredMotion& motion : motions) {
-    if (motion.chain % 2 == which) half.push_back(motion);
-  }
-  return half;
 }
 
 }  // namespace dynains

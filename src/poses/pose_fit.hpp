@@ -9,6 +9,7 @@
 
 #include "dynains/io/recording.hpp"
 #include "dynains/pose.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
 
 namespace dynains {
 
@@ -18,13 +19,13 @@ inline constexpr std::size_t kMaxSpan = 9;     ///< scans, of a registered motio
 
 /// Motion of the sensor between two scans, by their registration.
 struct RegisteredMotion {
-  std::size_t chain;   ///< motions of one chain begin at one scan
-  std::size_t first;   ///< scan
-  std::size_t second;  ///< scan
   Pose T_first_second;
   /// Difference of both directions of the registration: translation, and rotation times 10 m, m.
-  Eigen::Matrix<double, 6, 1, Eigen::DontAlign> difference;
-  double deviation;  ///< m, of a direction that landmarks determine; 0: none
+  Vector6 difference;
+  double deviation;        ///< m, of a direction that landmarks determine; 0: none
+  std::size_t first = 0;   ///< scan
+  std::size_t second = 0;  ///< scan
+  std::size_t chain = 0;   ///< motions of one chain begin at one scan
 };
 
 /// Registers pairs of scans at 12 places of a recording, neighbours and scans farther apart. If the
@@ -44,7 +45,7 @@ std::vector<RegisteredMotion> by_other_ways(const Recording& recording,
                                             std::size_t gap);
 
 /// Motion of the body between two scans under some reading of the poses; empty without poses.
-using BodyMotion = std::function<std::optional<Pose>(const RegisteredMotion&)>;
+using BodyMotion = std::function<std::optional<Pose>(std::size_t first, std::size_t second)>;
 
 /// Difference of poses and registered motions: medians over pairs.
 struct MotionError {
@@ -73,9 +74,5 @@ BodyMotion with_drift(const BodyMotion& body, const std::vector<RegisteredMotion
 /// best. Directions that the motions do not determine stay 0. Empty for fewer than 4 motions.
 std::optional<Pose> fit_extrinsic(const std::vector<RegisteredMotion>& registered,
                                   const BodyMotion& body);
-
-/// The motions of even (0) or odd (1) chains.
-std::vector<RegisteredMotion> half_of(const std::vector<RegisteredMotion>& motions,
-                                      std::size_t which);
 
 }  // namespace dynains

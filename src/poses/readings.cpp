@@ -33,10 +33,10 @@ Reading given_reading(const Recording& recording) {
 std::optional<Reading> fit_scale(const Recording& recording, const Motions& motions) {
   constexpr double kMinWay = 0.2;     // m
   constexpr double kMaxFactor = 3.0;  // more is another unit, or no motion
-  const BodyMotion given = motion_under(recording, given_reading(recording));
+  const BodyMotion given = given_motion(recording);
   std::vector<double> factors;
   for (const RegisteredMotion& motion : motions) {
-    const auto T = given(motion);
+    const auto T = given(motion.first, motion.second);
     if (!T || !(T->translation().norm() > kMinWay)) continue;
     const Eigen::Vector3d way = T->translation();
     factors.push_back(way.dot(motion.T_first_second.translation()) / way.squaredNorm());
@@ -124,12 +124,12 @@ Eigen::Vector3d middle_in_file(const Recording& recording, std::size_t i) {
 
 BodyMotion motion_under(const Recording& recording, const Reading& reading) {
   const double offset = reading.time_offset - recording.time_offset();
-  return [&recording, convention = reading.convention,
-          offset](const RegisteredMotion& motion) -> std::optional<Pose> {
+  return [&recording, convention = reading.convention, offset](
+             std::size_t first, std::size_t second) -> std::optional<Pose> {
     const auto pose_of = [&](std::size_t i) {
       return offset == 0.0 ? recording.pose_under(convention, i) : recording.pose_after(i, offset);
     };
-    const auto T_world_a = pose_of(motion.first), T_world_b = pose_of(motion.second);
+    const auto T_world_a = pose_of(first), T_world_b = pose_of(second);
     if (!T_world_a || !T_world_b) return std::nullopt;
     return T_world_a->inverse() * *T_world_b;
   };
@@ -182,8 +182,8 @@ std::vector<Reading> usual_readings(const Recording& recording) {
 
 std::vector<Reading> fitted_readings(const Recording& recording, const Motions& motions) {
   using Fit = std::function<std::optional<Reading>(const Motions&)>;
-  std::vector<Fit> fits = {[&](const Motions& some) { return fit_scale(recording, some); },
-                           [&](const Motions& some) { return fit_offset(recording, some); }};
+  std::vector<Fit> fits = {[&](const Motions& of) { return fit_scale(recording, of); },
+                           [&](const Motions& of) { return fit_offset(recording, of); }};
   const Reading given = given_reading(recording);
   std::vector<Reading> bases = {given, given};
   bases.back().convention.invert = !given.convention.invert;
@@ -195,13 +195,16 @@ std::vector<Reading> fitted_readings(const Recording& recording, const Motions& 
     bases.back().complexity = 1;
   }
   for (const Reading& base : bases) {
-    fits.emplace_back([&, base](const Motions& some) { return fit_body(recording, some, base); });
+    fits.emplace_back([&, base](const Motions& of) { return fit_body(recording, of, base); });
   }
-  const Motions others = half_of(motions, 1);
-  const double before = error_at_points(others, motion_under(recording, given));
+  Motions some, others;
+  for (const RegisteredMotion& motion : motions) {
+    (motion.chain % 2 == 0 ? some : others).push_back(motion);
+  }
+  const double before = error_at_points(others, given_motion(recording));
   std::vector<Reading> readings;
   for (const Fit& fit : fits) {
-    const auto of_half = fit(half_of(motions, 0));
+    const auto of_half = fit(some);
     if (!of_half) continue;
     const double then = error_at_points(others, motion_under(recording, *of_half));
     if (!is_much_smaller(then, before)) continue;

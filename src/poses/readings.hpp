@@ -23,6 +23,10 @@ struct Reading {
 
 /// The motion of the sensor under a reading. `recording` must outlive the result.
 BodyMotion motion_under(const Recording& recording, const Reading& reading);
+/// That under the given meaning.
+inline BodyMotion given_motion(const Recording& recording) {
+  return motion_under(recording, {recording.convention(), recording.time_offset(), 0});
+}
 
 /// Whether an error (m) of points 10 m from the sensor is clearly smaller than another one.
 bool is_much_smaller(double error, double other);
