@@ -17,11 +17,6 @@
 namespace dynains::run {
 namespace {
 
-nlohmann::ordered_json to_json(std::vector<double> values) {
-  const Statistics s = statistics(std::move(values));
-  return {{"median", s.median}, {"p95", s.p95}, {"p99", s.p99}, {"max", s.max}};
-}
-
 nlohmann::ordered_json times_to_json(const RunTiming& timing) {
   std::map<std::string, std::vector<double>> columns;
   for (const TimingRow& row : timing.rows) {
@@ -31,9 +26,10 @@ nlohmann::ordered_json times_to_json(const RunTiming& timing) {
   }
   nlohmann::ordered_json json;
   const StageTimes none;
-  StageTimes::visit(
-      none, [&](const char* stage, double) { json[stage] = to_json(std::move(columns[stage])); });
-  json["total"] = to_json(std::move(columns["total"]));
+  StageTimes::visit(none, [&](const char* stage, double) {
+    json[stage] = statistics(std::move(columns[stage]));
+  });
+  json["total"] = statistics(std::move(columns["total"]));
   return json;
 }
 
@@ -45,7 +41,7 @@ nlohmann::ordered_json pose_residual_to_json(const RunTiming& timing) {
     degrees.push_back(row.pose_residual->second);
   }
   if (metres.empty()) return nullptr;
-  return {{"metres", to_json(std::move(metres))}, {"degrees", to_json(std::move(degrees))}};
+  return {{"metres", statistics(std::move(metres))}, {"degrees", statistics(std::move(degrees))}};
 }
 
 /// Highest resident memory of this process so far.
@@ -57,14 +53,17 @@ std::uint64_t peak_memory_bytes() {
 
 }  // namespace
 
-Statistics statistics(std::vector<double> values) {
-  if (values.empty()) return {};
+nlohmann::ordered_json statistics(std::vector<double> values) {
+  if (values.empty()) values = {0.0};
   std::sort(values.begin(), values.end());
   const auto quantile = [&](double share) {
     const double rank = std::ceil(share * static_cast<double>(values.size()));
     return values[std::max<std::size_t>(static_cast<std::size_t>(rank), 1) - 1];
   };
-  return {quantile(0.5), quantile(0.95), quantile(0.99), values.back()};
+  return {{"median", quantile(0.5)},
+          {"p95", quantile(0.95)},
+          {"p99", quantile(0.99)},
+          {"max", values.back()}};
 }
 
 nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_json& doubts,

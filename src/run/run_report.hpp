@@ -22,15 +22,10 @@ struct TrackRow {
   MovingObject object;
 };
 
-/// Statistics of one number, for example milliseconds, over all scans. Quantiles are the smallest
-/// value that at least that share of the values does not exceed; all 0 if there are none.
-struct Statistics {
-  double median = 0.0;
-  double p95 = 0.0;
-  double p99 = 0.0;
-  double max = 0.0;
-};
-Statistics statistics(std::vector<double> values);
+/// "median", "p95", "p99" and "max" of one number, for example milliseconds, over all scans.
+/// Quantiles are the smallest value that at least that share of the values does not exceed; all 0
+/// if there are none.
+nlohmann::ordered_json statistics(std::vector<double> values);
 
 /// `doubts`: see to_json(RunDoubts), and "warnings".
 nlohmann::ordered_json make_report(const RunPlan& plan, const nlohmann::ordered_json& doubts,
