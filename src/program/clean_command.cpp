@@ -210,7 +210,7 @@ void add_scans(const Recording& recording, const ResultFolder& out, bool quiet,
   const VerdictFiles files(out.path());
   std::size_t done = 0;
   for (const std::size_t i : scans) {
-    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    InterruptGuard::check();
     recording.read_scan(i, scan);
     const std::vector<std::uint32_t> labels = files.labels(recording.name(i), scan.size());
     const Pose& T_world_sensor = recording.T_world_sensor(i);

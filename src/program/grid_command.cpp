@@ -55,13 +55,8 @@ PlacedGrid grid_of_results(GridOptions& options, const ResultFolder& out,
     files.read(recording.name(i), scan.size()).unpack(scan, verdict);
     std::swap(labels, verdict.labels);
   };
-  PlacedGrid made = grid_of_run(read, recording, scans, options.config, options.keep_moving,
-                                [&](std::size_t done) {
-                                  progress.update(done);
-                                  return InterruptGuard::signal() == 0;
-                                });
-  if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
-  return made;
+  return grid_of_run(read, recording, scans, options.config, options.keep_moving,
+                     [&](std::size_t done) { progress.update(done); });
 }
 
 void write(GridOptions& options) {

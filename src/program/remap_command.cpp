@@ -107,7 +107,7 @@ StaticMapAccumulator build_map(const Recording& corrected, const Recording& orig
   VerdictArrays arrays;
   Progress progress(scans.size(), "scans", quiet);
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    InterruptGuard::check();
     const std::size_t i = scans[k];
     original.read_scan(i, scan);
     copy_points(scan, points);

@@ -49,7 +49,7 @@ PoseEstimate find_poses(const Recording& recording, const ScanRange& range, bool
     scan = scans.next(std::move(scan));
     const std::vector<double> offsets = recording.point_offsets(i, scan);
     const OdometryResult result = odometry.push(points_of(scan), offsets, recording.time(i));
-    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    InterruptGuard::check();
     if (result.loss == OdometryLoss::kNone) {
       known = poses.size() + 1;
       loss.reset();

@@ -23,6 +23,10 @@ class InterruptGuard {
 
   /// Number of the signal that asked to stop, 0 if none did.
   static int signal();
+  /// Throws Interrupted if a signal asked to stop.
+  static void check() {
+    if (signal() != 0) throw Interrupted{signal()};
+  }
 };
 
 }  // namespace dynains::run

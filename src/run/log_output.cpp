@@ -49,7 +49,7 @@ class CloudEditor {
 
   std::optional<std::string> operator()(const LogMessage& message,
                                         const SerialisedMessage& cloud) const {
-    if (InterruptGuard::signal() != 0) throw Interrupted{InterruptGuard::signal()};
+    InterruptGuard::check();
     const auto part = parts_.find(place_of(message));
     if (part == parts_.end() || (!outputs_.mark_log && !part->second.scan)) {
       return std::nullopt;
@@ -114,22 +114,16 @@ void check_log_output(const RunPlan& plan) {
   if (plan.sequence.columns().label) throw ConfigError("--mark: the clouds have labels already");
 }
 
-bool write_log(const RunPlan& plan, const PointStore& labels, const fs::path& file,
+void write_log(const RunPlan& plan, const PointStore& labels, const fs::path& file,
                const Warn& warn) {
   const CloudEditor editor(plan, labels);
-  try {
-    const auto log =
-        open_log(plan.sequence.log()->log().path(), plan.sequence.options().accept_missing);
-    copy_log(*log, file, std::cref(editor));
-  } catch (const Interrupted&) {
-    return false;
-  }
-  if (editor.unjudged() > 0) {
-    warn(plan.settings.outputs.log.string() + ": " + std::to_string(editor.unjudged()) +
-         " clouds have no verdict, for lack of a pose, by their stamps or by --start and --end; "
-         "they keep all points");
-  }
-  return true;
+  const auto log =
+      open_log(plan.sequence.log()->log().path(), plan.sequence.options().accept_missing);
+  copy_log(*log, file, std::cref(editor));
+  if (editor.unjudged() == 0) return;
+  warn(plan.settings.outputs.log.string() + ": " + std::to_string(editor.unjudged()) +
+       " clouds have no verdict, for lack of a pose, by their stamps or by --start and --end; "
+       "they keep all points");
 }
 
 void write_clean(const Recording& recording, const JudgedScan& judged, const fs::path& folder,

@@ -14,9 +14,8 @@ namespace dynains::run {
 void check_log_output(const RunPlan& plan);
 
 /// Copies the log with the final labels of the scans of the run, in their order, to `file`. Warns
-/// of clouds on the topic that have none, which stay as they are. False after a signal. Throws
-/// IoError.
-bool write_log(const RunPlan& plan, const PointStore& labels, const std::filesystem::path& file,
+/// of clouds on the topic that have none, which stay as they are. Throws IoError, Interrupted.
+void write_log(const RunPlan& plan, const PointStore& labels, const std::filesystem::path& file,
                const Warn& warn);
 
 /// Writes a scan to `folder`: all finite points that are not dynamic, or with `drop_not_judged` all

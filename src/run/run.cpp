@@ -165,7 +165,7 @@ bool adds_session(const RunPlan& plan, const OutputFolder& out) {
   return !out.had("/request/session", plan.session.info.name) || !plan.session.is_fulfilled();
 }
 
-/// Writes the grid. Returns PlacedGrid::summary(), null after a signal.
+/// Writes the grid. Returns PlacedGrid::summary(). Throws Interrupted.
 nlohmann::ordered_json write_grid(const RunOutputs& outputs, const RunPlan& plan,
                                   const PointStore& labels, const Warn& warn) {
   std::vector<std::size_t> scans(plan.range.size());
@@ -174,9 +174,7 @@ nlohmann::ordered_json write_grid(const RunOutputs& outputs, const RunPlan& plan
       [&](std::size_t i, const RecordedScan&, std::vector<PointLabel>& of_scan) {
         labels.read(i - plan.range.first, of_scan);
       },
-      plan.sequence, scans, outputs.grid_config, false,
-      [](std::size_t) { return InterruptGuard::signal() == 0; });
-  if (InterruptGuard::signal() != 0) return nullptr;
+      plan.sequence, scans, outputs.grid_config, false, [](std::size_t) {});
   for (const std::string& doubt : made.doubts) warn(doubt);
   grid::write_grid(outputs.grid_image, outputs.grid, made.grid, made.origin);
   return made.summary();
@@ -267,13 +265,12 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
   write_timing(outputs.folder / "timing.csv", timing);
   if (outputs.write_poses) write_trajectory(outputs.folder / kResultNames.poses, plan.sequence);
   bool is_complete = results.finished() == plan.range.size() && results.is_revised();
-  if (is_complete && !outputs.log.empty()) {
-    is_complete = write_log(plan, labels, outputs.log, warn);
-  }
   nlohmann::ordered_json grid;
-  if (is_complete && !outputs.grid.empty()) {
-    grid = write_grid(outputs, plan, labels, warn);
-    is_complete = !grid.is_null();
+  try {
+    if (is_complete && !outputs.log.empty()) write_log(plan, labels, outputs.log, warn);
+    if (is_complete && !outputs.grid.empty()) grid = write_grid(outputs, plan, labels, warn);
+  } catch (const Interrupted&) {
+    is_complete = false;
   }
   nlohmann::ordered_json remarks = doubts.json;
   remarks["warnings"] = warnings;

@@ -5,6 +5,7 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
+#include "interrupt.hpp"
 #include "map_file.hpp"
 #include "run/output/output_folder.hpp"
 
@@ -15,34 +16,6 @@ namespace fs = std::filesystem;
 
 /// A place near a position: whole metres, so that cells of all grids of a map coincide.
 Eigen::Vector3d place_near(const Eigen::Vector3d& position) { return position.array().floor(); }
-
-/// The scans of a run with their verdicts, relative to a place near the first one.
-class JudgedScans {
- public:
-  JudgedScans(const LabelReader& read_labels, const Recording& recording, bool keep_moving)
-      : recording_(recording), read_labels_(read_labels), keep_moving_(keep_moving) {}
-
-  /// Calls `visit(position, label, sensor)` for the points of scan i that are judged.
-  template <class Visit>
-  void visit(std::size_t i, const Pose& T_place_sensor, Visit&& visit) {
-    recording_.read_scan(i, scan_);
-    read_labels_(i, scan_, labels_);
-    for (std::size_t k = 0; k < scan_.size(); ++k) {
-      PointLabel label = labels_[k];
-      if (label == PointLabel::kInvalid || label == PointLabel::kOutOfRange) continue;
-      if (label == PointLabel::kDynamic && keep_moving_) label = PointLabel::kStatic;
-      const std::size_t sensor = scan_.sensor.empty() ? 0 : scan_.sensor[k];
-      visit(T_place_sensor * scan_.point(k).position, label, sensor);
-    }
-  }
-
- private:
-  const Recording& recording_;
-  const LabelReader& read_labels_;
-  bool keep_moving_;
-  RecordedScan scan_;
-  std::vector<PointLabel> labels_;
-};
 
 /// Distance between the points of surfaces, from 0.02 to 0.5 m: the edge of voxels that hold about
 /// one.
@@ -88,7 +61,7 @@ nlohmann::ordered_json PlacedGrid::summary() const {
 
 PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recording,
                        const std::vector<std::size_t>& scans, const grid::Config& config,
-                       bool keep_moving, const std::function<bool(std::size_t done)>& progress) {
+                       bool keep_moving, const std::function<void(std::size_t done)>& progress) {
   const Eigen::Vector3d place = place_near(recording.T_world_sensor(scans.front()).translation());
   const auto pose = [&](std::size_t i) {
     Pose T_place_sensor = recording.T_world_sensor(i);
@@ -103,17 +76,35 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
     for (const Pose& T : sensors) places.emplace_back(pose(i) * T.translation());
     return places;
   };
-  JudgedScans judged(read_labels, recording, keep_moving);
+  RecordedScan scan;
+  std::vector<PointLabel> labels;
+  // The points of scan i that are judged: visit(position, label, sensor).
+  const auto for_each_judged = [&](std::size_t i, auto&& visit) {
+    recording.read_scan(i, scan);
+    read_labels(i, scan, labels);
+    const Pose T_place_sensor = pose(i);
+    for (std::size_t k = 0; k < scan.size(); ++k) {
+      PointLabel label = labels[k];
+      if (label == PointLabel::kInvalid || label == PointLabel::kOutOfRange) continue;
+      if (label == PointLabel::kDynamic && keep_moving) label = PointLabel::kStatic;
+      const std::size_t sensor = scan.sensor.empty() ? 0 : scan.sensor[k];
+      visit(T_place_sensor * scan.point(k).position, label, sensor);
+    }
+  };
   grid::Floors floors(recording.folder().string());
   std::size_t done = 0;
+  const auto end_scan = [&] {
+    progress(++done);
+    InterruptGuard::check();
+  };
   progress(done);
   for (const std::size_t i : scans) {
     const std::vector<Eigen::Vector3d> places = places_of_sensors(i);
-    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
+    for_each_judged(i, [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
       if (label == PointLabel::kDynamic) return;
       floors.add(point, label == PointLabel::kGround, point.z() > places.at(k).z());
     });
-    if (!progress(++done)) return {};
+    end_scan();
   }
   floors.finish(config.min_height, config.resolution);
   grid::GridMaker maker(config, floors);
@@ -121,13 +112,13 @@ PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recordin
   for (const std::size_t i : scans) {
     for (auto& of_sensor : ends) of_sensor.clear();
     maker.begin_scan();
-    judged.visit(i, pose(i), [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
+    for_each_judged(i, [&](const Eigen::Vector3d& point, PointLabel label, std::size_t k) {
       maker.add(point, label == PointLabel::kDynamic);
       ends.at(k).push_back(point);
     });
     const std::vector<Eigen::Vector3d> places = places_of_sensors(i);
     for (std::size_t k = 0; k < sensors.size(); ++k) maker.add_beams(places[k], ends[k]);
-    if (!progress(++done)) return {};
+    end_scan();
   }
   return placed(maker, place, floors, scans.size() == 1);
 }

@@ -34,11 +34,11 @@ using LabelReader = std::function<void(std::size_t scan, const RecordedScan& poi
 
 /// The grid of these scans by the final labels of their run. All scans are read
 /// twice: first the ground, then what is on it. `keep_moving`: what moved counts as if it were
-/// static. Calls `progress` before the first scan and after each; it returns whether to go on.
-/// Throws IoError, ConfigError.
+/// static. Calls `progress` before the first scan and after each. Throws IoError, ConfigError,
+/// Interrupted.
 PlacedGrid grid_of_run(const LabelReader& read_labels, const Recording& recording,
                        const std::vector<std::size_t>& scans, const grid::Config& config,
-                       bool keep_moving, const std::function<bool(std::size_t done)>& progress);
+                       bool keep_moving, const std::function<void(std::size_t done)>& progress);
 
 /// The grid of a map alone: free is where ground was seen. Throws IoError, ConfigError.
 PlacedGrid grid_of_map(const std::filesystem::path& map, const grid::Config& config);
