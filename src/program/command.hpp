@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 
 #include "dynains/io/recording.hpp"
@@ -76,24 +75,6 @@ struct RecordingFlags {
 
  private:
   Recording open_with(const RecordingOptions& options) const;
-};
-
-/// A file for text that takes long to compute. Opening it shows beforehand whether it can be
-/// written.
-class TextFile {
- public:
-  /// Opens it unless `path` is empty: then there is none. Throws IoError.
-  TextFile(const std::string& path, bool force, const InputFiles& inputs) {
-    if (!path.empty()) file_.emplace(path, existing_by(force), inputs);
-  }
-
-  /// Puts the file in place, whole or not at all. Throws IoError.
-  void write(const std::string& text) {
-    if (file_) file_->write([&](std::ostream& out) { out << text; });
-  }
-
- private:
-  std::optional<OutputFile> file_;
 };
 
 /// Adds --no-deskew.

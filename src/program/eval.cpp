@@ -1,4 +1,5 @@
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -125,8 +126,11 @@ void eval(const EvalOptions& options) {
     throw ConfigError("--json and --csv name one file: " + options.json);
   }
   const InputFiles inputs = inputs_of(options, recording);
-  TextFile json(options.json, options.force, inputs);
-  TextFile csv(options.csv, options.force, inputs);
+  // Opening files shows beforehand whether they can be written.
+  std::optional<OutputFile> json, csv;
+  const Existing existing = existing_by(options.force);
+  if (!options.json.empty()) json.emplace(options.json, existing, inputs);
+  if (!options.csv.empty()) csv.emplace(options.csv, existing, inputs);
   LabelledSequence sequence(std::move(recording), options.window, runs);
   if (sequence.missing_truths() > 0) {
     print_warning(std::to_string(sequence.missing_truths()) + " of " +
@@ -152,8 +156,8 @@ void eval(const EvalOptions& options) {
 
   std::cout << evaluation::to_table(result);
   if (options.errors) std::cout << '\n' << evaluation::errors_to_table(result);
-  json.write(evaluation::to_json(result));
-  csv.write(evaluation::to_csv(result));
+  if (json) json->write([&](std::ostream& out) { out << evaluation::to_json(result); });
+  if (csv) csv->write([&](std::ostream& out) { out << evaluation::to_csv(result); });
 }
 
 }  // namespace

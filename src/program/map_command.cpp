@@ -34,45 +34,36 @@ fs::path target_of(const std::string& name) {
   throw ConfigError(name + ": expected a name that ends in .ply, .pcd or .las");
 }
 
-/// A file for points of a city.
-class CityPointFile {
- public:
-  /// Throws ConfigError, IoError.
-  CityPointFile(const City& city, const std::string& name, bool force)
-      : city_(city), output_(target_of(name), existing_by(force), InputFiles(city.folder())) {}
+/// A file for points of a city. Throws ConfigError, IoError.
+OutputFile point_file(const City& city, const std::string& name, bool force) {
+  return {target_of(name), existing_by(force), InputFiles(city.folder())};
+}
 
-  /// Calls `fill(add)`, and `add(tile, session, point)` writes a point with its session, the begin
-  /// of that as time, and its label, as far as the format has them. Returns their number.
-  template <class Fill>
-  std::size_t write(Fill&& fill) {
-    double most = 0.0;
-    Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
-    for (const SessionInfo& session : city_.sessions()) {
-      most = std::max(
-          {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
-      lowest = session.lowest;
-    }
-    PointColumns columns;
-    columns.label = columns.time = columns.session = true;
-    columns.double_xyz = most > kFloatCoordinateLimit;
-    return write_points(output_, columns, las_options_near(lowest), [&](const AddPoint& add) {
-      fill([&](const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
-        FilePoint of_map{position_of(city_.grid(), tile, point)};
-        of_map.time = of_map.scan_time = city_.sessions()[session].begin;
-        of_map.label = of_map.instance = point.label;
-        of_map.session = static_cast<std::uint16_t>(std::min(session, 65535U));
-        of_map.is_ground = point.is_ground != 0;
-        add(of_map);
-      });
-    });
+/// Calls `fill(add)`, and `add(tile, session, point)` writes a point with its session, the begin of
+/// that as time, and its label, as far as the format has them. Returns their number.
+template <class Fill>
+std::size_t write_city_points(const City& city, const OutputFile& file, Fill&& fill) {
+  double most = 0.0;
+  Eigen::Vector3d lowest = Eigen::Vector3d::Zero();
+  for (const SessionInfo& session : city.sessions()) {
+    most = std::max(
+        {most, session.lowest.cwiseAbs().maxCoeff(), session.highest.cwiseAbs().maxCoeff()});
+    lowest = session.lowest;
   }
-
-  void put_in_place() { output_.put_in_place(); }
-
- private:
-  const City& city_;
-  OutputFile output_;
-};
+  PointColumns columns;
+  columns.label = columns.time = columns.session = true;
+  columns.double_xyz = most > kFloatCoordinateLimit;
+  return write_points(file, columns, las_options_near(lowest), [&](const AddPoint& add) {
+    fill([&](const TileIndex& tile, std::uint32_t session, const SessionPoint& point) {
+      FilePoint of_map{position_of(city.grid(), tile, point)};
+      of_map.time = of_map.scan_time = city.sessions()[session].begin;
+      of_map.label = of_map.instance = point.label;
+      of_map.session = static_cast<std::uint16_t>(std::min(session, 65535U));
+      of_map.is_ground = point.is_ground != 0;
+      add(of_map);
+    });
+  });
+}
 
 void list(const MapOptions& options) {
   const City city{fs::path(options.city)};
@@ -92,8 +83,8 @@ void list(const MapOptions& options) {
 
 /// Writes the map after session number `last`.
 void write_map(const City& city, std::uint32_t last, const MapOptions& options) {
-  CityPointFile file(city, options.file, options.force);
-  const std::size_t count = file.write([&](const auto& add) {
+  OutputFile file = point_file(city, options.file, options.force);
+  const std::size_t count = write_city_points(city, file, [&](const auto& add) {
     for (const TileIndex& tile : city.tiles()) {
       const TileHistory history = city.history(tile, last);
       history.for_each_standing(last, [&](std::size_t session, std::size_t i) {
@@ -125,11 +116,11 @@ void diff(const MapOptions& options) {
   if (whole_path(options.added) == whole_path(options.removed)) {
     throw ConfigError("--removed " + options.removed + ": is the file of --added, too");
   }
-  CityPointFile added(city, options.added, options.force);
-  CityPointFile removed(city, options.removed, options.force);
+  OutputFile added = point_file(city, options.added, options.force);
+  OutputFile removed = point_file(city, options.removed, options.force);
   std::size_t removed_count = 0;
-  const std::size_t added_count = added.write([&](const auto& add) {
-    removed_count = removed.write([&](const auto& add_removed) {
+  const std::size_t added_count = write_city_points(city, added, [&](const auto& add) {
+    removed_count = write_city_points(city, removed, [&](const auto& add_removed) {
       for (const TileIndex& tile : city.tiles()) {
         const CityChanges changes = city.changes(tile, a, b);
         for (const CityPoint& p : changes.added) add(tile, p.session, p.point);
