@@ -136,7 +136,8 @@ run::RecordingSettings to_recording_settings(const py::dict& values) {
   run::RecordingSettings settings;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
-    if (!has_setting<run::RecordingSettings>(name)) throw ConfigError("unknown parameter " + name);
+    const bool is_known = assign_setting(settings, name, py::none());
+    if (!is_known) throw ConfigError("unknown parameter " + name);
     if (!value.is_none()) settings.assign("--" + run::flag_name(name), to_text(value), name);
   }
   return settings;

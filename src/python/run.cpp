@@ -43,10 +43,11 @@ constexpr const char* kObjects =
 /// Takes the settings of a run out of `values`. Returns the options of the recording.
 py::dict take_settings(const py::kwargs& values, RunSettings& settings) {
   py::dict options;
+  run::RecordingSettings of_recording;
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
     if (assign_setting(settings, name, value)) continue;
-    if (!has_setting<run::RecordingSettings>(name)) {
+    if (!assign_setting(of_recording, name, py::none())) {
       throw ConfigError("unknown parameter " + name);
     }
     options[key] = value;

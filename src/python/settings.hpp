@@ -50,14 +50,6 @@ void assign_all(Config& config, const py::dict& values) {
   }
 }
 
-template <class Settings>
-bool has_setting(const std::string& name) {
-  bool is_known = false;
-  const Settings defaults;
-  Settings::visit(defaults, [&](const auto& setting) { is_known |= name == setting.name; });
-  return is_known;
-}
-
 /// Name, meaning and values of each setting, one a line, for docstrings.
 template <class Settings>
 std::string describe_settings() {
