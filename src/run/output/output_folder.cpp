@@ -153,14 +153,11 @@ std::string listed_name(const std::string& name) {
 }
 
 bool OutputListing::contains(const std::string& folder, const std::string& name) const {
-  const std::string listed = listed_name(name);
-  if (folder.empty()) return files.count(listed) > 0;
+  const fs::path listed = listed_name(name);
+  if (folder.empty()) return files.count(listed.string()) > 0;
   const auto found = folders.find(listed_name(folder));
-  if (found == folders.end()) return false;
-  const std::string& extension = found->second;
-  const std::size_t stem = listed.size() - std::min(listed.size(), extension.size());
-  return listed.compare(stem, listed.npos, extension) == 0 &&
-         scans.count(listed.substr(0, stem)) > 0;
+  return found != folders.end() && listed.extension() == found->second &&
+         scans.count(listed.stem().string()) > 0;
 }
 
 nlohmann::ordered_json OutputListing::to_json() const {
