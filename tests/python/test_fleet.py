@@ -42,39 +42,30 @@ def expected(drives, tmp_path_factory):
     return results_in(out)
 
 
-class Workers:
-    """A scheduler and three workers, each a process."""
+@pytest.fixture
+def cluster(tmp_path):
+    """The address of a scheduler, and its three workers, each a process."""
+    file = tmp_path / "scheduler.json"
+    with open(tmp_path / "log", "w") as log:
 
-    def __init__(self, folder):
-        self.file = folder / "scheduler.json"
-        self.log = open(folder / "log", "w")
-        self.scheduler = self.start("scheduler", "--port", "0", "--no-dashboard")
-        self.workers = [self.start("worker", "--nthreads", "1", "--no-nanny") for _ in range(3)]
-        while not self.file.exists():
+        def start(what, *flags):
+            command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *flags]
+            return subprocess.Popen(
+                [*command, "--scheduler-file", str(file)], stdout=log, stderr=log
+            )
+
+        scheduler = start("scheduler", "--port", "0", "--no-dashboard")
+        workers = [start("worker", "--nthreads", "1", "--no-nanny") for _ in range(3)]
+        while not file.exists():
             time.sleep(0.1)
-        self.address = json.loads(self.file.read_text())["address"]
-
-    def start(self, what, *flags):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *flags]
-        return subprocess.Popen(
-            [*command, "--scheduler-file", str(self.file)], stdout=self.log, stderr=self.log
-        )
-
-    def close(self):
-        for process in [*self.workers, self.scheduler]:
+        yield json.loads(file.read_text())["address"], workers
+        for process in [*workers, scheduler]:
             process.kill()
             process.wait()
-        self.log.close()
 
 
-@pytest.fixture
-def workers(tmp_path):
-    result = Workers(tmp_path)
-    yield result
-    result.close()
-
-
-def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, workers, tmp_path):
+def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, cluster, tmp_path):
+    address, workers = cluster
     out = tmp_path / "out"
     disturbed = []
 
@@ -82,17 +73,14 @@ def test_a_worker_that_dies_and_one_that_stops_change_no_byte(drives, expected, 
         while not disturbed:
             disturbed.extend(out.glob("drive3.partial/labels/*.label"))
             time.sleep(0.01)
-        workers.workers[0].send_signal(signal.SIGKILL)
-        workers.workers[1].send_signal(signal.SIGSTOP)
-        threading.Timer(10.0, workers.workers[1].send_signal, [signal.SIGCONT]).start()
+        workers[0].send_signal(signal.SIGKILL)
+        workers[1].send_signal(signal.SIGSTOP)
+        threading.Timer(10.0, workers[1].send_signal, [signal.SIGCONT]).start()
 
     threading.Thread(target=disturb, daemon=True).start()
-    results = fleet.clean(
-        fleet.find_recordings(drives.glob("drive*")),
-        out,
-        scheduler=workers.address,
-    )
-    assert disturbed and workers.workers[0].wait() == -signal.SIGKILL
+    recordings = fleet.find_recordings(drives.glob("drive*"))
+    results = fleet.clean(recordings, out, scheduler=address)
+    assert disturbed and workers[0].wait() == -signal.SIGKILL
     assert not [name for name, result in results.items() if "error" in result]
     assert list(results) == [f"drive{seed}" for seed in range(4)]
     assert results_in(out) == expected

@@ -17,6 +17,14 @@ def final_verdicts(scans, points_of=lambda scan: scan.points, **parameters):
     return verdicts + remover.flush(), remover
 
 
+def assert_same_verdicts(expected, found):
+    assert len(expected) == len(found)
+    for a, b in zip(expected, found):
+        np.testing.assert_array_equal(a.labels, b.labels)
+        np.testing.assert_array_equal(a.instances, b.instances)
+        np.testing.assert_array_equal(a.beliefs, b.beliefs)
+
+
 @pytest.fixture(scope="module")
 def verdicts(street):
     return final_verdicts(street)[0]
@@ -63,11 +71,7 @@ def test_moving_objects_are_an_array_with_named_fields(street):
     ids=["float64", "column-major", "3 of 4", "every second row", "rows back", "columns back"],
 )
 def test_labels_do_not_depend_on_type_and_strides(street, verdicts, points_of):
-    found = final_verdicts(street, points_of)[0]
-    for a, b in zip(verdicts, found):
-        np.testing.assert_array_equal(a.labels, b.labels)
-        np.testing.assert_array_equal(a.instances, b.instances)
-        np.testing.assert_array_equal(a.beliefs, b.beliefs)
+    assert_same_verdicts(verdicts, final_verdicts(street, points_of)[0])
 
 
 def test_results_outlive_the_next_call_and_the_remover(street):
@@ -255,7 +259,6 @@ def test_removers_in_threads_and_one_shared(street, verdicts):
     for thread in threads:
         thread.join()
     for name in range(3):
-        for a, b in zip(verdicts, found[name]):
-            np.testing.assert_array_equal(a.labels, b.labels)
+        assert_same_verdicts(verdicts, found[name])
     next_scan = shared.push(street[0].points, street[0].T_world_sensor).newest.scan
     assert next_scan == 3 * len(street)

@@ -31,6 +31,12 @@ pytestmark = [
 ]
 
 
+def output_of(environment, *command, **options):
+    return subprocess.run(
+        command, env=environment, stdout=subprocess.PIPE, text=True, **options
+    ).stdout.strip()
+
+
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -98,10 +104,7 @@ PartitionName=all Nodes=ALL Default=YES State=UP
     def starts(environment):
         end = time.monotonic() + 60
         while time.monotonic() < end:
-            state = subprocess.run(
-                ["sinfo", "--noheader", "--format=%t"], env=environment, capture_output=True
-            ).stdout
-            if state.strip() == b"idle":
+            if output_of(environment, "sinfo", "--noheader", "--format=%t") == "idle":
                 return True
             time.sleep(0.5)
         return False
@@ -121,12 +124,7 @@ def final_state(job, environment):
     """State of a job that has ended. `sbatch --wait` would look after 2, 4, 8 ... s only."""
     end = time.monotonic() + 240
     while time.monotonic() < end:
-        shown = subprocess.run(
-            ["scontrol", "--oneliner", "show", "job", job],
-            env=environment,
-            capture_output=True,
-            text=True,
-        ).stdout
+        shown = output_of(environment, "scontrol", "--oneliner", "show", "job", job)
         state = re.search(r"JobState=(\w+)", shown)[1]
         if state not in ("PENDING", "CONFIGURING", "RUNNING", "COMPLETING"):
             return state
@@ -143,10 +141,7 @@ def test_the_script_for_slurm_gives_the_results_of_single_runs(slurm, simulate, 
     command = ["sbatch", "--parsable", "--nodes=1", "--ntasks-per-node=2", "--output=job.log", *job]
     if os.cpu_count() < 2:
         command[3] = "--ntasks-per-node=1"
-    number = subprocess.run(
-        command, env=slurm, cwd=tmp_path, check=True, capture_output=True, text=True
-    ).stdout.strip()
-    state = final_state(number, slurm)
+    state = final_state(output_of(slurm, *command, cwd=tmp_path, check=True), slurm)
     log = (tmp_path / "job.log").read_text()
     assert state == "COMPLETED", log
     assert "2 of 2 recordings" in log
