@@ -5,28 +5,24 @@
 #include "dynains/city/city.hpp"
 #include "dynains/city/session_writer.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "simulation/simulator.hpp"
+#include "support/drive_of.hpp"
 #include "support/points.hpp"
-#include "support/standard.hpp"
 
 using namespace dynains;
 
 namespace {
 
-std::uint32_t instance_of(std::uint32_t label) { return label >> 16U; }
+using test::instance_of;
 
 /// Where the objects were whose points a day measured, up to the range of contributions. Labels do
 /// not tell this: they call a car moving that drove off out of sight.
 class MeasuredObjects {
  public:
   void add(const simulation::SimulatedScan& scan) {
-    constexpr float kRange = static_cast<float>(kTestRange);
     std::set<std::uint32_t> measured;
     for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-      const Eigen::Map<const Eigen::Vector3f> point(&scan.xyzi[4 * i]);
-      if (instance_of(scan.labels[i]) != 0 && point.norm() <= kRange) {
-        measured.insert(instance_of(scan.labels[i]));
-      }
+      const std::uint32_t instance = instance_of(scan.labels[i]);
+      if (instance != 0 && test::point_of(scan, i).norm() <= kTestRange) measured.insert(instance);
     }
     for (const simulation::ObjectState& object : scan.objects) {
       if (measured.count(object.instance) == 0) continue;

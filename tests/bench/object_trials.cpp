@@ -6,10 +6,8 @@
 //   object_trials [FROM [WORLDS [SCANS]]]
 // Prints a row for each world and kind of verdict, then all of them.
 
-#include "dynains/compiled_remover.hpp"
-#include "simulation/simulator.hpp"
+#include "support/drive_of.hpp"
 #include "support/simulated_runs.hpp"
-#include "support/standard.hpp"
 
 using namespace dynains;
 
@@ -46,9 +44,9 @@ std::vector<Truth> truth_of(const std::vector<simulation::SimulatedScan>& scans)
     std::map<std::uint32_t, int> points;
     std::map<std::uint32_t, double> offsets;  // s, sums
     for (std::size_t p = 0; p < scans[i].labels.size(); ++p) {
-      ++points[scans[i].labels[p] >> 16];
-      if (scans[i].times.empty()) continue;
-      offsets[scans[i].labels[p] >> 16] += static_cast<double>(scans[i].times[p]);
+      const std::uint32_t instance = test::instance_of(scans[i].labels[p]);
+      ++points[instance];
+      if (!scans[i].times.empty()) offsets[instance] += static_cast<double>(scans[i].times[p]);
     }
     const auto state_of = [&](std::size_t scan, std::uint32_t instance) {
       const auto& objects = scans[scan].objects;
@@ -178,13 +176,9 @@ int main(int argc, char** argv) {
       count(truth[verdict.scan], verdict.objects, ids[kind], counts[kind]);
       count(truth[verdict.scan], verdict.objects, ids_for_sums[kind], sums[kind]);
     };
-    for (const simulation::SimulatedScan& scan : scans) {
-      const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-      const FrameResult frame = remover.push(points, scan.T_world_sensor, scan.time);
-      take(frame.newest(), 0);
-      if (frame.finished) take(*frame.finished, 1);
-    }
-    remover.flush([&](const ScanVerdict& verdict) { take(verdict, 1); });
+    test::push_all(
+        remover, scans, [&](const FrameResult& frame) { take(frame.newest(), 0); },
+        [&](const ScanVerdict& verdict) { take(verdict, 1); });
     for (std::size_t kind = 0; kind < 2; ++kind) {
       print(std::to_string(seed) + ' ' + plain_value(world.scene) + ' ' +
                 plain_value(world.sensor) + ' ' + kNames[kind],

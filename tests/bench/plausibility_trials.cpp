@@ -5,18 +5,12 @@
 // first scan.
 //   plausibility_trials [FROM [WORLDS [SCANS [right|all [SCENE]]]]]
 // Prints a row for each world and kind with the largest shares of any window, then the counts.
-#include <unistd.h>
-
-#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
-#include "dynains/io/kitti.hpp"
-#include "dynains/io/point_file.hpp"
 #include "run/remarks/cloud_remarks.hpp"
 #include "run/remarks/recording_check.hpp"
-#include "simulation/simulator.hpp"
-#include "simulation/write_sequence.hpp"
+#include "support/drive_of.hpp"
 #include "support/simulated_runs.hpp"
-#include "support/standard.hpp"
+#include "support/written_drive.hpp"
 
 using namespace dynains;
 
@@ -60,19 +54,18 @@ Fault posed(const std::function<Pose(const Scans&, std::size_t)>& change) {
   };
 }
 
-Fault of_body(const Pose& T_sensor_body) {
-  return posed([T_sensor_body](const Scans& scans, std::size_t i) {
-    return Pose(scans[i].T_world_sensor * T_sensor_body);
+/// Poses that `change(i, T_world_sensor)` gives.
+Fault changed_poses(const std::function<Pose(std::size_t, const Pose&)>& change) {
+  return posed([change](const Scans& scans, std::size_t i) {
+    return change(i, Pose(scans[i].T_world_sensor));
   });
 }
 
-Fault scaled_poses(double factor) {
-  return posed([factor](const Scans& scans, std::size_t i) {
-    Pose T = scans[i].T_world_sensor;
-    T.translation() *= factor;
-    return T;
-  });
+Fault of_body(const Pose& T_sensor_body) {
+  return changed_poses([T_sensor_body](std::size_t, const Pose& T) { return T * T_sensor_body; });
 }
+
+Fault scaled_poses(double factor) { return changed_poses(test::scaled_poses(factor)); }
 
 /// `change_of_scan(i)` gives the function that changes each coordinate of scan i.
 template <class ChangeOfScan>
@@ -123,8 +116,7 @@ std::vector<Kind> kinds() {
       return i < middle ? scans[i].T_world_sensor : Pose(change * scans[i].T_world_sensor);
     });
   };
-  const auto right =
-      posed([](const Scans& scans, std::size_t i) { return scans[i].T_world_sensor; });
+  const auto right = changed_poses([](std::size_t, const Pose& T) { return T; });
   const auto random_points = changed_points([](std::size_t i) {
     return [random = std::mt19937(static_cast<unsigned>(i)),
             place = std::uniform_real_distribution<float>(-40.0F, 40.0F)](float) mutable {
@@ -175,9 +167,8 @@ std::vector<Kind> kinds() {
       {"poses held for three scans", held},
       {"one cloud lost", lost(1)},
       {"three clouds lost", lost(3)},
-      {"noise of 20 cm and 1 deg", posed([](const Scans& scans, std::size_t i) {
-         return Pose(scans[i].T_world_sensor * noise(i, 0.2, 1.0));
-       })},
+      {"noise of 20 cm and 1 deg",
+       changed_poses([](std::size_t i, const Pose& T) { return T * noise(i, 0.2, 1.0); })},
       {"no motion", posed([](const Scans& scans, std::size_t) { return scans[0].T_world_sensor; })},
       {"random points", random_points},
       {"points with noise of 30 cm", noisy_points}};
@@ -218,16 +209,8 @@ WrittenScans write_and_open(const Scans& scans, const Kind& kind,
     const std::string name = simulation::scan_name(written.size());
     if (kind.time) {
       const double period = scans[1].time - scans[0].time;
-      PointColumns columns;
-      columns.time = true;
-      PointFileWriter file(clouds / (name + ".pcd"), columns);
-      for (std::size_t k = 0; k < scans[i].times.size(); ++k) {
-        FilePoint point;
-        point.position = Eigen::Map<const Eigen::Vector3f>(&recorded.xyzi[4 * k]).cast<double>();
-        point.time = kind.time(static_cast<double>(scans[i].times[k]), period);
-        file.add(point);
-      }
-      file.commit();
+      test::write_timed_scan(clouds / (name + ".pcd"), recorded.xyzi, scans[i].times,
+                             [&](double time) { return kind.time(time, period); });
     } else {
       write_scan(clouds / (name + ".bin"), recorded.xyzi);
     }
@@ -274,7 +257,7 @@ Outcome judge(const Scans& scans, const WrittenScans& written) {
   const auto count = [&](const ScanVerdict& verdict) {
     const simulation::SimulatedScan& scan = scans[written.scans[verdict.scan]];
     for (std::size_t i = 0; i < verdict.labels.size(); ++i) {
-      const std::uint32_t label = scan.labels[i] & 0xFFFFU;
+      const std::uint32_t label = test::class_of(scan.labels[i]);
       const bool is_fixed = label > 1 && label < 252;
       if (!is_fixed || std::hypot(scan.xyzi[4 * i], scan.xyzi[4 * i + 1]) > kMaxRange) continue;
       ++fixed;
@@ -345,9 +328,8 @@ int main(int argc, char** argv) {
   const std::uint64_t from = number(1, 1), worlds = number(2, 10);
   const bool only_right = argc > 4 && std::string(argv[4]) == "right";
   std::map<std::string, Counts> counts;
-  std::string pattern =
-      (std::filesystem::temp_directory_path() / "plausibility_trials_XXXXXX").string();
-  const std::filesystem::path folder = ::mkdtemp(pattern.data());
+  const test::TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   for (std::uint64_t seed = from; seed < from + worlds; ++seed) {
     simulation::Config config = simulation::random_world(seed);
     if (argc > 5) config.scene = value_of_name<simulation::Scene>(argv[5]).value();
@@ -378,7 +360,6 @@ int main(int argc, char** argv) {
     };
     take(world, twice, outcome_of(skewed, twice, folder / "recording"), usual, counts);
   }
-  std::filesystem::remove_all(folder);
   std::cout << "| kind | trials | harmful | of them told | told in all |\n"
                "|---|---|---|---|---|\n";
   for (const auto& [kind, sum] : counts) {

@@ -7,7 +7,6 @@
 #include "dynains/io/kitti.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "support/standard.hpp"
 #include "support/written_drive.hpp"
 
 using namespace dynains;

@@ -4,7 +4,6 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/median.hpp"
 #include "support/scene.hpp"
-#include "support/standard.hpp"
 
 namespace dynains::bench {
 namespace {

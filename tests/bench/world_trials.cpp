@@ -4,13 +4,10 @@
 //   world_trials [--from SEED] [--worlds N] [--scans N] [--world scene=room,...] [SETTING...]
 #include <CLI/CLI.hpp>
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
 #include "program/parameter_flags.hpp"
-#include "simulation/simulator.hpp"
 #include "support/simulated_runs.hpp"
-#include "support/standard.hpp"
 
 using namespace dynains;
 
@@ -82,9 +79,8 @@ void judge(const Scans& scans, const DynaInsRemover::Config& config, unsigned bi
   };
   DynaInsRemover remover(config);
   for (const simulation::SimulatedScan& scan : scans) {
-    const std::uint8_t* const sensors = scan.sensors.empty() ? nullptr : scan.sensors.data();
-    const RawPoints<float> points{scan.xyzi.data(), scan.labels.size(), 4, sensors};
-    const FrameResult frame = remover.push(points, scan.T_world_sensor_noisy, scan.time);
+    const FrameResult frame =
+        remover.push(test::points_of(scan), scan.T_world_sensor_noisy, scan.time);
     if (frame.finished) keep(*frame.finished);
   }
   remover.flush(keep);

@@ -11,6 +11,7 @@
 #include "scenes.hpp"
 #include "simulation/write_sequence.hpp"
 #include "support/catch.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::program {
 
@@ -30,10 +31,8 @@ OwnedScan street_scan(std::size_t number, double speed) {
   OwnedScan scan;
   for (int ring = 0; ring < 12; ++ring) {
     for (int step = 0; step < 240; ++step) {
-      const double angle = step * 2 * 3.14159265358979 / 240;
-      const double range = 4.0 + 1.5 * ring;
-      scan.add(static_cast<float>(range * std::cos(angle)),
-               static_cast<float>(range * std::sin(angle)), -1.7F, kRoad);
+      const Eigen::Vector3d place = (4.0 + 1.5 * ring) * test::ray_of(0.0, step * M_PI / 120);
+      scan.add(static_cast<float>(place.x()), static_cast<float>(place.y()), -1.7F, kRoad);
     }
   }
   for (int column = 0; column < 120; ++column) {
@@ -115,19 +114,22 @@ std::string message_of(const std::vector<std::string>& arguments) {
 }
 const std::string kNoMessage = "(nothing was thrown)";
 
-/// A street of three scans with a correct run, whose score is written to `json`.
+/// A street with a correct run, whose score is written to `json`.
 struct JudgedStreet {
-  JudgedStreet() { write_run(run, scans, 0); }
+  explicit JudgedStreet(std::size_t scan_count = 3) : scans(write_street(sequence, scan_count)) {
+    write_run(run, scans, 0);
+  }
   std::vector<std::string> eval(const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments = {"eval",   sequence.string(), run.string(),
                                           "--json", json.string(),     "--force"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
+  nlohmann::json result() const { return nlohmann::json::parse(read_text(json)); }
 
   TemporaryFolder folder;
   fs::path sequence = folder.path() / "street";
-  std::vector<OwnedScan> scans = write_street(sequence, 3);
+  std::vector<OwnedScan> scans;
   fs::path run = folder.path() / "run";
   fs::path json = folder.path() / "eval.json";
 };
@@ -167,20 +169,16 @@ TEST_CASE("eval refuses an incomplete run, unless a flag allows it") {
 }
 
 TEST_CASE("eval scores a run beside identity and oracle") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  const auto scans = write_street(sequence, 4);
-  write_run(folder.path() / "perfect", scans, 0);
-  write_run(folder.path() / "half", scans, 240);  // of 480 points
+  const JudgedStreet street(4);
+  const std::string half = (street.folder.path() / "half").string();
+  write_run(half, street.scans, 240);  // of 480 points
 
-  const std::string json_path = (folder.path() / "eval.json").string();
-  const std::string csv_path = (folder.path() / "eval.csv").string();
-  const std::string text = call({"eval", sequence.string(), (folder.path() / "half").string(),
-                                 (folder.path() / "perfect").string(), "--errors", "--json",
-                                 json_path, "--csv", csv_path});
+  const std::string csv_path = (street.folder.path() / "eval.csv").string();
+  const std::string text = call({"eval", street.sequence.string(), half, street.run.string(),
+                                 "--errors", "--json", street.json.string(), "--csv", csv_path});
   CHECK(has(text, "identity"));
   CHECK(has(text, "moving-car"));
-  const auto json = nlohmann::json::parse(read_text(json_path));
+  const auto json = street.result();
   REQUIRE(json["rows"].size() == 4);
   CHECK(json["rows"][1]["points"]["ha"] == 100.0);
   CHECK(json["rows"][2]["points"]["da"] == 50.0);
@@ -189,7 +187,7 @@ TEST_CASE("eval scores a run beside identity and oracle") {
   CHECK(json["errors"]["by_class"][2]["removed"] == 960);
   CHECK(has(read_text(csv_path), "identity"));
 
-  const std::string window = call({"eval", sequence.string(), "--start", "1", "--end", "2"});
+  const std::string window = call({"eval", street.sequence.string(), "--start", "1", "--end", "2"});
   CHECK(has(window, "2 scans, "));
 }
 
@@ -202,7 +200,7 @@ TEST_CASE("eval judges the scans that have ground truth, and tells how many have
   std::cerr.rdbuf(before);
   CHECK(has(text, "2 scans, "));
   CHECK(has(told.str(), "1 of 3 scans have no ground truth"));
-  CHECK(nlohmann::json::parse(read_text(street.json))["rows"][1]["points"]["ha"] == 100.0);
+  CHECK(street.result()["rows"][1]["points"]["ha"] == 100.0);
   fs::remove(street.sequence / "labels" / "000000.label");
   fs::remove(street.sequence / "labels" / "000002.label");
   CHECK(has(message_of(street.eval()), "no label of any chosen scan"));
@@ -218,7 +216,7 @@ TEST_CASE("Ground truth of moving object segmentation is judged as it is") {
     write_labels(street.sequence / "labels" / (scan_name(i) + ".label"), labels);
   }
   call(street.eval());
-  const auto json = nlohmann::json::parse(read_text(street.json));
+  const auto json = street.result();
   CHECK(json["rows"][1]["points"]["da"] == 100.0);
   CHECK(json["rows"][1]["points"]["sa"] == 100.0);
 }
@@ -227,7 +225,7 @@ TEST_CASE("eval --online scores the verdicts without latency, and only these") {
   const JudgedStreet street;
   const auto accuracy = [&](const std::vector<std::string>& more) {
     call(street.eval(more));
-    return nlohmann::json::parse(read_text(street.json))["rows"][2]["points"]["da"].get<double>();
+    return street.result()["rows"][2]["points"]["da"].get<double>();
   };
   CHECK(message_of(street.eval({"--online"})) != kNoMessage);
   write_run(street.run, street.scans, 120, "online");  // of 480 points
@@ -236,45 +234,39 @@ TEST_CASE("eval --online scores the verdicts without latency, and only these") {
 }
 
 TEST_CASE("Maps of several runs are distinguished by their paths") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  write_street(sequence, 2);
+  const JudgedStreet street;
   std::vector<std::string> maps;
   for (const char* run : {"a", "b"}) {
-    fs::create_directories(folder.path() / run);
-    maps.push_back((folder.path() / run / "static_map.ply").string());
+    fs::create_directories(street.folder.path() / run);
+    maps.push_back((street.folder.path() / run / "static_map.ply").string());
     PointFileWriter(maps.back()).commit();
   }
-  const std::string one = call({"eval", sequence.string(), "--map", maps[0]});
+  const std::string sequence = street.sequence.string();
+  const std::string one = call({"eval", sequence, "--map", maps[0]});
   CHECK(has(one, "static_map.ply"));
   CHECK(!has(one, maps[0]));
-  const std::string two = call({"eval", sequence.string(), "--map", maps[0], "--map", maps[1]});
+  const std::string two = call({"eval", sequence, "--map", maps[0], "--map", maps[1]});
   CHECK(has(two, maps[0]));
   CHECK(has(two, maps[1]));
 }
 
 TEST_CASE("A file that cannot be written is detected before the evaluation") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  write_street(sequence, 2);
+  const JudgedStreet street;
   // If it were detected afterwards, the error would be the missing run.
-  const std::string missing = (folder.path() / "nowhere").string();
-  const std::string file = missing + "/file";
-  const std::string broken = (folder.path() / "no run").string();
+  const std::string missing = (street.folder.path() / "nowhere").string();
+  const std::string broken = (street.folder.path() / "no run").string();
   for (const char* flag : {"--json", "--csv"}) {
-    CHECK(has(message_of({"eval", sequence.string(), broken, flag, file}),
+    CHECK(has(message_of({"eval", street.sequence.string(), broken, flag, missing + "/file"}),
               missing + ": cannot be opened"));
   }
 }
 
 TEST_CASE("eval scores map files of either format") {
-  const TemporaryFolder folder;
-  const fs::path sequence = folder.path() / "street";
-  const auto scans = write_street(sequence, 3);
-  for (const char* extension : {".ply", ".pcd"}) {
-    const fs::path path = folder.path() / (std::string("map") + extension);
+  const JudgedStreet street;
+  for (const char* name : {"map.ply", "map.pcd"}) {
+    const fs::path path = street.folder.path() / name;
     PointFileWriter writer(path);
-    for (const auto& scan : scans) {
+    for (const auto& scan : street.scans) {
       for (std::size_t i = 0; i < scan.truth.size(); ++i) {
         FilePoint point;
         point.position = scan.view().point(i);
@@ -282,9 +274,9 @@ TEST_CASE("eval scores map files of either format") {
       }
     }
     writer.commit();
-    const std::string json_path = (folder.path() / "map.json").string();
-    call({"eval", sequence.string(), "--map", path.string(), "--json", json_path, "--force"});
-    const auto json = nlohmann::json::parse(read_text(json_path));
+    call({"eval", street.sequence.string(), "--map", path.string(), "--json", street.json.string(),
+          "--force"});
+    const auto json = street.result();
     REQUIRE(json["rows"].size() == 3);
     CHECK(json["rows"][2]["voxels"]["f1"] == 1.0);
     CHECK(json["rows"][2]["points"]["ha"] == 100.0);

@@ -70,8 +70,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
         if ((scan.in_map[i] & 1U) == 0) continue;
         const double shift = chance(random, 0.5) ? 0.06 : 0.0;
         map.push_back(scan.T_world_sensor * scan.view().point(i) +
-                      shift * Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1),
-                                              random.uniform(-1, 1)));
+                      shift * random.vector({-1, -1, -1}, {1, 1, 1}));
       }
     }
     EvaluationConfig with = map_settings(0.2, 0.05);
@@ -91,13 +90,7 @@ TEST_CASE("Map files get the score of the simple reference implementation", "[re
           continue;
         bool kept = false;
         for (const Eigen::Vector3d& m : map) kept = kept || (m - p_world).norm() <= 0.05;
-        if (truth == Truth::kStatic) {
-          ++points.static_total;
-          points.static_kept += kept;
-        } else {
-          ++points.dynamic_total;
-          points.dynamic_removed += !kept;
-        }
+        count(truth, kept, points);
       }
     }
     std::vector<VoxelPoint> labelled;

@@ -62,6 +62,17 @@ inline std::vector<VoxelPoint> reference_map(const std::vector<OwnedScan>& scans
   return voxelise(all, settings.voxel);
 }
 
+/// Counts one point or voxel and whether the map has it.
+inline void count(Truth truth, bool is_kept, Score& score) {
+  if (truth == Truth::kStatic) {
+    ++score.static_total;
+    score.static_kept += is_kept;
+  } else {
+    ++score.dynamic_total;
+    score.dynamic_removed += !is_kept;
+  }
+}
+
 inline Score reference_score(const std::vector<VoxelPoint>& raw,
                              const std::vector<VoxelPoint>& estimate, double edge) {
   Score score;
@@ -75,14 +86,7 @@ inline Score reference_score(const std::vector<VoxelPoint>& raw,
         truth = candidate.truth;
       }
     }
-    const bool preserved = nearest < edge * std::sqrt(3.0) / 2 && truth == point.truth;
-    if (point.truth == Truth::kStatic) {
-      ++score.static_total;
-      score.static_kept += preserved;
-    } else {
-      ++score.dynamic_total;
-      score.dynamic_removed += !preserved;
-    }
+    count(point.truth, nearest < edge * std::sqrt(3.0) / 2 && truth == point.truth, score);
   }
   return score;
 }

@@ -1,6 +1,7 @@
 #include "dynains/evaluation/truth.hpp"
 #include "grid/grid_maker.hpp"
 #include "support/catch.hpp"
+#include "support/drive_of.hpp"
 #include "support/simulated_runs.hpp"
 
 using namespace dynains;
@@ -18,32 +19,24 @@ bool is_wall(std::uint32_t semantic_class) { return semantic_class >= 50 && sema
 }  // namespace
 
 TEST_CASE("a grid of a simulated street has its free cells and walls, and no trails") {
-  simulation::Config world;
-  world.sensor = simulation::Sensor::kOs1_64;
-  world.scans = 40;
-  world.seed = 5;
-  const std::vector<simulation::SimulatedScan> scans = simulate(world);
+  const std::vector<simulation::SimulatedScan> scans =
+      simulate(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 40, 5));
   std::vector<std::vector<PointLabel>> labels(scans.size());
   DynaInsRemover remover;
   const auto keep = [&](const ScanVerdict& verdict) {
     labels.at(verdict.scan).assign(verdict.labels.begin(), verdict.labels.end());
   };
-  for (const simulation::SimulatedScan& scan : scans) {
-    const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-    const FrameResult frame = remover.push(points, scan.T_world_sensor, scan.time);
-    if (frame.finished) keep(*frame.finished);
-  }
-  remover.flush(keep);
+  push_all(
+      remover, scans, [](const FrameResult&) {}, keep);
 
   const auto visit = [&](auto&& take) {
     for (std::size_t s = 0; s < scans.size(); ++s) {
       for (std::size_t i = 0; i < labels[s].size(); ++i) {
-        const Eigen::Map<const Eigen::Vector3f> local(&scans[s].xyzi[4 * i]);
         const PointLabel label = labels[s][i];
         if (label != PointLabel::kGround && label != PointLabel::kStatic &&
             label != PointLabel::kDynamic)
           continue;
-        take(s, scans[s].T_world_sensor * local.cast<double>(), label, scans[s].labels[i]);
+        take(s, scans[s].T_world_sensor * point_of(scans[s], i), label, scans[s].labels[i]);
       }
     }
   };

@@ -4,10 +4,10 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/median.hpp"
-#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/scene.hpp"
+#include "support/simulated_runs.hpp"
 
 namespace dynains::test {
 namespace {
@@ -16,26 +16,20 @@ simulation::Config place(simulation::Scene scene, std::size_t scans) {
   return drive_of(scene, simulation::Sensor::kVlp16, static_cast<int>(scans), 4711);
 }
 
-RawPoints<float> points_of(const simulation::SimulatedScan& scan) {
-  return {scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-}
-
 struct Drive {
   std::vector<Pose> estimated;
   std::vector<Pose> exact;  ///< in the frame of the first scan
 };
 
 Drive drive(const simulation::Config& config, const OdometryConfig& odometry_config) {
-  simulation::Simulator simulator(config);
   Odometry odometry(odometry_config);
   Drive result;
-  const Pose T_first_world = simulator.scan(0).T_world_sensor.inverse();
-  for (std::size_t i = 0; i < simulator.size(); ++i) {
-    const simulation::SimulatedScan scan = simulator.scan(i);
+  const std::vector<simulation::SimulatedScan> scans = simulate(config);
+  for (const simulation::SimulatedScan& scan : scans) {
     const OdometryResult found = odometry.push(points_of(scan), {}, scan.time);
     REQUIRE(found.loss == OdometryLoss::kNone);
     result.estimated.push_back(found.T_world_sensor);
-    result.exact.push_back(T_first_world * scan.T_world_sensor);
+    result.exact.push_back(scans[0].T_world_sensor.inverse() * scan.T_world_sensor);
   }
   return result;
 }
@@ -51,11 +45,9 @@ double worst_error(const Drive& drive) {
 
 TEST_CASE("Scans along smooth walls have a free direction, though many points fit there") {
   const auto free_scans = [](simulation::Scene scene) {
-    simulation::Simulator simulator(drive_of(scene, simulation::Sensor::kOs0_128, 8, 6102));
     Odometry odometry;
     std::size_t count = 0;
-    for (std::size_t i = 0; i < simulator.size(); ++i) {
-      const simulation::SimulatedScan scan = simulator.scan(i);
+    for (const auto& scan : simulate(drive_of(scene, simulation::Sensor::kOs0_128, 8, 6102))) {
       count += odometry.push(points_of(scan), {}, scan.time).free_directions > 0 ? 1 : 0;
     }
     return count;
@@ -180,8 +172,7 @@ TEST_CASE("All sensors of a rig register together, and each point has the beam o
   double worst = 0.0;
   for (std::size_t i = 0; i < simulator.size(); ++i) {
     simulation::SimulatedScan scan = simulator.scan(i);
-    RawPoints<float> points = points_of(scan);
-    points.sensors = scan.sensors.data();
+    const RawPoints<float> points = points_of(scan);
     const OdometryResult found = odometry.push(points, {}, scan.time);
     REQUIRE(found.loss == OdometryLoss::kNone);
     const Pose T_exact = T_first_world * scan.T_world_sensor;
@@ -225,9 +216,7 @@ TEST_CASE("Points with times: motions to 3 cm, wherever in the turn the stamp is
     simulation::Config config = place(simulation::Scene::kUrban, 14);
     config.ego_speed = speed;
     config.rolling_shutter = true;
-    simulation::Simulator simulator(config);
-    std::vector<simulation::SimulatedScan> scans;
-    for (std::size_t i = 0; i < simulator.size(); ++i) scans.push_back(simulator.scan(i));
+    const std::vector<simulation::SimulatedScan> scans = simulate(config);
     for (const double shift : {0.0, 0.05, 0.1}) {
       CAPTURE(speed, shift);
       CHECK(error_of_motion(scans, shift) < 0.03);

@@ -15,6 +15,23 @@ inline std::vector<simulation::SimulatedScan> simulate(const simulation::Config&
   return scans;
 }
 
+inline RawPoints<float> points_of(const simulation::SimulatedScan& scan) {
+  const std::uint8_t* const sensors = scan.sensors.empty() ? nullptr : scan.sensors.data();
+  return {scan.xyzi.data(), scan.labels.size(), 4, sensors};
+}
+
+/// Pushes all scans and gives each frame and each final verdict to a function.
+template <class TakeFrame, class TakeFinal>
+void push_all(DynaInsRemover& remover, const std::vector<simulation::SimulatedScan>& scans,
+              const TakeFrame& take_frame, const TakeFinal& take_final) {
+  for (const simulation::SimulatedScan& scan : scans) {
+    const FrameResult frame = remover.push(points_of(scan), scan.T_world_sensor, scan.time);
+    take_frame(frame);
+    if (frame.finished) take_final(*frame.finished);
+  }
+  remover.flush(take_final);
+}
+
 /// For each scan and point, whether the point is static.
 using StaticPoints = std::vector<std::vector<std::uint8_t>>;
 

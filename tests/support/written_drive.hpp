@@ -11,6 +11,23 @@
 
 namespace dynains::test {
 
+/// Writes a scan as PCD with the time `time_of(s)` of each point that was measured `s` seconds
+/// after the time of the scan.
+inline void write_timed_scan(const std::filesystem::path& path, const std::vector<float>& xyzi,
+                             const std::vector<float>& times,
+                             const std::function<double(double)>& time_of) {
+  PointColumns columns;
+  columns.time = true;
+  PointFileWriter file(path, columns);
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    FilePoint point;
+    point.position = Eigen::Map<const Eigen::Vector3f>(&xyzi[4 * k]).cast<double>();
+    point.time = time_of(static_cast<double>(times[k]));
+    file.add(point);
+  }
+  file.commit();
+}
+
 /// A folder of KITTI with the scans and the true poses of a simulated drive.
 class WrittenDrive {
  public:
@@ -60,24 +77,15 @@ class WrittenDrive {
     }
   }
 
-  /// Writes the drive into another folder, as PCD with the time `time_of(s)` of each point that was
-  /// measured `s` seconds after the time of its scan.
+  /// Writes the drive into another folder by write_timed_scan().
   void write_with_times(
       const std::filesystem::path& folder,
       const std::function<double(double)>& time_of = [](double s) { return s; }) const {
     std::filesystem::create_directories(folder / "pcd");
-    PointColumns columns;
-    columns.time = true;
     std::vector<double> times;
     for (std::size_t i = 0; i < size(); ++i) {
-      PointFileWriter file(folder / "pcd" / (simulation::scan_name(i) + ".pcd"), columns);
-      for (std::size_t k = 0; k < scans_[i].times.size(); ++k) {
-        FilePoint point;
-        point.position = Eigen::Map<const Eigen::Vector3f>(&scans_[i].xyzi[4 * k]).cast<double>();
-        point.time = time_of(static_cast<double>(scans_[i].times[k]));
-        file.add(point);
-      }
-      file.commit();
+      write_timed_scan(folder / "pcd" / (simulation::scan_name(i) + ".pcd"), scans_[i].xyzi,
+                       scans_[i].times, time_of);
       times.push_back(scans_[i].time);
     }
     write_times(folder / "times.txt", times);
