@@ -2,7 +2,7 @@
 #include "dynains/poses/diagnosis.hpp"
 
 #include "dynains/io/trajectory.hpp"
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
@@ -134,14 +134,9 @@ TEST_CASE("check estimates the place of the lidar in the body whose poses are gi
   // The flag that check prints corrects the poses.
   const std::string seq = street.path();
   const std::string pose = extrinsic_text(found);
-  const Outcome told = start({"check", seq});
-  CHECK(told.code == 1);
-  CHECK_THAT(told.out, ContainsSubstring("\n    dynains run " + seq + " --extrinsic \"" + pose +
-                                         "\" --out OUT\n"));
-  const Outcome healed = start({"check", seq, "--extrinsic", pose});
-  CAPTURE(healed.out);
-  CHECK(healed.code == 0);
-  CHECK_THAT(healed.out, ContainsSubstring("agree as they are"));
+  check_says(start({"check", seq}), 1,
+             "\n    dynains run " + seq + " --extrinsic \"" + pose + "\" --out OUT\n");
+  check_says(start({"check", seq, "--extrinsic", pose}), 0, "agree as they are");
 }
 
 TEST_CASE("check estimates the offset of the clocks") {
@@ -198,7 +193,7 @@ TEST_CASE("check reports what it cannot decide") {
 
   const TemporaryFolder folder;
   write_text(folder / "velodyne/0.bin", std::string(16, '\0'));
-  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "poses.txt", pose_row());
   const Diagnosis one = diagnose(Recording(folder.path()));
   CHECK(one.verdict == PoseVerdict::kUnknown);
   CHECK(one.invalid_share == 1.0);
@@ -213,13 +208,10 @@ TEST_CASE("check and run report a problem in one sentence") {
   const std::string seq = street.path();
 
   const Outcome wrong = start({"check", seq});
-  CHECK(wrong.code == 1);
-  CHECK_THAT(wrong.out, ContainsSubstring("pass --invert-poses.\n    dynains run " + seq +
-                                          " --invert-poses --out OUT\n"));
+  check_says(wrong, 1,
+             "pass --invert-poses.\n    dynains run " + seq + " --invert-poses --out OUT\n");
   CHECK(wrong.err.empty());
-  const Outcome right = start({"check", seq, "--invert-poses"});
-  CHECK(right.code == 0);
-  CHECK_THAT(right.out, ContainsSubstring("agree as they are"));
+  check_says(start({"check", seq, "--invert-poses"}), 0, "agree as they are");
   CHECK_THAT(
       start({"check", seq, "--left-handed-poses", "--pose-units", "cm", "--invert-poses"}).out,
       ContainsSubstring("leave out --left-handed-poses, pass --pose-units m.\n"));
@@ -234,11 +226,9 @@ TEST_CASE("check and run report a problem in one sentence") {
           ContainsSubstring("pass --invert-poses. See: dynains check " + seq) &&
           ContainsSubstring("--accept-poses"));
   CHECK_FALSE(fs::exists(out / "wrong"));
-  const Outcome warned = start({"run", seq, "-o", out / "wrong", "-q", "--accept-poses"});
-  CHECK(warned.code == 0);
+  const Outcome warned = succeed(start({"run", seq, "-o", out / "wrong", "-q", "--accept-poses"}));
   CHECK_THAT(warned.err, !ContainsSubstring("Scans agree under other options"));
-  const Outcome fine = start({"run", seq, "-o", out / "right", "-q", "--invert-poses"});
-  CHECK(fine.code == 0);
+  const Outcome fine = succeed(start({"run", seq, "-o", out / "right", "-q", "--invert-poses"}));
   CHECK(fine.err.empty());
 }
 
@@ -253,9 +243,9 @@ TEST_CASE("Proposed commands repeat the flags of the user, as a shell reads them
   const std::string seq = street.path();
   const Outcome outcome = start({"check", seq, "--poses", poses, "--invert-poses", "--pose-shift",
                                  "0", "--extrinsic", "0 0 0 0 0 0 1"});
-  CHECK(outcome.code == 1);
-  CHECK_THAT(outcome.out, ContainsSubstring("\n    dynains run " + seq + " --poses '" + seq +
-                                            "/a user'\\''s poses.txt' --invert-poses"));
+  check_says(
+      outcome, 1,
+      "\n    dynains run " + seq + " --poses '" + seq + "/a user'\\''s poses.txt' --invert-poses");
   CHECK_THAT(outcome.out,
              ContainsSubstring(" --pose-shift 0 --extrinsic '0 0 0 0 0 0 1' --pose-units mm "
                                "--out OUT\n"));
@@ -266,10 +256,10 @@ TEST_CASE("check tells if there are more poses than scans") {
   Poses poses = street.poses();
   poses.resize(30, poses.back());
   write_poses(street.path() / "poses.txt", poses);
-  const Outcome outcome = start({"check", street.path()});
-  CHECK(outcome.code == 0);
-  CHECK_THAT(outcome.out, ContainsSubstring(" 30 poses for 24 scans in poses.txt: row N belongs to "
-                                            "the scan with number N, counted from 0; if clouds"));
+  check_says(
+      start({"check", street.path()}), 0,
+      " 30 poses for 24 scans in poses.txt: row N belongs to the scan with number N, counted "
+      "from 0; if clouds");
   poses.resize(60, poses.back());  // of a longer recording
   write_poses(street.path() / "poses.txt", poses);
   CHECK_THAT(start({"check", street.path()}).out,
@@ -349,13 +339,10 @@ TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") 
   for (std::size_t i = 0; i < 12; ++i) {
     const RecordedScan all = before.read_scan(i);
     const RecordedScan kept = clean.read_scan(i);
-    const std::vector<std::uint32_t> labels =
-        read_labels(folder / ("out/labels/" + std::to_string(i) + ".label"), all.size());
-    std::size_t expected = 0;
-    for (const std::uint32_t label : labels) {
-      if ((label & 0xFFFF) != 251) ++expected;
-    }
-    CHECK(kept.size() == expected);
+    const std::vector<std::uint32_t> labels = labels_in(folder / "out", std::to_string(i));
+    REQUIRE(labels.size() == all.size());
+    const auto moving = std::count_if(labels.begin(), labels.end(), is_moving);
+    CHECK(kept.size() + static_cast<std::size_t>(moving) == all.size());
     CHECK(clean.T_world_sensor(i).isApprox(before.T_world_sensor(i), 1e-9));
     REQUIRE_FALSE(kept.ring.empty());
     CHECK(kept.ring.front() == 5);

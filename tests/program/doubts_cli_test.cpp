@@ -1,8 +1,7 @@
 // Messages about faulty recordings, and no message about right ones.
 #include <initializer_list>
-#include <nlohmann/json.hpp>
 
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "run/remarks/cloud_remarks.hpp"
 #include "simulation/config.hpp"
 #include "support/catch.hpp"
@@ -29,9 +28,7 @@ class Drive : public WrittenDrive {
     fs::remove_all(out());
     return start(Arguments{"run", path(), "-o", out(), "-q"} + flags);
   }
-  nlohmann::json report() const {
-    return nlohmann::json::parse(read_text(fs::path(out()) / "report.json"));
-  }
+  nlohmann::json report() const { return report_in(out()); }
 
  private:
   TemporaryFolder folder_;
@@ -68,8 +65,7 @@ TEST_CASE("run names the scan at which poses jump, and the size") {
   const Pose change = T_world_c * sideways * T_world_c.inverse();
   drive.with_poses([&](std::size_t i, const Pose& T) { return i < 15 ? T : Pose(change * T); });
   const Outcome outcome = drive.run();
-  CHECK(outcome.code == 0);
-  CHECK_THAT(outcome.err, ContainsSubstring("poses jump 1 time, at scan 000015 by 3.0"));
+  check_warns(outcome, "poses jump 1 time, at scan 000015 by 3.0");
   const nlohmann::json jumps = drive.report()["doubts"]["jumps"];
   REQUIRE(jumps.size() == 1);
   CHECK(jumps[0]["scan"] == "000015");
@@ -293,9 +289,7 @@ TEST_CASE("check tells clouds that are parts of a turn") {
 
 TEST_CASE("one scan alone is told") {
   const Drive drive;
-  const Outcome outcome = drive.run({"--start", "3", "--end", "3"});
-  CHECK(outcome.code == 0);
-  CHECK_THAT(outcome.err, ContainsSubstring("one scan alone"));
+  check_warns(drive.run({"--start", "3", "--end", "3"}), "one scan alone");
 }
 
 /// Turns the sensor of a drive nose down by this angle (deg), in addition.
@@ -406,10 +400,8 @@ TEST_CASE("check names ways of the poses that are too long, and the factor") {
   const Drive drive(drive_of(simulation::Scene::kUrban, simulation::Sensor::kOs1_64, 30, 41));
   for (const double factor : {1.1, 0.9}) {
     drive.with_poses(scaled_poses(factor));
-    const Outcome outcome = start({"check", drive.path()});
-    CHECK(outcome.code == 1);
-    CHECK_THAT(outcome.out, ContainsSubstring(factor > 1.0 ? "pass --pose-scale 0.909"
-                                                           : "pass --pose-scale 1.11"));
+    check_says(start({"check", drive.path()}), 1,
+               factor > 1.0 ? "pass --pose-scale 0.909" : "pass --pose-scale 1.11");
     CHECK(start({"check", drive.path(), "--pose-scale", std::to_string(1.0 / factor)}).code == 0);
   }
   CHECK(start({"check", drive.path(), "--pose-scale", "0.01"}).code == 2);
@@ -421,12 +413,8 @@ TEST_CASE("check proposes to de-skew points whose times explain what the poses d
   succeed(
       start({"simulate", path, "-q", "--format", "mcap", "--sensor", "os1-64", "--scans", "30",
              "--seed", GENERATE("43", "92"), "--ego-speed", "12", "--rolling-shutter", "true"}));
-  const Outcome raw = start({"check", path});
-  CHECK(raw.code == 1);
-  CHECK_THAT(raw.out, ContainsSubstring("pass --deskew"));
-  const Outcome deskewed = start({"check", path, "--deskew"});
-  CHECK(deskewed.code == 0);
-  CHECK_THAT(deskewed.out, ContainsSubstring("agree as they are"));
+  check_says(start({"check", path}), 1, "pass --deskew");
+  check_says(start({"check", path, "--deskew"}), 0, "agree as they are");
 }
 
 TEST_CASE("check names poses without orientation, and proposes nothing for coarse coordinates") {

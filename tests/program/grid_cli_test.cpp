@@ -1,4 +1,3 @@
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "program/tiny_sequence.hpp"
 #include "run/write_grid.hpp"
@@ -57,7 +56,7 @@ TEST_CASE("beams of a grid begin at the sensor of their point") {
   // The first sensor, high above, sees two patches of ground; the second one a point of the far
   // patch, past what lies between.
   const TemporaryFolder folder;
-  write_text(folder / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write_text(folder / "poses.txt", pose_row());
   write_text(folder / "sensors.txt", "1 0 0 2 0 1 0 2 0 0 1 30\n1 0 0 2 0 1 0 3 0 0 1 0.8\n");
   std::ostringstream points("x,y,z\n", std::ios::ate);
   std::string sensors;

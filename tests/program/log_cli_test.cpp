@@ -1,40 +1,21 @@
 // The program with logs of ROS instead of folders of scans.
-#include <nlohmann/json.hpp>
-
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
-#include "io/files.hpp"
 #include "io/log_writer.hpp"
-#include "program/start.hpp"
-#include "program/tiny_sequence.hpp"
+#include "program/run_folder.hpp"
+#include "reliability/tree.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;
 using namespace dynains::test;
-
-namespace {
-
-constexpr std::size_t kLogScans = 12;
-std::string all_labels(const fs::path& out) {
-  std::string all;
-  for (std::size_t i = 0; i < kLogScans; ++i) {
-    all += read_text(out / "labels" / (scan_name(i) + ".label"));
-  }
-  return all;
-}
-
-}  // namespace
 
 TEST_CASE(
     "De-skewing by --deskew restores the scores that a rolling shutter costs, and keeps times of "
     "points") {
   const TemporaryFolder folder;
   const std::string log = folder / "drive" / "drive.mcap";
-  const Outcome refused =
-      start({"simulate", folder / "kitti", "--scans", "2", "--rolling-shutter", "true"});
-  CHECK(refused.code != 0);
-  CHECK_THAT(refused.err, ContainsSubstring("--rolling-shutter needs --format mcap"));
+  check_refused(start({"simulate", folder / "kitti", "--scans", "2", "--rolling-shutter", "true"}),
+                2, "--rolling-shutter needs --format mcap");
   succeed(start({"simulate", folder / "drive", "--format", "mcap", "--scene", "urban", "--sensor",
                  "vlp16", "--scans", "30", "--rolling-shutter", "true"}));
   const auto static_accuracy = [&](const Arguments& flags) {
@@ -74,9 +55,7 @@ TEST_CASE("Memory for reading does not grow with the log") {
       messages.push_back(
           {1, nanoseconds(time), odometry(time, "lidar", Eigen::Isometry3d::Identity())});
     }
-    write_text(folder / "drive.mcap", mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
-                                                 {"/odom", "nav_msgs/msg/Odometry"}},
-                                                messages, {}));
+    write_text(folder / "drive.mcap", mcap_file({kClouds, kOdometry}, messages, {}));
   };
   const auto peak_memory = [&](int clouds) {
     // A new process counts the memory of this one, too, so that the log in memory must be gone.
@@ -94,8 +73,7 @@ TEST_CASE("Memory for reading does not grow with the log") {
 
 TEST_CASE("run, check and eval read a log as the folder of its scans, a truncated one to its end") {
   const TemporaryFolder folder;
-  const Arguments flags = {"--sensor", "vlp16", "--scans", std::to_string(kLogScans),
-                           "--seed",   "5"};
+  const Arguments flags = {"--sensor", "vlp16", "--scans", "12", "--seed", "5"};
   const auto simulate = [&](const std::string& out, const Arguments& more) {
     return start(Arguments{"simulate", out} + flags + more);
   };
@@ -108,9 +86,9 @@ TEST_CASE("run, check and eval read a log as the folder of its scans, a truncate
   const std::string out = folder / "of_log";
   const Outcome outcome = succeed(start({"run", log, "--out", out, "--write-clean"}));
   CHECK_THAT(outcome.err, !ContainsSubstring("ends early"));
-  CHECK(all_labels(out) == all_labels(folder / "of_folder"));
-  const auto report = nlohmann::json::parse(read_text(folder / "of_log" / "report.json"));
-  CHECK(report["scans"] == kLogScans);
+  CHECK(read_tree(folder / "of_log/labels") == read_tree(folder / "of_folder/labels"));
+  const nlohmann::json report = report_in(out);
+  CHECK(report["scans"] == 12);
   CHECK(report["log_ends_early"] == false);
   CHECK(start({"eval", log, out}).out == start({"eval", folder / "seq", folder / "of_folder"}).out);
   CHECK_THAT(start({"check", log}).out, ContainsSubstring("clouds from topic /points"));
@@ -137,5 +115,5 @@ TEST_CASE("run, check and eval read a log as the folder of its scans, a truncate
                                               "recorder; ") &&
                             ContainsSubstring(" scans before it are read\n"));
   CHECK(count_lines(early.err) == 1);
-  CHECK(nlohmann::json::parse(read_text(folder / "early/report.json"))["log_ends_early"] == true);
+  CHECK(report_in(folder / "early")["log_ends_early"] == true);
 }

@@ -2,7 +2,6 @@
 
 #include <unistd.h>
 
-#include "dynains/errors.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

@@ -1,6 +1,5 @@
 // The rule of outputs, for each command that writes a file of a name that the user gives.
 
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "reliability/tree.hpp"
 #include "support/catch.hpp"

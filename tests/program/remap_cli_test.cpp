@@ -1,13 +1,9 @@
-#include <nlohmann/json.hpp>
-
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
 #include "dynains/io/recording.hpp"
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
-#include "io/files.hpp"
 #include "io/folder.hpp"
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
 
@@ -39,25 +35,29 @@ void write_other_poses(const std::string& file, std::size_t count, unsigned seed
 }
 
 /// A finished run over a small sequence, and a file of corrected poses.
-struct RemapFixture {
+struct RemapFixture : RunFolder {
   explicit RemapFixture(const Arguments& more = {}) {
     write_tiny_sequence(seq, kRunScans);
     write_other_poses(corrected, kRunScans, 7);
-    succeed(start(Arguments{"run", seq, "--out", out} + more));
+    succeed(run(more));
   }
-  RemapFixture(const RemapFixture& other) {
+  RemapFixture(const RemapFixture& other) : RunFolder() {
     fs::copy(other.folder.path(), folder.path(), fs::copy_options::recursive);
   }
   Outcome remap(const Arguments& more = {}) const {
     return start(Arguments{"remap", seq, out} + more);
   }
+  /// Changes the report of the run.
+  template <class Change>
+  void edit_report(Change&& change) const {
+    nlohmann::json edited = report();
+    change(edited);
+    write_text(report_file, edited.dump());
+  }
 
-  TemporaryFolder folder;
-  std::string seq = folder / "a seq";
-  std::string out = folder / "an out";
   std::string corrected = folder / "corrected.txt";
   std::string map = out + "/static_map_remapped.ply";
-  std::string report = out + "/report.json";
+  std::string report_file = out + "/report.json";
 };
 
 /// Bytes of the map of the labels in `out` under the poses of `corrected`.
@@ -103,7 +103,7 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
   CHECK(read_text(f.map) == expected_map(f));
   CHECK_THAT(outcome.out, ContainsSubstring("12 scans, static map: "));
   CHECK(read_text(f.out + "/static_map.ply") == own_map);
-  const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
+  const auto report = f.report();
   CHECK(report["remapped_map"]["points"] == read_points(f.map).positions.size());
   CHECK(report["complete"] == true);
 
@@ -113,11 +113,11 @@ TEST_CASE("remap gives the bytes of a map of the labels and the corrected poses"
     CHECK(read_text(f.map) == expected_map(f));
   }
   SECTION("a map elsewhere leaves the folder of the run as it is") {
-    const std::string before = read_text(f.out + "/report.json");
+    const std::string before = read_text(f.report_file);
     const std::string elsewhere = f.folder / "corrected.ply";
     succeed(f.remap({"--poses", f.corrected, "--map", elsewhere}));
     CHECK(read_text(elsewhere) == expected_map(f));
-    CHECK(read_text(f.out + "/report.json") == before);
+    CHECK(read_text(f.report_file) == before);
     CHECK_THAT(f.remap({"--map", elsewhere}).err, ContainsSubstring("exists"));
     CHECK(read_text(elsewhere) == expected_map(f));
     CHECK(f.remap({"--map", elsewhere, "--force"}).code == 0);
@@ -153,7 +153,7 @@ TEST_CASE("remap with the poses of the run fills the voxels of the run's map") {
   CHECK(read_points(f.map).positions.size() ==
         read_points(f.out + "/static_map.ply").positions.size());
   succeed(f.remap({"--map-voxel", "0"}));
-  const auto report = nlohmann::json::parse(read_text(f.out + "/report.json"));
+  const auto report = f.report();
   CHECK(read_points(f.map).positions.size() == report["labels"]["static"].get<std::size_t>() +
                                                    report["labels"]["ground"].get<std::size_t>());
 }
@@ -230,16 +230,10 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
          write_text(f.seq + "/times.txt", times);
        },
        "has no pose or no scan for 4 of 12 scans of the run, 000008 first"},
-      {[](const auto& f) {
-         auto report = nlohmann::json::parse(read_text(f.report));
-         report["complete"] = false;
-         write_text(f.report, report.dump());
-       },
+      {[](const auto& f) { f.edit_report([](auto& report) { report["complete"] = false; }); },
        "/complete: expected true"},
       {[](const auto& f) {
-         auto report = nlohmann::json::parse(read_text(f.report));
-         report["outputs"]["scans"] = nlohmann::json::array();
-         write_text(f.report, report.dump());
+         f.edit_report([](auto& report) { report["outputs"]["scans"].clear(); });
        },
        "/outputs/scans: expected the scans of the run"},
       {[](const auto& f) {
@@ -272,9 +266,9 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
     const auto text_of = [](const std::string& file) {
       return fs::exists(file) ? read_text(file) : "";
     };
-    const std::string report = text_of(f.report), map = text_of(f.map);
+    const std::string report = text_of(f.report_file), map = text_of(f.map);
     check_refused(f.remap(Arguments{"--poses", f.corrected} + flags), code, expected);
-    CHECK(text_of(f.report) == report);
+    CHECK(text_of(f.report_file) == report);
     CHECK(text_of(f.map) == map);
   };
   for (const Case& wrong : cases) {

@@ -1,11 +1,8 @@
 #include <csignal>
-#include <nlohmann/json.hpp>
 
 #include "dynains/compiled_remover.hpp"
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/point_file.hpp"
-#include "io/files.hpp"
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "program/tiny_sequence.hpp"
 #include "run/verdict_files.hpp"
 #include "support/catch.hpp"
@@ -15,25 +12,15 @@ using namespace dynains::test;
 
 namespace {
 
-/// A sequence, and a folder for the results that does not exist yet. Their names contain a blank.
-struct Fixture {
-  explicit Fixture(std::size_t scans = 12) : seq(folder / "a seq"), out(folder / "an out") {
-    write_tiny_sequence(seq, scans);
-  }
-  Outcome run(const Arguments& more = {}) const {
-    return start(Arguments{"run", seq, "--out", out} + more);
-  }
-  nlohmann::json report() const { return nlohmann::json::parse(read_text(out + "/report.json")); }
+struct Fixture : RunFolder {
+  explicit Fixture(std::size_t scans = 12) { write_tiny_sequence(seq, scans); }
   std::size_t labels() const { return count_entries(out + "/labels"); }
+  std::string scan_file(std::size_t i) const { return seq + "/velodyne/" + scan_name(i) + ".bin"; }
   void await_first_scan() const {
     for (int i = 0; i < 60000 && !fs::exists(out + ".partial/labels/000000.label"); ++i) {
       ::usleep(1000);
     }
   }
-
-  TemporaryFolder folder;
-  std::string seq;
-  std::string out;
 };
 
 }  // namespace
@@ -85,13 +72,13 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
   std::uint64_t points = 0;
   std::uint64_t moving = 0;
   for (std::size_t i = 0; i < 12; ++i) {
-    const std::size_t count = tiny_scan(i).size() / 4;
-    points += count;
-    for (const std::uint32_t label :
-         read_labels(fixture.out + "/labels/" + scan_name(i) + ".label", count)) {
+    const auto labels = labels_in(fixture.out, scan_name(i));
+    CHECK(labels.size() == tiny_scan(i).size() / 4);
+    points += labels.size();
+    for (const std::uint32_t label : labels) {
       const std::uint32_t id = label & 0xFFFF;
       CHECK((id == 251 || id == 9 || id == 0));
-      if (id == 251) ++moving;
+      if (is_moving(label)) ++moving;
     }
   }
   const nlohmann::json report = fixture.report();
@@ -305,22 +292,15 @@ TEST_CASE("Different spellings of a path name one place") {
     fs::path before;
   };
   const Here here(fixture.folder.path());
-  for (const std::vector<std::string>& flags :
-       {std::vector<std::string>{"--out", "trailing/"},
-        std::vector<std::string>{"--out", "beside", "--map", "map.ply"},
-        std::vector<std::string>{"--out", "within", "--map", fixture.folder / "within/own.ply"}}) {
+  for (const Arguments& flags : {Arguments{"--out", "trailing/"},
+                                 {"--out", "beside", "--map", "map.ply"},
+                                 {"--out", "within", "--map", fixture.folder / "within/own.ply"}}) {
     CAPTURE(flags);
-    std::vector<std::string> arguments = {"run", "a seq", "--quiet"};
-    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    const Arguments arguments = Arguments{"run", "a seq", "--quiet"} + flags;
     succeed(start(arguments));
-    arguments.push_back("--force");
-    const Outcome again = start(arguments);
-    CAPTURE(again.err);
-    CHECK(again.code == 0);
+    succeed(start(arguments + Arguments{"--force"}));
   }
-  const auto map_of = [](const std::string& folder) {
-    return nlohmann::json::parse(read_text(folder + "/report.json"))["static_map"]["file"];
-  };
+  const auto map_of = [](const fs::path& out) { return report_in(out)["static_map"]["file"]; };
   CHECK(map_of("trailing") == "static_map.ply");
   CHECK(map_of("within") == "own.ply");
   CHECK(map_of("beside") == (fs::current_path() / "map.ply").string());
@@ -339,9 +319,7 @@ TEST_CASE("Scans without a pose are left out with a warning, and counted in the 
   for (int i = 0; i < 7; ++i) poses += std::to_string(100.0 + 0.1 * i) + " 0 0 0 0 0 0 1\n";
   write_text(fixture.seq + "/times.txt", times);
   write_text(fixture.seq + "/poses.txt", poses);
-  const Outcome outcome = succeed(fixture.run());
-  CHECK_THAT(outcome.err,
-             ContainsSubstring("warning: 5 of 12 scans have no pose and are left out"));
+  check_warns(fixture.run(), "warning: 5 of 12 scans have no pose and are left out");
   CHECK(fixture.report()["scans"] == 7);
   CHECK(fixture.report()["scans_without_pose"] == 5);
 }
@@ -373,11 +351,7 @@ TEST_CASE("Wrong flags: exit code 2, one line, nothing written") {
       {{"--map", fixture.folder / "map.las", "--crs", "EPSG:25832"}, "projinfo"},
   };
   for (const Case& wrong : cases) {
-    const Outcome outcome = fixture.run(wrong.flags);
-    CAPTURE(wrong.expected);
-    CHECK(outcome.code == 2);
-    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
-    CHECK(count_lines(outcome.err) == 1);
+    check_one_error(fixture.run(wrong.flags), 2, wrong.expected);
     CHECK_FALSE(fs::exists(fixture.out));
   }
 }
@@ -389,14 +363,12 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
   const std::string right = fixture.folder / "right";
   fs::rename(fixture.seq, right);
   std::string far_away;
-  for (int i = 0; i < 12; ++i) {
-    far_away += i == 5 ? "1 0 0 3e7 0 1 0 0 0 0 1 0\n" : "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  }
+  for (int i = 0; i < 12; ++i) far_away += pose_row(i == 5 ? 3e7 : 0.0);
   struct Case {
     std::string file;                 // of the sequence
     std::optional<std::string> text;  // none: the file is removed
     std::string expected;
-    std::vector<std::string> flags = {};
+    Arguments flags = {};
   };
   const std::vector<Case> cases = {
       {"velodyne/000011.bin", std::string(33, '\0'), "000011.bin: truncated at byte 33"},
@@ -416,12 +388,7 @@ TEST_CASE("Broken input: exit code 1, one line, earlier results as they were") {
     } else {
       fs::remove_all(file);
     }
-    std::vector<std::string> flags = broken.flags;
-    flags.push_back("--force");
-    const Outcome outcome = fixture.run(flags);
-    CHECK(outcome.code == 1);
-    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(broken.expected));
-    CHECK(count_lines(outcome.err) == 1);
+    check_one_error(fixture.run(broken.flags + Arguments{"--force"}), 1, broken.expected);
     CHECK(read_text(fixture.out + "/report.json") == before);
     CHECK(fixture.labels() == 12);
   }
@@ -446,7 +413,7 @@ TEST_CASE("One odd scan does not decide how much memory a run takes") {
              head + size_lines(kPoints) + "DATA binary_compressed\n" + sizes + lzf);
   std::string poses;
   for (int i = 0; i < 40; ++i) {
-    poses += "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    poses += pose_row();
     if (i == 0) continue;
     std::string usual = head + size_lines(3000) + "DATA ascii\n";
     for (int k = 0; k < 3000; ++k) {
@@ -456,10 +423,8 @@ TEST_CASE("One odd scan does not decide how much memory a run takes") {
   }
   write_text(scans / "poses.txt", poses);
   succeed(start({"run", scans, "--out", folder / "out", "-q"}));
-  const std::string report = read_text(folder / "out/report.json");
-  const std::size_t at = report.find("\"peak_memory_bytes\": ") + 21;
   // The open scan, its file in memory, and the memory for its verdict: 300 bytes per point.
-  CHECK(std::stoull(report.substr(at)) < 100'000'000U + 300U * kPoints);
+  CHECK(report_in(folder / "out")["peak_memory_bytes"] < 100'000'000U + 300U * kPoints);
 }
 
 TEST_CASE("Maps far from the origin lose nothing") {
@@ -537,21 +502,17 @@ TEST_CASE("Closed standard streams change no result") {
 }
 
 TEST_CASE("run writes cleaned scans of KITTI") {
-  const TemporaryFolder folder;
-  const std::string seq = folder / "seq";
-  constexpr std::size_t kScans = 12;
-  write_tiny_sequence(seq, kScans);
-  succeed(start({"run", seq, "-o", folder / "out", "-q", "--write-clean"}));
+  const Fixture fixture;
+  succeed(fixture.run({"-q", "--write-clean"}));
   std::size_t removed = 0;
-  for (std::size_t i = 0; i < kScans; ++i) {
-    std::vector<float> all, kept;
-    read_scan(seq + "/velodyne/" + scan_name(i) + ".bin", all);
-    read_scan(folder / ("out/clean/" + scan_name(i) + ".bin"), kept);
-    const std::vector<std::uint32_t> labels =
-        read_labels(folder / ("out/labels/" + scan_name(i) + ".label"), all.size() / 4);
-    std::vector<float> expected;
+  for (std::size_t i = 0; i < 12; ++i) {
+    std::vector<float> all, kept, expected;
+    read_scan(fixture.scan_file(i), all);
+    read_scan(fixture.out + "/clean/" + scan_name(i) + ".bin", kept);
+    const std::vector<std::uint32_t> labels = labels_in(fixture.out, scan_name(i));
+    REQUIRE(labels.size() == all.size() / 4);
     for (std::size_t k = 0; k < labels.size(); ++k) {
-      if ((labels[k] & 0xFFFF) == 251) {
+      if (is_moving(labels[k])) {
         ++removed;
       } else {
         expected.insert(expected.end(), all.data() + 4 * k, all.data() + 4 * k + 4);
@@ -613,7 +574,7 @@ TEST_CASE("Coordinates in millimetres are refused before any output, and read by
   for (std::size_t i = 0; i < 12; ++i) {
     std::vector<float> scan = tiny_scan(i);
     for (std::size_t k = 0; k < scan.size(); ++k) scan[k] *= k % 4 == 3 ? 1.0F : 1000.0F;
-    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"), scan);
+    write_scan(fixture.scan_file(i), scan);
   }
   const Outcome refused = fixture.run({"--force"});
   CHECK(refused.code == 2);
@@ -644,9 +605,7 @@ TEST_CASE("A run that judges nothing is no success, and keeps earlier results") 
   const std::string label = fixture.out + "/labels/" + scan_name(5) + ".label";
   const std::string before = read_text(label);
   std::vector<float> nothing(4000, 0.0F);
-  for (std::size_t i = 0; i < 12; ++i) {
-    write_scan(fs::path(fixture.seq) / "velodyne" / (scan_name(i) + ".bin"), nothing);
-  }
+  for (std::size_t i = 0; i < 12; ++i) write_scan(fixture.scan_file(i), nothing);
   for (const char* build_map : {"true", "false"}) {
     check_refused(fixture.run({"--force", "--build-map", build_map}), 1,
                   fixture.seq +

@@ -1,9 +1,5 @@
 // `dynains run --passes 2` as a user starts it.
-#include <nlohmann/json.hpp>
-
-#include "dynains/io/kitti.hpp"
-#include "io/files.hpp"
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "reliability/tree.hpp"
 #include "support/catch.hpp"
 
@@ -23,10 +19,6 @@ struct CarPark {
     return start(Arguments{"run", seq, "--out", folder / out, "--min-range", "2.7"} + more);
   }
   fs::path path(const std::string& name) const { return folder / name; }
-  std::vector<std::uint32_t> labels(const std::string& out, const std::string& scan) const {
-    const fs::path file = path(out) / "labels" / (scan + ".label");
-    return read_labels(file, fs::file_size(file) / 4);
-  }
 
   TemporaryFolder folder;
   std::string seq = folder / "seq";
@@ -54,10 +46,11 @@ TEST_CASE(
   for (const fs::directory_entry& entry :
        fs::directory_iterator(recording.path("one") / "labels")) {
     const std::string scan = entry.path().stem().string();
-    const auto before = recording.labels("one", scan), after = recording.labels("two", scan);
+    const auto before = labels_in(recording.path("one"), scan),
+               after = labels_in(recording.path("two"), scan);
     REQUIRE(before.size() == after.size());
     for (std::size_t i = 0; i < after.size(); ++i) {
-      const bool did_move = (before[i] & 0xffffU) == 251, moves = (after[i] & 0xffffU) == 251;
+      const bool did_move = is_moving(before[i]), moves = is_moving(after[i]);
       removed += moves && !did_move ? 1 : 0;
       kept_again += did_move && !moves ? 1 : 0;
       moving += moves ? 1 : 0;
@@ -66,7 +59,7 @@ TEST_CASE(
   CHECK(removed > 0);
   CHECK(kept_again > 0);
 
-  const auto report = nlohmann::json::parse(read_text(recording.path("two") / "report.json"));
+  const auto report = report_in(recording.path("two"));
   CHECK(report["labels"]["dynamic"] == moving);
   CHECK(report["second_pass"]["removed_points"] == removed);
   CHECK(report["second_pass"]["restored_points"] == kept_again);
@@ -83,14 +76,12 @@ TEST_CASE("passes are one or two, and the policy of static points needs two") {
   for (const char* const passes : {"0", "3"}) {
     CHECK(start({"run", folder / "seq", "--out", folder / "out", "--passes", passes}).code == 2);
   }
-  const std::vector<std::vector<std::string>> streams = {{"--passes", "1"},
-                                                         {"--preset", "default"}};
-  for (const std::vector<std::string>& stream : streams) {
+  for (const Arguments& stream : {Arguments{"--passes", "1"}, {"--preset", "default"}}) {
     CAPTURE(stream.front());
-    const Outcome last = start(
-        Arguments{"run", folder / "seq", "--out", folder / "out", "--static", "last"} + stream);
-    CHECK(last.code == 2);
-    CHECK(last.err.find("--static last needs --passes 2") != std::string::npos);
+    check_refused(
+        start(Arguments{"run", folder / "seq", "--out", folder / "out", "--static", "last"} +
+              stream),
+        2, "--static last needs --passes 2");
   }
   CHECK(!fs::exists(folder / "out"));
 }

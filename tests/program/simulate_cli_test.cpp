@@ -1,7 +1,6 @@
 #include <nlohmann/json.hpp>
 
 #include "dynains/io/recording.hpp"
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
 
@@ -35,9 +34,7 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
   for (const char* preset : {"paper", "default"}) {
     succeed(start({"run", a, "--out", out, "--preset", preset, "--force"}));
     const Outcome judged =
-        start({"eval", a, out, "--errors", "--json", folder / "eval.json", "--force"});
-    CAPTURE(judged.err);
-    CHECK(judged.code == 0);
+        succeed(start({"eval", a, out, "--errors", "--json", folder / "eval.json", "--force"}));
     CHECK_THAT(judged.out, ContainsSubstring("identity") && ContainsSubstring("oracle") &&
                                ContainsSubstring("called ground"));
     // The causes account for every error and every right verdict.
@@ -72,10 +69,7 @@ TEST_CASE("simulate makes a sequence for run and eval, with equal bytes for equa
 
   // Labels that do not fit the scan.
   write_text(a + "/labels/000002.label", "1234");
-  const Outcome refused = start({"eval", a, out});
-  CHECK(refused.code == 1);
-  CHECK_THAT(refused.err, StartsWith("dynains: error: ") &&
-                              ContainsSubstring("000002.label: has 4 bytes, expected"));
+  check_one_error(start({"eval", a, out}), 1, "000002.label: has 4 bytes, expected");
 }
 
 TEST_CASE("simulate refuses unknown values") {
@@ -83,8 +77,7 @@ TEST_CASE("simulate refuses unknown values") {
   const std::string out = folder / "sim";
   CHECK_THAT(simulate(out, {"--scene", "moon"}).err,
              ContainsSubstring("--scene = moon: expected urban|"));
-  CHECK_THAT(simulate(out, {"--scans", "0"}).err, ContainsSubstring("--scans = 0: expected INT"));
-  CHECK(simulate(out, {"--scans", "0"}).code == 2);
+  check_refused(simulate(out, {"--scans", "0"}), 2, "--scans = 0: expected INT");
   CHECK_FALSE(fs::exists(out));
   const Outcome without = start({"simulate"});
   CHECK(without.code == 2);

@@ -104,6 +104,26 @@ inline void check_refused(const Outcome& outcome, int code, const std::string& w
   CHECK_THAT(outcome.err, ContainsSubstring(words));
 }
 
+/// Checks the exit code of a command, and that its standard output has these words.
+inline void check_says(const Outcome& outcome, int code, const std::string& words) {
+  INFO(outcome.err);
+  CHECK(outcome.code == code);
+  CHECK_THAT(outcome.out, ContainsSubstring(words));
+}
+
+/// Checks that a command succeeded, with these words on standard error.
+inline void check_warns(const Outcome& outcome, const std::string& words) {
+  check_refused(outcome, 0, words);
+}
+
+/// Checks that a command failed with one line of error, which has these words, and no output.
+inline void check_one_error(const Outcome& outcome, int code, const std::string& words) {
+  check_refused(outcome, code, words);
+  CHECK_THAT(outcome.err, StartsWith("dynains: error: "));
+  CHECK(count_lines(outcome.err) == 1);
+  CHECK(outcome.out.empty());
+}
+
 /// Output of `dynains ARGUMENTS` on a pseudo-terminal. Throws unless the exit code is 0.
 inline std::string show_on_terminal(const Arguments& arguments) {
   const int screen = ::posix_openpt(O_RDWR | O_NOCTTY);

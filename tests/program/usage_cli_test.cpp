@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include "dynains/version.hpp"
-#include "io/files.hpp"
 #include "program/start.hpp"
 #include "support/catch.hpp"
 
@@ -37,7 +36,7 @@ TEST_CASE("run --help shows the options that matter, --help-all the rest too") {
 
 TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
   struct Case {
-    std::vector<std::string> arguments;
+    Arguments arguments;
     std::string expected;
   };
   const std::vector<Case> cases = {
@@ -51,12 +50,7 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
       {{"config", "--preste"}, "--preste"},
   };
   for (const Case& wrong : cases) {
-    const Outcome outcome = start(wrong.arguments);
-    CAPTURE(wrong.expected);
-    CHECK(outcome.code == 2);
-    CHECK(outcome.out.empty());
-    CHECK_THAT(outcome.err, StartsWith("dynains: error: ") && ContainsSubstring(wrong.expected));
-    CHECK(std::count(outcome.err.begin(), outcome.err.end(), '\n') == 1);
+    check_one_error(start(wrong.arguments), 2, wrong.expected);
   }
 }
 

@@ -2,14 +2,11 @@
 #include <sys/resource.h>
 
 #include <csignal>
-#include <nlohmann/json.hpp>
 
-#include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
-#include "io/files.hpp"
 #include "io/log_writer.hpp"
 #include "io/logs/log_file.hpp"
-#include "program/start.hpp"
+#include "program/run_folder.hpp"
 #include "program/tiny_sequence.hpp"
 #include "support/catch.hpp"
 #include "support/rig_log.hpp"
@@ -26,21 +23,19 @@ constexpr std::uint8_t kUint8 = 2, kUint16 = 4;
 /// Points with columns that nothing here reads, one of which cannot be compressed.
 std::string points_of_scan(std::size_t i, const std::vector<bool>& keep = {}) {
   const std::vector<float> scan = tiny_scan(i);
-  ByteWriter points;
+  std::string points;
   for (std::size_t k = 0; k < scan.size() / 4; ++k) {
     if (!keep.empty() && !keep[k]) continue;
-    for (std::size_t c = 0; c < 4; ++c) points.number(scan[4 * k + c]);
-    points.number(static_cast<std::uint16_t>(40503 * (k + 977 * i)))
-        .number(static_cast<std::uint8_t>(i));
+    for (std::size_t c = 0; c < 4; ++c) points += packed(scan[4 * k + c]);
+    points +=
+        packed(static_cast<std::uint16_t>(40503 * (k + 977 * i)), static_cast<std::uint8_t>(i));
   }
-  return points.bytes();
+  return points;
 }
 
 std::string cloud_of(std::size_t i, const std::string& points) {
-  std::vector<CloudField> fields = kXyz;
-  fields.push_back({"intensity", 12, 7});
-  fields.push_back({"ambient", 16, kUint16});
-  fields.push_back({"tag", 18, kUint8});
+  const std::vector<CloudField> fields =
+      xyz_and({{"intensity", 12, 7}, {"ambient", 16, kUint16}, {"tag", 18, kUint8}});
   return cloud_message(MessageEncoding::kCdr, 0.1 * static_cast<double>(i), "lidar", fields,
                        kPointBytes, points);
 }
@@ -54,20 +49,7 @@ std::string tiny_log() {
     messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(0, 0))});
     messages.push_back({2, nanoseconds(time) + 5, "{\"scan\": " + std::to_string(i) + "}"});
   }
-  return mcap_file({{"/points", "sensor_msgs/msg/PointCloud2"},
-                    {"/odom", "nav_msgs/msg/Odometry"},
-                    {"/camera", "any/msg/Thing", "json"}},
-                   messages, {});
-}
-
-/// By point of scan i: whether the run calls it moving.
-std::vector<bool> moving_in(const fs::path& out, std::size_t i) {
-  std::vector<bool> moving;
-  const std::size_t count = tiny_scan(i).size() / 4;
-  for (const std::uint32_t label : read_labels(out / "labels" / (scan_name(i) + ".label"), count)) {
-    moving.push_back((label & 0xffffU) == 251);
-  }
-  return moving;
+  return mcap_file({kClouds, kOdometry, {"/camera", "any/msg/Thing", "json"}}, messages, {});
 }
 
 /// The messages that the log without moving points of scans from `first` on has.
@@ -78,24 +60,24 @@ std::vector<Message> cleaned(const fs::path& log, const fs::path& out, std::size
     if (message.first.rfind("/points", 0) != 0) continue;
     const std::size_t i = scan++;
     if (i < first) continue;
-    std::vector<bool> keep = moving_in(out, i);
-    keep.flip();
+    std::vector<bool> keep;
+    for (const std::uint32_t label : labels_in(out, scan_name(i)))
+      keep.push_back(!is_moving(label));
+    CHECK(keep.size() == tiny_scan(i).size() / 4);
     message.second = cloud_of(i, points_of_scan(i, keep));
   }
   CHECK(scan == kScans);
   return messages;
 }
 
-struct Fixture {
+struct Fixture : RunFolder {
   Fixture() { write_text(log, tiny_log()); }
 
   Outcome run(const Arguments& flags) const {
     return start(Arguments{"run", log, "--out", out, "--quiet"} + flags);
   }
 
-  TemporaryFolder folder;
   std::string log = folder / "drive.mcap";
-  std::string out = folder / "out";
   std::string target = folder / "clean" / "drive.mcap";
 };
 
@@ -125,8 +107,8 @@ TEST_CASE(
 TEST_CASE("Clouds without a verdict stay in the log as they are, and their number is told") {
   Fixture fixture;
   const std::string target = fixture.folder / "window.mcap";
-  const Outcome outcome = succeed(fixture.run({"--write-log", target, "--start", "3"}));
-  CHECK_THAT(outcome.err, ContainsSubstring("window.mcap: 3 clouds have no verdict"));
+  check_warns(fixture.run({"--write-log", target, "--start", "3"}),
+              "window.mcap: 3 clouds have no verdict");
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 3));
 }
 
@@ -151,8 +133,7 @@ TEST_CASE("run --mark adds the labels of the run to all clouds") {
   for (std::size_t i = 0; i < kScans; ++i) {
     const std::size_t count = tiny_scan(i).size() / 4;
     std::vector<std::uint32_t> labels(count, 0);
-    if (i >= 3)
-      labels = read_labels(fs::path(fixture.out) / "labels" / (scan_name(i) + ".label"), count);
+    if (i >= 3) labels = labels_in(fixture.out, scan_name(i));
     for (std::uint32_t& label : labels) label &= 0xffU;
     CHECK(marked.read_labels(i) == labels);
   }
@@ -175,8 +156,7 @@ TEST_CASE("A rig with a topic for each sensor is run as its merged clouds, and c
   const std::string out = folder / "out", of_rig = folder / "of_rig";
   succeed(start({"run", rig, "--out", of_rig}));
   succeed(start(Arguments{"run", log, "--out", out, "--write-log", clean} + topics));
-  const auto report = nlohmann::json::parse(read_text(fs::path(out) / "report.json"));
-  CHECK(report["scans"] == 24);
+  CHECK(report_in(out)["scans"] == 24);
 
   RecordingOptions options;
   options.cloud_topic = topics[1];
@@ -185,15 +165,15 @@ TEST_CASE("A rig with a topic for each sensor is run as its merged clouds, and c
   std::size_t moving = 0, same = 0, points = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
     const RecordedScan scan = before.read_scan(i);
-    const std::string name = scan_name(i) + ".label";
-    const auto labels = read_labels(fs::path(out) / "labels" / name, scan.size());
-    const auto expected = read_labels(fs::path(of_rig) / "labels" / name, scan.size());
+    const auto labels = labels_in(out, scan_name(i)), expected = labels_in(of_rig, scan_name(i));
+    REQUIRE(labels.size() == scan.size());
+    REQUIRE(expected.size() == scan.size());
     std::vector<float> kept;
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      const bool is_moving = (labels[k] & 0xffffU) == 251;
-      moving += is_moving ? 1 : 0;
-      same += is_moving == ((expected[k] & 0xffffU) == 251) ? 1 : 0;
-      if (!is_moving) kept.insert(kept.end(), {scan.xyzi[4 * k], scan.xyzi[4 * k + 1]});
+      const bool moves = is_moving(labels[k]);
+      moving += moves ? 1 : 0;
+      same += moves == is_moving(expected[k]) ? 1 : 0;
+      if (!moves) kept.insert(kept.end(), {scan.xyzi[4 * k], scan.xyzi[4 * k + 1]});
     }
     points += scan.size();
     std::vector<float> found;
@@ -228,7 +208,7 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
   const std::string there = fixture.folder / "mine.mcap";
   const std::string before = read_text(fixture.log);
   struct Case {
-    std::vector<std::string> flags;
+    Arguments flags;
     int code;
     std::string text;
   };
@@ -240,10 +220,7 @@ TEST_CASE("run --write-log refuses places and recordings before the run, and cha
       {{"--write-log", fixture.folder / "none" / "a.mcap"}, 1, "none: cannot be opened"},
       {{"--mark"}, 2, "--mark needs --write-log"}};
   for (const Case& one : cases) {
-    const Outcome outcome = fixture.run(one.flags);
-    CAPTURE(one.text, outcome.err);
-    CHECK(outcome.code == one.code);
-    CHECK_THAT(outcome.err, ContainsSubstring(one.text));
+    check_refused(fixture.run(one.flags), one.code, one.text);
     CHECK_FALSE(fs::exists(fixture.out));
   }
   fixture.log = fixture.folder / "seq";
@@ -265,11 +242,11 @@ TEST_CASE("A log that does not fit on the disk leaves nothing, for the results a
     std::signal(SIGXFSZ, SIG_IGN);
     ::setrlimit(RLIMIT_FSIZE, &limit);
   };
-  check_refused(start({"run", fixture.log, "--out", fixture.out, "--quiet", "--write-log", target,
-                       "--passes", "1", "--map-voxel", "2"},
-                      limit_files),
-                1, "big.mcap");
+  const Arguments flags = {"--write-log", target, "--passes", "1", "--map-voxel", "2"};
+  check_refused(
+      start(Arguments{"run", fixture.log, "--out", fixture.out, "-q"} + flags, limit_files), 1,
+      "big.mcap");
   CHECK(count_entries(fixture.folder.path()) == 1);
-  CHECK(fixture.run({"--write-log", target, "--passes", "1", "--map-voxel", "2"}).code == 0);
+  CHECK(fixture.run(flags).code == 0);
   CHECK(messages_of(target) == cleaned(fixture.log, fixture.out, 0));
 }
