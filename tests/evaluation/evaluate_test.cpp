@@ -158,14 +158,11 @@ TEST_CASE("Malformed scans and settings are refused with their name") {
 
 TEST_CASE("Class lists are ids and ranges, with a short text form that can be read back") {
   const TruthClasses moving;
-  CHECK(moving(252) == Truth::kDynamic);
-  CHECK(moving(258) == Truth::kDynamic);
-  CHECK(moving(259 | 5U << 16U) == Truth::kDynamic);
-  CHECK(moving(251) == Truth::kDynamic);
-  CHECK(moving(250) == Truth::kStatic);
-  CHECK(moving(260) == Truth::kStatic);
-  CHECK(moving(0) == Truth::kIgnored);
-  CHECK(moving(1) == Truth::kIgnored);
+  for (const std::uint32_t label : {251U, 252U, 258U, 259U | 5U << 16U}) {
+    CHECK(moving(label) == Truth::kDynamic);
+  }
+  for (const std::uint32_t label : {250U, 260U}) CHECK(moving(label) == Truth::kStatic);
+  for (const std::uint32_t label : {0U, 1U}) CHECK(moving(label) == Truth::kIgnored);
   CHECK(TruthClasses(Unlabeled::kStatic)(1) == Truth::kStatic);
   CHECK(moving.dynamic_classes() == "251-259");
 

@@ -93,14 +93,12 @@ TEST_CASE("Estimates are judged apart, beside identity and oracle") {
   for (std::size_t i = 0; i < 100; ++i) scan.in_map[i] = i < 50 ? 3 : 1;  // estimate 1 keeps half
   PointProtocol protocol(EvaluationConfig(), 2);
   protocol.add(scan.view());
-  CHECK(protocol.objects(kFirst).kept() == 100.0);
-  CHECK(protocol.objects(kFirst + 1).kept() == 0.0);
-  CHECK(protocol.objects(kFirst).removed() == 0.0);
-  CHECK(protocol.objects(kFirst + 1).removed() == 100.0);
-  CHECK(protocol.objects(kIdentity).kept() == 100.0);
-  CHECK(protocol.objects(kIdentity).removed() == 0.0);
-  CHECK(protocol.objects(kOracle).kept() == 100.0);
-  CHECK(protocol.objects(kOracle).removed() == 100.0);
+  const std::size_t rows[] = {kFirst, kFirst + 1, kIdentity, kOracle};
+  for (const std::size_t row : rows) {
+    CAPTURE(row);
+    CHECK(protocol.objects(row).kept() == (row == kFirst + 1 ? 0.0 : 100.0));
+    CHECK(protocol.objects(row).removed() == (row == kFirst || row == kIdentity ? 0.0 : 100.0));
+  }
 }
 
 TEST_CASE("Table, JSON and CSV of an evaluation have the objects") {
