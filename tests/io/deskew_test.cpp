@@ -116,9 +116,8 @@ TEST_CASE("Poses of a log between its clouds take part in de-skewing") {
     };
     for (int i = 0; i <= 6; ++i) {
       const double time = 1.0 + 0.05 * i;
-      messages.push_back({1, nanoseconds(time),
-                          by_transforms ? transform(time, "odom", "lidar", place(time))
-                                        : odometry(time, "lidar", place(time))});
+      messages.push_back(by_transforms ? transform_at(1, time, "odom", "lidar", place(time))
+                                       : odometry_at(1, time, "lidar", place(time)));
     }
     for (const double time : {1.0, 1.1, 1.2}) {
       std::string points;

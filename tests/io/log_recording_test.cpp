@@ -20,11 +20,10 @@ const std::vector<LogChannel> kDrive = {kClouds, kTf, kStaticTf};  // of drive_b
 std::vector<WrittenMessage> drive_by_transforms(MessageEncoding encoding = MessageEncoding::kCdr,
                                                 const std::string& frame = "lidar") {
   std::vector<WrittenMessage> messages = {
-      {2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar, encoding)}};
+      transform_at(2, 1.0, "base", "lidar", kT_base_lidar, encoding)};
   for (int i = 0; i < 4; ++i) {
     const double time = 1.0 + 0.1 * i;
-    messages.push_back(
-        {1, nanoseconds(time), transform(time, "odom", "base", pose_at(i, 0), encoding)});
+    messages.push_back(transform_at(1, time, "odom", "base", pose_at(i, 0), encoding));
     messages.push_back({0, nanoseconds(time + 0.03), small_cloud(time, frame, encoding)});
   }
   return messages;
@@ -36,7 +35,7 @@ std::vector<WrittenMessage> clouds_with(const std::string& frame,
   std::vector<WrittenMessage> messages;
   for (std::size_t i = 0; i < 3; ++i) {
     const double time = 1.0 + 0.1 * static_cast<double>(i);
-    messages.push_back({0, nanoseconds(time), small_cloud(time, frame)});
+    messages.push_back(cloud_at(0, time, frame));
     if (i < poses.size()) messages.push_back({1, nanoseconds(time), poses[i]});
   }
   return messages;
@@ -61,6 +60,9 @@ struct Log {
     write_text(path, mcap_file(channels, messages, {}));
   }
   std::string error(const RecordingOptions& options = {}) const { return log_error(path, options); }
+  Pose pose(std::size_t scan, const RecordingOptions& options = {}) const {
+    return Recording(path, options).T_world_sensor(scan);
+  }
 
   TemporaryFolder folder;
   fs::path path = folder / "drive.mcap";
@@ -107,7 +109,7 @@ TEST_CASE("A frame of the log gives the position of the sensor in the clouds") {
 
   write_text(log.folder / "poses.txt", "1 0 0 0 0 0 0 1\n1.4 4 0 0 0 0 0 1\n");
   options.poses = log.folder / "poses.txt";
-  CHECK(Recording(log.path, options).T_world_sensor(2).translation().isApprox(expected));
+  CHECK(log.pose(2, options).translation().isApprox(expected));
 
   options.sensor_frame = "radar";
   CHECK_THAT(log.error(options),
@@ -119,13 +121,12 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
   const Eigen::Isometry3d T_base_rear = pose_at(-2, 0);
   const LogChannel rear = {"/rear", "sensor_msgs/msg/PointCloud2"};
   std::vector<WrittenMessage> messages = drive_by_transforms();
-  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "rear", T_base_rear)});
+  messages.push_back(transform_at(2, 1.0, "base", "rear", T_base_rear));
   for (const double time : {0.98, 1.04, 1.13, 1.38}) {  // twice, once, never, and too late
-    messages.push_back({3, nanoseconds(time), small_cloud(time, "rear")});
+    messages.push_back(cloud_at(3, time, "rear"));
   }
   for (const double time : {0.9, 1.4}) {
-    messages.push_back(
-        {1, nanoseconds(time), transform(time, "odom", "base", pose_at(10 * time - 10, 0))});
+    messages.push_back(transform_at(1, time, "odom", "base", pose_at(10 * time - 10, 0)));
   }
   log.write({kClouds, kTf, kStaticTf, rear}, messages);
   RecordingOptions options;
@@ -173,7 +174,7 @@ TEST_CASE("Clouds of several topics within half a period are one scan, at one ti
 TEST_CASE("Concatenated clouds have the sensors of ConcatenatedPointCloudInfo") {
   const Log log;
   std::vector<WrittenMessage> messages = drive_by_transforms(MessageEncoding::kCdr, "base");
-  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "left", pose_at(1, 0))});
+  messages.push_back(transform_at(2, 1.0, "base", "left", pose_at(1, 0)));
   MessageWriter info(MessageEncoding::kCdr);
   info.header(nanoseconds(1.1), "base").number(std::uint8_t{1}).number(std::uint8_t{1});
   info.number(3U).raw("abc").number(2U);
@@ -230,14 +231,14 @@ TEST_CASE("Poses of a file belong to the clouds of a log by time") {
 TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
   const Log log;
   std::vector<WrittenMessage> messages = clouds_with("lidar", three_odometries("base"));
-  messages.push_back({2, nanoseconds(1.0), transform(1.0, "base", "lidar", kT_base_lidar)});
+  messages.push_back(transform_at(2, 1.0, "base", "lidar", kT_base_lidar));
   log.write({kClouds, kOdometry, kStaticTf}, messages);
-  CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
+  CHECK(log.pose(2).isApprox(pose_at(2, 0.1) * kT_base_lidar, 1e-9));
   CHECK(has_note(Recording(log.path), "the transform from lidar to base is from the log"));
 
   messages.pop_back();
   log.write({kClouds, kOdometry}, messages);
-  CHECK(Recording(log.path).T_world_sensor(2).isApprox(pose_at(2, 0.1), 1e-9));
+  CHECK(log.pose(2).isApprox(pose_at(2, 0.1), 1e-9));
   CHECK(has_note(Recording(log.path),
                  "no transform from lidar to base: poses count as those of lidar"));
 
@@ -249,7 +250,7 @@ TEST_CASE("A topic of poses gets the transform to the sensor from the log") {
                         .bytes());
   }
   log.write({kClouds, {"/pose", "geometry_msgs/msg/PoseStamped"}}, clouds_with("lidar", poses));
-  CHECK(Recording(log.path).T_world_sensor(1).isApprox(pose_at(1, 0.1), 1e-9));
+  CHECK(log.pose(1).isApprox(pose_at(1, 0.1), 1e-9));
 }
 
 TEST_CASE("Clouds in the fixed frame of the poses come back in the frame of the sensor") {
@@ -306,10 +307,10 @@ TEST_CASE("Robots of one log whose frames have equal names keep their own transf
   const Pose T_of_other = pose_at(0, 0.3);
   const auto write = [&](const std::string& points) {
     std::vector<WrittenMessage> messages = drive_by_transforms();
-    messages.push_back({4, nanoseconds(1.0), transform(1.0, "base", "lidar", T_of_other)});
+    messages.push_back(transform_at(4, 1.0, "base", "lidar", T_of_other));
     for (int i = 0; i < 4; ++i) {
       const double time = 1.01 + 0.1 * i;
-      messages.push_back({3, nanoseconds(time), transform(time, "odom", "base", pose_at(-i, 1))});
+      messages.push_back(transform_at(3, time, "odom", "base", pose_at(-i, 1)));
     }
     log.write({{points, kClouds.type},
                {"/one/tf", kTf.type},
@@ -321,32 +322,27 @@ TEST_CASE("Robots of one log whose frames have equal names keep their own transf
   write("/one/points");
   check_drive(log.path);
   write("/two/points");
-  CHECK(Recording(log.path).T_world_sensor(1).linear().isApprox(
-      (pose_at(-1, 1) * T_of_other).linear(), 0.1));
+  CHECK(log.pose(1).linear().isApprox((pose_at(-1, 1) * T_of_other).linear(), 0.1));
   write("/points");
   CHECK_THAT(log.error(), ContainsSubstring("found different ones of frame ") &&
                               ContainsSubstring(" by namespaces /one and /two"));
   RecordingOptions options;
   options.pose_topic = "/one/tf";
-  CHECK(
-      Recording(log.path, options).T_world_sensor(2).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
+  CHECK(log.pose(2, options).isApprox(pose_at(2, 0) * kT_base_lidar, 1e-9));
 }
 
 TEST_CASE("Flag --pose-frame-id takes the poses from transforms, in that frame") {
   const Log log;
   std::vector<WrittenMessage> messages = drive_by_transforms();
-  messages.push_back({2, nanoseconds(1.0), transform(1.0, "map", "odom", pose_at(100, 1))});
-  messages.push_back({3, nanoseconds(1.0), odometry(1.0, "base", pose_at(50, 0))});
+  messages.push_back(transform_at(2, 1.0, "map", "odom", pose_at(100, 1)));
+  messages.push_back(odometry_at(3, 1.0, "base", pose_at(50, 0)));
   log.write({kClouds, kTf, kStaticTf, kOdometry}, messages);
   RecordingOptions options;
   options.pose_topic = "/tf";
-  CHECK(Recording(log.path, options)
-            .T_world_sensor(0)
-            .isApprox(pose_at(100, 1) * pose_at(0, 0) * kT_base_lidar, 1e-9));
+  CHECK(log.pose(0, options).isApprox(pose_at(100, 1) * pose_at(0, 0) * kT_base_lidar, 1e-9));
   options.pose_topic.clear();
   options.pose_frame = "odom";
-  CHECK(
-      Recording(log.path, options).T_world_sensor(0).isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
+  CHECK(log.pose(0, options).isApprox(pose_at(0, 0) * kT_base_lidar, 1e-9));
   options.pose_frame = "utm";
   CHECK_THAT(log.error(options),
              ContainsSubstring("expected poses of frame lidar in utm at the times of the clouds"));
@@ -360,9 +356,8 @@ TEST_CASE("A time offset is applied before poses of the log are taken") {
       std::vector<WrittenMessage> messages = clouds_with("lidar", {});
       for (int i = 0; i < 6; ++i) {
         const double time = 1.0 + 0.1 * i + ahead;
-        messages.push_back({1, nanoseconds(time),
-                            by_transforms ? transform(time, "odom", "lidar", pose_at(i, 0))
-                                          : odometry(time, "lidar", pose_at(i, 0))});
+        messages.push_back(by_transforms ? transform_at(1, time, "odom", "lidar", pose_at(i, 0))
+                                         : odometry_at(1, time, "lidar", pose_at(i, 0)));
       }
       log.write({kClouds, by_transforms ? kTf : kOdometry}, messages);
       RecordingOptions options;
@@ -383,10 +378,8 @@ TEST_CASE("A time offset is applied before poses of the log are taken") {
 
 TEST_CASE("An extrinsic calibration of the user stands for a transform that the log lacks") {
   const Log log;
-  std::vector<WrittenMessage> messages;
-  for (const WrittenMessage& message : drive_by_transforms()) {
-    if (message.channel != 2) messages.push_back(message);
-  }
+  std::vector<WrittenMessage> messages = drive_by_transforms();
+  messages.erase(messages.begin());
   const auto write = [&] { log.write(kDrive, messages); };
   write();
   RecordingOptions options;
@@ -401,18 +394,17 @@ TEST_CASE("An extrinsic calibration of the user stands for a transform that the 
   // Wheels of the body move, too, and a static transform of the lidar leads nowhere.
   for (int i = 0; i < 4; ++i) {
     for (const char* wheel : {"left", "right"}) {
-      messages.push_back(
-          {1, nanoseconds(1.0 + 0.1 * i), transform(1.0 + 0.1 * i, "base", wheel, pose_at(0, i))});
+      messages.push_back(transform_at(1, 1.0 + 0.1 * i, "base", wheel, pose_at(0, i)));
     }
   }
   write();
   check();
-  messages.push_back({2, nanoseconds(1.0), transform(1.0, "mast", "lidar", kT_base_lidar)});
+  messages.push_back(transform_at(2, 1.0, "mast", "lidar", kT_base_lidar));
   write();
   check();
   CHECK_THAT(log.error(), ContainsSubstring("--extrinsic gives the pose of lidar in base"));
   // Two bodies that nothing connects.
-  messages.push_back({1, nanoseconds(1.0), transform(1.0, "world", "trailer", pose_at(0, 0))});
+  messages.push_back(transform_at(1, 1.0, "world", "trailer", pose_at(0, 0)));
   write();
   CHECK_THAT(log.error(options),
              ContainsSubstring("expected one moving body for --extrinsic, found moving transforms "
@@ -422,12 +414,8 @@ TEST_CASE("An extrinsic calibration of the user stands for a transform that the 
 TEST_CASE("Parts of a log that are missing are named, and accepted on demand") {
   const TemporaryFolder folder;
   const std::vector<WrittenMessage> all = drive_by_transforms();
-  const auto write = [&](const std::string& name, std::size_t first, std::size_t last) {
-    const auto begin = all.begin();
-    write_text(folder / name, mcap_file(kDrive,
-                                        {begin + static_cast<std::ptrdiff_t>(first),
-                                         begin + static_cast<std::ptrdiff_t>(last)},
-                                        {}));
+  const auto write = [&](const std::string& name, std::ptrdiff_t first, std::ptrdiff_t last) {
+    write_text(folder / name, mcap_file(kDrive, {all.begin() + first, all.begin() + last}, {}));
   };
   write("drive_0.mcap", 0, 5);
   write("drive_1.mcap", 5, 9);
@@ -545,8 +533,8 @@ TEST_CASE("Clouds that a log has lost are told, and uneven stamps are not") {
   const auto warnings_of = [&](const std::vector<double>& stamps) {
     std::vector<WrittenMessage> messages;
     for (const double time : stamps) {
-      messages.push_back({0, nanoseconds(time), small_cloud(time, "lidar")});
-      messages.push_back({1, nanoseconds(time), odometry(time, "lidar", pose_at(time, 0))});
+      messages.push_back(cloud_at(0, time, "lidar"));
+      messages.push_back(odometry_at(1, time, "lidar", pose_at(time, 0)));
     }
     log.write({kClouds, kOdometry}, messages);
     return Recording(log.path).warnings();

@@ -32,6 +32,24 @@ struct WrittenMessage {
   std::string data;
 };
 
+/// tf2_msgs/TFMessage with one transform, at its time (s).
+inline WrittenMessage transform_at(std::uint16_t channel, double time, const std::string& parent,
+                                   const std::string& child, const Eigen::Isometry3d& T,
+                                   MessageEncoding encoding = MessageEncoding::kCdr) {
+  return {channel, nanoseconds(time), transform(time, parent, child, T, encoding)};
+}
+
+/// nav_msgs/Odometry at its time (s).
+inline WrittenMessage odometry_at(std::uint16_t channel, double time, const std::string& child,
+                                  const Eigen::Isometry3d& T) {
+  return {channel, nanoseconds(time), odometry(time, child, T)};
+}
+
+/// small_cloud() at its time (s).
+inline WrittenMessage cloud_at(std::uint16_t channel, double time, const std::string& frame) {
+  return {channel, nanoseconds(time), small_cloud(time, frame)};
+}
+
 /// Frames of lz4 and zstd can contain uncompressed bytes.
 inline std::string compressed(const std::string& method, const std::string& bytes) {
   const auto size = static_cast<std::uint32_t>(bytes.size());

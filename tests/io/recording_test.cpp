@@ -612,13 +612,9 @@ TEST_CASE("Names of 19 digits are times") {
   CHECK(recording.T_world_sensor(1).translation().x() == 2.0);
 }
 
-TEST_CASE("Folders of SC-LIO-SAM and KITTI raw are read") {
+TEST_CASE("Folders of SC-LIO-SAM are read") {
   const TemporaryFolder folder;
   write_text(folder / "sc/Scans/000000.pcd", pcd({1, 0, 0}));
   write_text(folder / "sc/optimized_poses.txt", pose_row(3));
   CHECK(Recording(folder / "sc").T_world_sensor(0).translation().x() == 3.0);
-
-  write_text(folder / "raw/velodyne_points/data/0000000000.bin", std::string(16, 'B'));
-  write_text(folder / "raw/poses.txt", pose_row(4));
-  CHECK(Recording(folder / "raw").T_world_sensor(0).translation().x() == 4.0);
 }

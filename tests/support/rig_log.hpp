@@ -19,13 +19,12 @@ inline void write_rig_log(const Recording& rig, const std::vector<double>& delay
   for (std::size_t k = 0; k < delays.size(); ++k) {
     const std::string name = "lidar" + std::to_string(k);
     channels.push_back({"/" + name, kClouds.type});
-    messages.push_back({1, 0, transform(0.0, "base", name, T_body_sensor[k])});
+    messages.push_back(transform_at(1, 0.0, "base", name, T_body_sensor[k]));
   }
   const std::vector<CloudField> fields = xyz_and({{"label", 12, 6}});
   for (std::size_t i = 0; i < rig.size(); ++i) {
     const Pose& T_world_body = rig.T_world_sensor(i);
-    messages.push_back(
-        {0, nanoseconds(rig.time(i)), transform(rig.time(i), "odom", "base", T_world_body)});
+    messages.push_back(transform_at(0, rig.time(i), "odom", "base", T_world_body));
     if (i + 1 == rig.size()) break;  // for its motion
     const RecordedScan scan = rig.read_scan(i);
     const std::vector<std::uint32_t> labels = rig.read_labels(i);
