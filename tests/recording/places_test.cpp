@@ -81,42 +81,34 @@ class Recorder {
 constexpr int kEnough = RecordingPlace::kFreeObservations;
 constexpr int kObject = 6;  // places
 
+/// What beams tell of all places, and how often in a row.
+using Observations = std::vector<std::pair<BeamResult, int>>;
+
+/// Number of changed places of an object after these observations.
+std::size_t changed_after(const Observations& observations, int places = kObject) {
+  Recorder recorder;
+  recorder.measure(places);
+  for (const auto& [seen, times] : observations) recorder.observe(seen, times);
+  return recorder.changed();
+}
+
 TEST_CASE("a place that enough observations in a row passed has changed") {
-  Recorder left;
-  left.measure(kObject);
-  left.observe(BeamResult::kHit, 60);  // however long it stood
-  left.observe(BeamResult::kFree, kEnough);
-  CHECK(left.changed() == 6);
-
-  Recorder came;
-  came.measure(kObject);
-  came.observe(BeamResult::kFree, kEnough);
-  came.observe(BeamResult::kHit, 60);
-  CHECK(came.changed() == 6);
-
-  Recorder few;
-  few.measure(kObject);
-  few.observe(BeamResult::kHit, 60);
-  few.observe(BeamResult::kFree, kEnough - 1);
-  CHECK(few.changed() == 0);
+  // However long it stood, and whether it left or came.
+  CHECK(changed_after({{BeamResult::kHit, 60}, {BeamResult::kFree, kEnough}}) == 6);
+  CHECK(changed_after({{BeamResult::kFree, kEnough}, {BeamResult::kHit, 60}}) == 6);
+  CHECK(changed_after({{BeamResult::kHit, 60}, {BeamResult::kFree, kEnough - 1}}) == 0);
 }
 
 TEST_CASE("a hit between free observations begins a new row of them") {
-  Recorder fence;
-  fence.measure(kObject);
+  Observations fence, hidden;
   for (int i = 0; i < 20; ++i) {
-    fence.observe(BeamResult::kFree, kEnough - 1);
-    fence.observe(BeamResult::kHit);
+    fence.insert(fence.end(), {{BeamResult::kFree, kEnough - 1}, {BeamResult::kHit, 1}});
   }
-  CHECK(fence.changed() == 0);
-
-  Recorder hidden;
-  hidden.measure(kObject);
+  CHECK(changed_after(fence) == 0);
   for (int i = 0; i < kEnough; ++i) {
-    hidden.observe(BeamResult::kFree);
-    hidden.observe(BeamResult::kUnknown);
+    hidden.insert(hidden.end(), {{BeamResult::kFree, 1}, {BeamResult::kUnknown, 1}});
   }
-  CHECK(hidden.changed() == 6);
+  CHECK(changed_after(hidden) == 6);
 }
 
 TEST_CASE("references near each other in time and place are one observation") {
@@ -138,13 +130,9 @@ TEST_CASE("references near each other in time and place are one observation") {
 }
 
 TEST_CASE("an object needs enough places") {
-  for (const int places : {kObject - 1, kObject}) {
-    Recorder recorder;
-    recorder.measure(places);
-    recorder.observe(BeamResult::kHit, 5);
-    recorder.observe(BeamResult::kFree, 10);
-    CHECK(recorder.changed() == (places < kObject ? 0U : static_cast<std::size_t>(places)));
-  }
+  const Observations leaves = {{BeamResult::kHit, 5}, {BeamResult::kFree, 10}};
+  CHECK(changed_after(leaves, kObject - 1) == 0);
+  CHECK(changed_after(leaves, kObject) == kObject);
 }
 
 TEST_CASE("a part of something that stays stays") {

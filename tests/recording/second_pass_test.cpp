@@ -77,6 +77,8 @@ SecondPassConfig last_policy() {
 
 struct Counts {
   std::size_t kept = 0, removed = 0;
+  bool are_removed() const { return removed > 9 * kept; }
+  bool are_kept() const { return kept > 0 && removed == 0; }
 };
 
 /// Points of each scan with a label, after both passes.
@@ -180,9 +182,7 @@ TEST_CASE("a car that leaves after a minute leaves the scans before, and nothing
 TEST_CASE("a car that stays, and a street where nothing moves, lose nothing") {
   const Recorded recording = there_and_back(true, true);
   for (const std::uint32_t label : {kCar, kHouse, kTree}) {
-    const Counts all = sum(count(recording, label));
-    CHECK(all.kept > 0);
-    CHECK(all.removed == 0);
+    CHECK(sum(count(recording, label)).are_kept());
   }
 }
 
@@ -194,22 +194,20 @@ TEST_CASE("a car beside one that leaves stays, though the first pass took both f
   boxes.push_back(car_at(4.0));
   recording.drive(boxes, -15.0, 15.0);
   const Counts leaves = sum(count(recording, kCar)), stays = sum(count(recording, kCarBeside));
-  CHECK(leaves.removed > 9 * leaves.kept);
+  CHECK(leaves.are_removed());
   CHECK(stays.kept > 1000);
   CHECK(stays.removed == 0);
 }
 
 TEST_CASE("a car that parks and stays is static under the policy last, since it parked") {
   const Recorded recording = there_and_back(false, true);
-  const Counts always = sum(count(recording, kCar));
-  CHECK(always.removed > 9 * always.kept);
-  const Counts last = sum(count(recording, kCar, true, removes_nothing, last_policy()));
-  CHECK(last.kept > 0);
-  CHECK(last.removed == 0);
-  // A car that left is in neither map.
-  const Counts left = sum(count(with_parked_car(), kCar, true, removes_nothing, last_policy()));
-  CHECK(left.removed > 9 * left.kept);
-  CHECK(sum(count(recording, kHouse, true, removes_nothing, last_policy())).removed == 0);
+  const auto last = [](const Recorded& of, std::uint32_t label) {
+    return sum(count(of, label, true, removes_nothing, last_policy()));
+  };
+  CHECK(sum(count(recording, kCar)).are_removed());
+  CHECK(last(recording, kCar).are_kept());
+  CHECK(last(with_parked_car(), kCar).are_removed());  // a car that left is in neither map
+  CHECK(last(recording, kHouse).removed == 0);
 }
 
 TEST_CASE("an epoch judges another one if it fits there, and no scan that was compared before") {
@@ -297,16 +295,11 @@ TEST_CASE(
     "what a scan took for ground on a car that leaves is moving if it rises above the ground") {
   constexpr std::uint32_t kRoad = 40;
   const Recorded left = with_ground_on_car(with_parked_car());
-  const Counts high = sum(count(left, kHigh));
-  CHECK(high.removed > 9 * high.kept);
-  const Counts flat = sum(count(left, kFlat));
-  CHECK(flat.kept > 0);
-  CHECK(flat.removed == 0);
+  CHECK(sum(count(left, kHigh)).are_removed());
+  CHECK(sum(count(left, kFlat)).are_kept());
   CHECK(sum(count(left, kRoad)).removed == 0);
   // The second pass keeps every point of a car that is parked during the whole recording.
-  const Counts stays = sum(count(with_ground_on_car(there_and_back(true, true)), kHigh));
-  CHECK(stays.kept > 0);
-  CHECK(stays.removed == 0);
+  CHECK(sum(count(with_ground_on_car(there_and_back(true, true)), kHigh)).are_kept());
 }
 
 TEST_CASE("memory does not change the second pass") {
