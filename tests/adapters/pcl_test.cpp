@@ -4,10 +4,8 @@
 
 #include "adapters/message.hpp"
 #include "dynains/adapters/point_cloud2.hpp"
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

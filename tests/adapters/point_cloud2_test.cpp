@@ -1,10 +1,8 @@
 #include "dynains/adapters/point_cloud2.hpp"
 
 #include "adapters/message.hpp"
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

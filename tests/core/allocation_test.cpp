@@ -2,10 +2,8 @@
 #include <atomic>
 #include <new>
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace {
 

@@ -1,10 +1,8 @@
 // Labels do not depend on the type of the cloud.
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/points.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -1,9 +1,7 @@
 // The cause of each verdict, on scenes with known causes.
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -4,11 +4,9 @@
 #include <mutex>
 #include <thread>
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -1,10 +1,8 @@
 // Sensors that are mounted at a tilt: scans are levelled inside, and answers are in the sensor
 // frame.
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -1,10 +1,8 @@
 // Moving objects as boxes with ids and velocities (RemoverConfig::objects).
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/pipeline/object_tracks.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

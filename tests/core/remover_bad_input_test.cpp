@@ -1,10 +1,8 @@
 // Any input gives an exception or a label, and the remover continues to work.
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/own_stages.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains {
 

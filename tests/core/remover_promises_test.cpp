@@ -1,10 +1,8 @@
 // Guarantees of the facade, on scenes with known truth.
 #include <thread>
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -1,10 +1,8 @@
 // Scans of several sensors: each point has the origin of its own.
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

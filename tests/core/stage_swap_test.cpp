@@ -1,11 +1,9 @@
 // Every stage can be replaced by a stage of the user.
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/points.hpp"
 #include "support/catch.hpp"
 #include "support/own_stages.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

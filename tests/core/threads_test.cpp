@@ -3,9 +3,7 @@
 
 #include "support/catch.hpp"
 #include "support/own_stages.hpp"
-#include "support/random.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {

@@ -2,7 +2,6 @@
 // final labels to the file that is given, one byte each.
 #include "io/fingerprint.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace {
 

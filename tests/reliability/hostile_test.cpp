@@ -1,9 +1,7 @@
 // Faulty poses and times: the results are defined, for both presets.
 
-#include "dynains/compiled_remover.hpp"
 #include "support/catch.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {
