@@ -109,23 +109,17 @@ TEST_CASE("a cell that vanished weighs twice, one that nearly vanished once") {
 }
 
 TEST_CASE("a posterior of exactly tau_p is static, more is dynamic") {
-  const Heights half = {1.0F};
-  const Heights whole = {2.0F};
+  const Heights half = {1.0F}, whole = {2.0F};
   BeliefUpdater belief;
   CHECK(belief.posterior() == belief.config().tau_p);
   CHECK_FALSE(belief.is_dynamic());
-  belief.update(half, whole);
-  CHECK(belief.is_dynamic());
-
-  BeliefUpdater::Config strict;
-  strict.tau_p = 0.699;
-  BeliefUpdater below(strict);
-  below.update(half, whole);  // 0.7
-  CHECK(below.is_dynamic());
-  strict.tau_p = 0.701;
-  BeliefUpdater above(strict);
-  above.update(half, whole);
-  CHECK_FALSE(above.is_dynamic());
+  for (const double tau_p : {0.5, 0.699, 0.701}) {
+    BeliefUpdater::Config config;
+    config.tau_p = tau_p;
+    BeliefUpdater updated(config);
+    updated.update(half, whole);  // 0.7
+    CHECK(updated.is_dynamic() == (tau_p < 0.7));
+  }
 }
 
 TEST_CASE("observations without any occupied cell leave the belief as it is") {

@@ -174,13 +174,11 @@ TEST_CASE("cluster numbers do not depend on the order of the points") {
   const Config config = with_voxels(0.5, 1.0, 3.0);
   const PolarBuffer points = random_points(config, {3, 40, -180, 180, -20, 20}, 500, 1);
   const auto order = Random(1).permutation(points.size());
-  PolarBuffer shuffled;
-  shuffled.resize(points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    shuffled.range[i] = points.range[order[i]];
-    shuffled.azimuth[i] = points.azimuth[order[i]];
-    shuffled.z[i] = points.z[order[i]];
+  std::vector<PointRange> ranges;
+  for (const std::size_t i : order) {
+    ranges.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i + 1)});
   }
+  const PolarBuffer shuffled = gathered(points.view(), ranges);
   CurvedVoxelClusterer clusterer(config), of_shuffled(config);
   const auto numbers = clusterer.cluster(points.view());
   const auto shuffled_numbers = of_shuffled.cluster(shuffled.view());

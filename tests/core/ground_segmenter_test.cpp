@@ -4,7 +4,6 @@
 
 #include "support/catch.hpp"
 #include "support/points.hpp"
-#include "support/random.hpp"
 #include "support/scene.hpp"
 
 namespace dynains::test {
@@ -42,6 +41,12 @@ std::vector<bool> reference_ground(const GroundSegmenter::Config& config, Points
     std::vector<std::size_t> members;
   };
   std::map<std::vector<int>, Patch> patches;  // by zone, ring in it and sector
+  const auto rings = [](int zone) {
+    return detail::ConcentricZones::kRings[static_cast<std::size_t>(zone)];
+  };
+  const auto sectors = [](int zone) {
+    return detail::ConcentricZones::kSectors[static_cast<std::size_t>(zone)];
+  };
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double range = std::hypot(scan.x[i], scan.y[i]);
     if (range < inner || range > outer) continue;
@@ -51,21 +56,16 @@ std::vector<bool> reference_ground(const GroundSegmenter::Config& config, Points
     if (is_noise) continue;
     int zone = 3;
     while (range < edges[zone]) --zone;
-    const auto z = static_cast<std::size_t>(zone);
-    const int rings = detail::ConcentricZones::kRings[z];
-    const int sectors = detail::ConcentricZones::kSectors[z];
-    const double depth = (edges[zone + 1] - edges[zone]) / rings;
-    const double width = 2.0 * M_PI / sectors;
-    const int ring = std::min(static_cast<int>((range - edges[zone]) / depth), rings - 1);
+    const double depth = (edges[zone + 1] - edges[zone]) / rings(zone);
+    const double width = 2.0 * M_PI / sectors(zone);
+    const int ring = std::min(static_cast<int>((range - edges[zone]) / depth), rings(zone) - 1);
     const double azimuth = std::atan2(scan.y[i], scan.x[i]) + M_PI;
-    const int sector = std::min(static_cast<int>(azimuth / width), sectors - 1);
-    std::size_t ring_number = static_cast<std::size_t>(ring);
-    for (std::size_t k = 0; k < z; ++k) {
-      ring_number += static_cast<std::size_t>(detail::ConcentricZones::kRings[k]);
-    }
+    const int sector = std::min(static_cast<int>(azimuth / width), sectors(zone) - 1);
+    int ring_number = ring;
+    for (int z = 0; z < zone; ++z) ring_number += rings(z);
     Patch& patch = patches[{zone, ring, sector}];
     patch.is_innermost_zone = zone == 0;
-    patch.ring = ring_number;
+    patch.ring = static_cast<std::size_t>(ring_number);
     patch.points.push_back(i);
   }
 
@@ -138,12 +138,6 @@ std::vector<bool> reference_ground(const GroundSegmenter::Config& config, Points
 
   // Heights of the neighbouring patches in the ring, and of three in each adjacent ring: the one at
   // the middle of the sector and its neighbours.
-  const auto rings = [](int z) {
-    return detail::ConcentricZones::kRings[static_cast<std::size_t>(z)];
-  };
-  const auto sectors = [](int z) {
-    return detail::ConcentricZones::kSectors[static_cast<std::size_t>(z)];
-  };
   const auto heights_around = [&](const std::vector<int>& key) {
     const int zone = key[0], ring = key[1], sector = key[2];
     std::vector<double> heights;
@@ -216,21 +210,32 @@ std::vector<bool> ground_of(const GroundConfig& config, PointsView scan) {
   return ground_of(segmenter, scan);
 }
 
-// Ground with waves, noise and bushes.
-PointBuffer rough_terrain(std::uint64_t seed, std::size_t count) {
-  Random random(seed);
+// Random points around the sensor from `begin` to `end` (m), at `height_of(range, azimuth, place)`
+// (m) over its ground.
+template <class HeightOf>
+PointBuffer terrain(Random& random, std::size_t count, double begin, double end,
+                    HeightOf&& height_of) {
   PointBuffer result;
   for (std::size_t i = 0; i < count; ++i) {
-    const double range = random.uniform(0.5, 110.0);
+    const double range = random.uniform(begin, end);
     const double azimuth = random.uniform(-M_PI, M_PI);
-    const double x = range * std::cos(azimuth);
-    const double y = range * std::sin(azimuth);
-    double z = -kSensorHeight + 0.02 * x + 0.8 * std::sin(0.1 * y) + random.uniform(-0.05, 0.05);
-    if (random.index(5) == 0) z += random.uniform(0.0, 3.0);
-    if (random.index(50) == 0) z -= random.uniform(0.0, 2.0);
-    result.push_back(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+    Eigen::Vector3d place = range * ray_of(0.0, azimuth);
+    place.z() = height_of(range, azimuth, place) - kSensorHeight;
+    add_point(result, place);
   }
   return result;
+}
+
+// Ground with waves, noise and bushes.
+PointBuffer rough_terrain(std::uint64_t seed) {
+  Random random(seed);
+  const auto height_of = [&random](double, double, const Eigen::Vector3d& p) {
+    double z = 0.02 * p.x() + 0.8 * std::sin(0.1 * p.y()) + random.uniform(-0.05, 0.05);
+    if (random.index(5) == 0) z += random.uniform(0.0, 3.0);
+    if (random.index(50) == 0) z -= random.uniform(0.0, 2.0);
+    return z;
+  };
+  return terrain(random, 60000, 0.5, 110.0, height_of);
 }
 
 double share_of_differences(const std::vector<bool>& a, const std::vector<bool>& b) {
@@ -254,7 +259,7 @@ TEST_CASE("ground equals that of Patchwork in double precision") {
   for (const double yaw : {0.0, 2.0}) {
     compare(buffer_of(yard_with(van(10.0, 3.0)).scan(sensor_at(0.0, 0.0, yaw), 0.0).points));
   }
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) compare(rough_terrain(seed, 60000));
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) compare(rough_terrain(seed));
 }
 
 // All points are below the first plane, which was fitted to the seeds only.
@@ -263,15 +268,11 @@ TEST_CASE("a slope that flattens within its patch is fitted again") {
   const double depth = (config.ground_max_range - config.ground_min_range) / 8.0;  // outer rings
   const double begin = 0.5 * (config.ground_min_range + config.ground_max_range);
   Random random(3);
-  PointBuffer scan;
-  for (int i = 0; i < 40000; ++i) {
-    const double range = random.uniform(begin, config.ground_max_range);
-    const double azimuth = random.uniform(-M_PI, M_PI);
+  const auto height_of = [&](double range, double, const Eigen::Vector3d&) {
     const double ahead = std::fmod(range - begin, depth);
-    const double z = -kSensorHeight + 0.48 * ahead - 0.02 * ahead * ahead;
-    scan.push_back(static_cast<float>(range * std::cos(azimuth)),
-                   static_cast<float>(range * std::sin(azimuth)), static_cast<float>(z));
-  }
+    return 0.48 * ahead - 0.02 * ahead * ahead;
+  };
+  const PointBuffer scan = terrain(random, 40000, begin, config.ground_max_range, height_of);
   const std::vector<bool> expected = reference_ground(config, scan);
   const auto ground = std::count(expected.begin(), expected.end(), true);
   REQUIRE(ground > 10000);
@@ -292,7 +293,7 @@ TEST_CASE("ground equals that of Patchwork for other parameters") {
   config.ground_uprightness = 0.99;
   config.ground_elevation = {0.1, 0.1, 0.1, 0.1};
   config.ground_flatness = {1e-2, 1e-2, 1e-2, 1e-2};
-  const PointBuffer scan = rough_terrain(9, 60000);
+  const PointBuffer scan = rough_terrain(9);
   CHECK(share_of_differences(ground_of(config, scan), reference_ground(config, scan)) < kOnBorders);
 }
 
@@ -301,16 +302,12 @@ TEST_CASE("patches far above their neighbours are not ground, as in the referenc
   Random random(5);
   std::vector<double> terrace(13 * 10);
   for (double& height : terrace) height = random.index(3) == 0 ? random.uniform(0.3, 1.0) : 0.0;
-  PointBuffer scan;
-  for (int i = 0; i < 80000; ++i) {
-    const double range = random.uniform(0.5, 110.0);
-    const double azimuth = random.uniform(-M_PI, M_PI);
-    const double x = range * std::cos(azimuth), y = range * std::sin(azimuth);
+  const auto height_of = [&](double range, double azimuth, const Eigen::Vector3d& p) {
     const auto place = static_cast<std::size_t>((azimuth + M_PI) / 0.5) * 10 +
                        static_cast<std::size_t>(range / 11.5);
-    scan.push_back(static_cast<float>(x), static_cast<float>(y),
-                   static_cast<float>(-kSensorHeight + 0.02 * x + terrace[place]));
-  }
+    return 0.02 * p.x() + terrace[place];
+  };
+  const PointBuffer scan = terrain(random, 80000, 0.5, 110.0, height_of);
   GroundConfig config = GroundConfig::paper();
   const std::vector<bool> patchwork = ground_of(config, scan);
   config.ground_step = 0.5;
@@ -322,9 +319,7 @@ TEST_CASE("patches far above their neighbours are not ground, as in the referenc
 TEST_CASE("a flat floor is ground, pillars and vans are not") {
   const Scan scan = yard_with(van(10.0, 3.0)).scan(sensor_at(0.0), 0.0);
   const std::vector<bool> ground = ground_of(GroundConfig(), buffer_of(scan.points));
-  std::size_t missed = 0;
-  std::size_t wrong = 0;
-  std::size_t high = 0;
+  std::size_t missed = 0, wrong = 0, high = 0;
   for (std::size_t i = 0; i < ground.size(); ++i) {
     const bool is_floor = scan.object[i] == kGroundObject;
     if (is_floor && !ground[i]) ++missed;

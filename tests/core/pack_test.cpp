@@ -109,8 +109,8 @@ TEST_CASE("all kinds of packs give equal bits") {
     }
   }
   for (int i = 0; i < 8000; ++i) {
-    a.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
-    b.push_back(static_cast<float>(random.uniform(-100.0, 100.0)));
+    a.push_back(random.uniform_float(-100.0, 100.0));
+    b.push_back(random.uniform_float(-100.0, 100.0));
   }
   // Comparisons with NaN must not depend on the width either.
   constexpr std::size_t kMaxCount = detail::kPackWidth;
@@ -165,14 +165,17 @@ TEST_CASE("all kinds of packs give equal bits") {
 
 TEST_CASE("find_changes and for_each_run agree with a loop over single numbers") {
   Random random(21);
+  const auto random_values = [&](std::size_t count) {
+    std::vector<std::uint32_t> values(count);
+    for (std::uint32_t& value : values)
+      value = static_cast<std::uint32_t>(random.uniform(0.0, 2.5));
+    return values;
+  };
   const auto check = [&](auto packs) {
     using Packs = decltype(packs);
     for (int round = 0; round < 200; ++round) {
       const auto count = static_cast<std::size_t>(random.uniform(0.0, 64.999));
-      std::vector<std::uint32_t> values(count + 1);
-      for (std::uint32_t& value : values) {
-        value = static_cast<std::uint32_t>(random.uniform(0.0, 2.5));
-      }
+      const std::vector<std::uint32_t> values = random_values(count + 1);
       std::uint64_t changes = 0;
       for (std::size_t i = 0; i < count; ++i) {
         changes |= std::uint64_t{values[i + 1] != values[i]} << i;
@@ -181,10 +184,7 @@ TEST_CASE("find_changes and for_each_run agree with a loop over single numbers")
     }
     // More than two words of numbers.
     for (const std::size_t count : {0U, 1U, 2U, 64U, 65U, 66U, 129U, 200U}) {
-      std::vector<std::uint32_t> values(count);
-      for (std::uint32_t& value : values) {
-        value = static_cast<std::uint32_t>(random.uniform(0.0, 2.5));
-      }
+      const std::vector<std::uint32_t> values = random_values(count);
       std::size_t next = 0;
       detail::for_each_run<Packs>(
           count,

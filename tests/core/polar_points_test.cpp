@@ -1,5 +1,6 @@
 #include "dynains/clusters/cluster_set.hpp"
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 
 namespace dynains::test {
@@ -12,8 +13,7 @@ TEST_CASE("points of the window are at the place of Eq. 3 in double") {
     const Eigen::Isometry3d T = random.pose(5.0);
     PointBuffer points;
     for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3f p = random.vector({-60, -60, -5}, {60, 60, 10}).cast<float>();
-      points.push_back(p.x(), p.y(), p.z());
+      add_point(points, random.vector({-60, -60, -5}, {60, 60, 10}));
     }
     PolarBuffer window;
     window.append(points, T);

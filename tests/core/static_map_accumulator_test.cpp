@@ -2,6 +2,7 @@
 
 #include "dynains/pose.hpp"
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 
 namespace dynains::test {
@@ -62,8 +63,7 @@ PointBuffer grid_points(Random& random, std::size_t count, double reach) {
   for (std::size_t i = 0; i < count; ++i) {
     place = random.index(2) == 0 ? grid_vector(random, reach, 4.0)
                                  : place + grid_vector(random, 0.125, 0.125);
-    const Eigen::Vector3f p = place.cast<float>();
-    points.push_back(p.x(), p.y(), p.z());
+    add_point(points, place);
   }
   return points;
 }
@@ -120,8 +120,7 @@ TEST_CASE("at UTM coordinates the map keeps a tenth of a millimetre") {
   T.translation() = Eigen::Vector3d(500123.4567, 5678901.2345, 321.9876);
   for (int i = 0; i < 200; ++i) {
     PointBuffer one;
-    const Eigen::Vector3f p = random.vector({-80, -80, -3}, {80, 80, 3}).cast<float>();
-    one.push_back(p.x(), p.y(), p.z());
+    add_point(one, random.vector({-80, -80, -3}, {80, 80, 3}));
     StaticMapAccumulator single = make_map(0.0);
     single.insert(one, {}, T);
     const Eigen::Vector3d expected = T * Eigen::Vector3d(one.x[0], one.y[0], one.z[0]);

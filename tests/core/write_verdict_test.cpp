@@ -19,15 +19,19 @@ constexpr std::array<DecisionStage, 4> kStages = {
     DecisionStage::kNoCluster, DecisionStage::kTooFewScans, DecisionStage::kSimilar,
     DecisionStage::kProposed};
 
+// A cluster or none.
+std::uint32_t random_cluster(Random& random) {
+  const auto cluster = static_cast<std::uint32_t>(random.index(kClusters + 1));
+  return cluster == kClusters ? kNoCluster : cluster;
+}
+
 // PointRuns of random length, mostly short, each with one cluster or none.
 std::vector<PointRun> random_runs(Random& random, std::uint32_t points) {
   std::vector<PointRun> point_runs;
   for (std::uint32_t begin = 0; begin < points;) {
     const auto length = static_cast<std::uint32_t>(1 + random.index(random.index(4) == 0 ? 50 : 9));
     const std::uint32_t end = std::min(points, begin + length);
-    const std::size_t cluster = random.index(kClusters + 1);
-    point_runs.push_back(
-        {begin, end, cluster == kClusters ? kNoCluster : static_cast<std::uint32_t>(cluster)});
+    point_runs.push_back({begin, end, random_cluster(random)});
     begin = end;
   }
   return point_runs;
@@ -172,17 +176,15 @@ struct JudgedScan {
   explicit JudgedScan(Random& random) : ground(random.index(40)) {
     const std::size_t above = random.index(200);
     const std::size_t all = ground + above + random.index(20);
-    order.resize(all);
-    std::iota(order.begin(), order.end(), 0U);
-    for (std::size_t i = all; i > 1; --i) std::swap(order[i - 1], order[random.index(i)]);
+    const std::vector<std::size_t> numbers = random.permutation(all);
+    order.assign(numbers.begin(), numbers.end());
     slot.split.resize(ground + above);
     slot.split.ground_count = ground;
     slot.input.assign(order);
     slot.valid = all;
     for (std::uint32_t c = 0; c < kClusters; ++c) slot.ids.push_back(100 + c);
     for (std::size_t g = 1; g < kGroups; ++g) {
-      const std::size_t cluster = random.index(kClusters + 1);
-      cluster_of.push_back(cluster == kClusters ? kNoCluster : static_cast<std::uint32_t>(cluster));
+      cluster_of.push_back(random_cluster(random));
     }
     for (std::size_t i = 0; i < above; ++i) {
       group_of.push_back(static_cast<std::uint32_t>(random.index(kGroups)));
@@ -247,9 +249,7 @@ TEST_CASE("verdicts by evidence are those of the point's group, at once and agai
       REQUIRE(outside == verdict.labels.size() - slot.split.count);
     };
 
-    change();
-    check();
-    for (int again = 0; again < 2; ++again) {
+    for (int time = 0; time < 3; ++time) {
       change();
       check();
     }
