@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <iterator>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -54,6 +55,28 @@ void move_rest(const Folder& from, const Folder& to) {
       from.rename(name, to, name, Folder::Rename::kNew);
     }
   }
+}
+
+/// The results in the place of `target`; nothing if it is missing or empty.
+std::optional<ResultFolder> earlier_results(const fs::path& target, const OutputKind& kind,
+                                            bool may_replace, const InputFiles& inputs) {
+  const fs::path place = checked_place(target);
+  inputs.refuse(place);
+  if (!fs::exists(fs::symlink_status(place))) return std::nullopt;
+  if (identity_of(place) == identity_of(".")) {
+    throw IoError(target.string() +
+                  ": is the current folder, which a new one would replace; choose another folder");
+  }
+  ResultFolder found(Folder(place), kind);
+  if (found.has_results() && !may_replace) {
+    throw IoError(target.string() +
+                  ": holds earlier results; choose another folder, or replace them by --force");
+  }
+  found.check(inputs);
+  found.check_contents();
+  Folder(place.parent_path()).check_replaceable(place.filename().string());
+  if (found.folder().names().empty()) return std::nullopt;
+  return found;
 }
 
 [[noreturn]] void fail_at(const fs::path& path, std::string_view text, std::size_t byte,
@@ -347,11 +370,18 @@ void ResultFolder::mark_with(Json marker, const fs::path& file) {
   mark(std::move(marker), listing);
 }
 
-PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
-                             const OutputListing& listing, const InputFiles& inputs)
-    : parent_((create_folder(target.parent_path()), target.parent_path())),
-      target_(target.filename().string()),
-      name_(target_ + kPartialEnd) {
+OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
+                           const OutputListing& listing, bool may_replace, const InputFiles& inputs)
+    : OutputFolder(checked_place(target), kind, listing, inputs,
+                   earlier_results(target, kind, may_replace, inputs)) {}
+
+OutputFolder::OutputFolder(const fs::path& place, const OutputKind& kind,
+                           const OutputListing& listing, const InputFiles& inputs,
+                           std::optional<ResultFolder> earlier)
+    : parent_((create_folder(place.parent_path()), place.parent_path())),
+      target_(place.filename().string()),
+      name_(target_ + kPartialEnd),
+      earlier_(std::move(earlier)) {
   parent_.make_folder(name_);
   results_.emplace(Folder(parent_, name_), kind);
   // Another command may have renamed the folder before it was locked here.
@@ -370,7 +400,7 @@ PartialFolder::PartialFolder(const fs::path& target, const OutputKind& kind,
   }
 }
 
-PartialFolder::~PartialFolder() {
+OutputFolder::~OutputFolder() {
   if (is_kept_) return;
   try {
     remove();
@@ -379,82 +409,63 @@ PartialFolder::~PartialFolder() {
   }
 }
 
-void PartialFolder::remove() {
-  keep();
+void OutputFolder::remove() {
+  is_kept_ = true;
   results_->remove_results();
   parent_.remove_folder(name_);
 }
 
-void PartialFolder::replace(ResultFolder* earlier) {
+void OutputFolder::replace_target() {
   // Files that others have put into the folder meanwhile stay there.
   const auto empty = [&] {
-    earlier->remove_results();
-    move_rest(earlier->folder(), results_->folder());
+    earlier_->remove_results();
+    move_rest(earlier_->folder(), results_->folder());
   };
-  if (earlier != nullptr && parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
+  if (earlier_ && parent_.rename(name_, parent_, target_, Folder::Rename::kExchange)) {
     parent_.sync();
     empty();
     parent_.remove_folder(name_);
     return;
   }
-  if (earlier != nullptr) {
+  if (earlier_) {
     // Nothing that is called complete loses its files one by one.
-    Json marker = earlier->marker();
+    Json marker = earlier_->marker();
     marker["complete"] = false;
-    earlier->mark(marker, OutputListing(earlier->listing()));
+    earlier_->mark(marker, OutputListing(earlier_->listing()));
     empty();
   }
   parent_.rename(name_, parent_, target_, Folder::Rename::kReplace);
   parent_.sync();
 }
 
-OutputFolder::OutputFolder(const fs::path& target, const OutputKind& kind,
-                           const OutputListing& listing, bool may_replace, const InputFiles& inputs)
-    : listing_(listing) {
-  const fs::path place = checked_place(target);
-  inputs.refuse(place);
-  if (fs::exists(fs::symlink_status(place))) {
-    if (identity_of(place) == identity_of(".")) {
-      throw IoError(target.string() +
-                    ": is the current folder, which a new one would replace; "
-                    "choose another folder");
-    }
-    ResultFolder found(Folder(place), kind);
-    if (found.has_results() && !may_replace) {
-      throw IoError(target.string() +
-                    ": holds earlier results; choose another folder, or replace them by --force");
-    }
-    found.check(inputs);
-    found.check_contents();
-    Folder(place.parent_path()).check_replaceable(place.filename().string());
-    if (!found.folder().names().empty()) earlier_.emplace(std::move(found));
-  }
-  partial_.emplace(place, kind, listing, inputs);
-}
-
 bool OutputFolder::had(const char* field, const std::string& text) const {
   const Json::json_pointer where(field);
   return (earlier_ && has(earlier_->marker(), where, text)) ||
-         (has(partial_->left(), kComplete, true) && has(partial_->left(), where, text));
+         (has(left_, kComplete, true) && has(left_, where, text));
 }
 
 Existing OutputFolder::owns(const fs::path& path) const {
   if (!is_file(path)) return Existing::kForeign;
   const Json::json_pointer field = Json::json_pointer("/written") / listed_name(path.string());
   const Json content = content_of(path);
-  const bool is_ours = (earlier_ && has(earlier_->marker(), field, content)) ||
-                       has(partial_->left(), field, content);
+  const bool is_ours =
+      (earlier_ && has(earlier_->marker(), field, content)) || has(left_, field, content);
   return is_ours ? Existing::kOurs : Existing::kForeign;
 }
 
-void OutputFolder::keep_unfinished(const Json& marker) {
-  partial_->results().mark(marker, listing_);
-  sync_files(path());
-  partial_->keep();
+fs::path OutputFolder::add(const fs::path& file, const InputFiles& inputs) {
+  return files_.emplace_back(file, owns(file), inputs).path();
 }
 
-void OutputFolder::put_files_in_place(std::size_t first) {
-  if (first < files_.size()) files_[first].put_in_place([&] { put_files_in_place(first + 1); });
+void OutputFolder::keep_unfinished(const Json& marker) {
+  results_->mark(marker, OutputListing(results_->listing()));
+  sync_files(path());
+  is_kept_ = true;
+}
+
+void OutputFolder::put_files_in_place(std::list<OutputFile>::iterator first) {
+  if (first == files_.end()) return;
+  first->put_in_place([&] { put_files_in_place(std::next(first)); });
 }
 
 void OutputFolder::finish(Json marker, const std::function<void()>& put_others) {
@@ -462,13 +473,13 @@ void OutputFolder::finish(Json marker, const std::function<void()>& put_others) 
     marker["written"][file.listed_target()] = content_of(file.path());
   }
   marker["complete"] = true;
-  marker[kContents] = partial_->results().contents();
-  partial_->results().mark(marker, listing_);
+  marker[kContents] = results_->contents();
+  results_->mark(marker, OutputListing(results_->listing()));
   sync_files(path());
-  partial_->keep();  // the results are whole
-  put_files_in_place(0);
+  is_kept_ = true;  // the results are whole
+  put_files_in_place(files_.begin());
   put_others();
-  partial_->replace(earlier_ ? &*earlier_ : nullptr);
+  replace_target();
 }
 
 OutputFile::OutputFile(const fs::path& target, Existing existing, const InputFiles& inputs)
@@ -477,8 +488,8 @@ OutputFile::OutputFile(const fs::path& target, Existing existing, const InputFil
   // First: a folder that this command reads is in use, too.
   how_ = check_output(*locked_, name, existing, inputs);
   locked_->lock(Folder::Lock::kShared);
-  partial_.emplace(target_, kFileOutput, listing_of_file(name), inputs);
-  folder_ = &partial_->parent();
+  partial_.reset(new OutputFolder(target_, kFileOutput, listing_of_file(name), inputs, {}));
+  folder_ = &partial_->parent_;
 }
 
 OutputFile::OutputFile(const ResultFolder& results, const std::string& name)
@@ -486,16 +497,16 @@ OutputFile::OutputFile(const ResultFolder& results, const std::string& name)
   const bool is_ours = results.listing().contains("", name);
   how_ = check_output(*folder_, name, is_ours ? Existing::kOurs : Existing::kForeign, {});
   // Beside the folder, in which a file that is not listed is one of the user.
-  partial_.emplace(whole_path(results.path()).concat('.' + name), kFileOutput,
-                   listing_of_file(name), InputFiles());
+  partial_.reset(new OutputFolder(whole_path(results.path()).concat('.' + name), kFileOutput,
+                                  listing_of_file(name), InputFiles(), {}));
 }
 
 void OutputFile::put_in_place(const std::function<void()>& publish_more) {
   sync_files(partial_->path());
   publish_more();
-  partial_->keep();  // the file is whole
+  partial_->is_kept_ = true;  // the file is whole
   const std::string name = target_.filename().string();
-  partial_->results().folder().rename(name, *folder_, name, how_);
+  partial_->results_->folder().rename(name, *folder_, name, how_);
   folder_->sync();
   partial_->remove();
 }

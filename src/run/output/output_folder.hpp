@@ -6,10 +6,11 @@
 // folder that holds the target.
 #pragma once
 
-#include <deque>
 #include <filesystem>
 #include <functional>
+#include <list>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
@@ -42,16 +43,9 @@ std::optional<T> json_field(const std::filesystem::path& path, const nlohmann::o
   const nlohmann::ordered_json::json_pointer where(pointer);
   if (!json.contains(where) || json[where].is_null()) return std::nullopt;
   const nlohmann::ordered_json& value = json[where];
-  const char* expected = "a string";
-  bool fits = value.is_string();
-  if constexpr (std::is_same_v<T, bool>) {
-    expected = "true or false";
-    fits = value.is_boolean();
-  } else if constexpr (std::is_same_v<T, double>) {
-    expected = "a number";
-    fits = value.is_number();
-  }
-  if (fits) return value.get<T>();
+  const std::string kind = nlohmann::ordered_json(T()).type_name();
+  if (value.type_name() == kind) return value.get<T>();
+  const std::string expected = kind == "boolean" ? "true or false" : "a " + kind;
   throw IoError(path.string() + ": " + pointer + ": expected " + expected + ", found " +
                 value.type_name());
 }
@@ -208,38 +202,63 @@ class ResultFolder {
   OutputListing listing_;
 };
 
-/// The folder TARGET.partial. The destructor removes it unless it was renamed or kept.
-class PartialFolder {
- public:
-  /// Creates the folder, and those above it, with a marker of this listing. What a killed command
-  /// of this kind has left there is removed before. Throws IoError if anything else has the name,
-  /// or `inputs` are there; UsageError if another command writes the target.
-  PartialFolder(const std::filesystem::path& target, const OutputKind& kind,
-                const OutputListing& listing, const InputFiles& inputs);
-  ~PartialFolder();
-  PartialFolder(const PartialFolder&) = delete;
-  PartialFolder& operator=(const PartialFolder&) = delete;
+class OutputFile;
 
+/// Results that wait in the folder TARGET.partial until they are whole. The destructor removes it
+/// unless they are finished or kept.
+class OutputFolder {
+ public:
+  /// `listing` has all files that will be written. Creates the folder, and those above it; what a
+  /// killed command of this kind has left there is removed before. Throws IoError unless `target`
+  /// is missing, empty or, if `may_replace`, holds results of this kind, all of which are listed
+  /// and none of which are `inputs`, or if anything else has the name of the folder; UsageError if
+  /// another command uses one of them.
+  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
+               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// The folder to write into.
   const std::filesystem::path& path() const { return results_->path(); }
-  ResultFolder& results() { return *results_; }
-  /// Marker of what a killed command had left; null if there was nothing.
-  const nlohmann::ordered_json& left() const { return left_; }
-  /// The folder of the target.
-  const Folder& parent() const { return parent_; }
-  /// Moves this folder to the target, in place of the results that are there, if any.
-  void replace(ResultFolder* earlier);
-  /// The folder stays as it is.
-  void keep() { is_kept_ = true; }
-  /// Removes the folder, which has nothing left but its marker.
-  void remove();
+  /// Whether the results that will be replaced, or complete ones that a killed command has left
+  /// beside the target, have this text in `field` of their marker.
+  bool had(const char* field, const std::string& text) const;
+  /// kOurs if any of those results have written the file `path`, as it is now: their markers have
+  /// its content_of() in the field `written`, by its listed_target().
+  Existing owns(const std::filesystem::path& path) const;
+  /// Also writes a file outside of the folder; one of the results that are replaced is replaced,
+  /// too. Returns where to write it. Throws IoError, UsageError.
+  std::filesystem::path add(const std::filesystem::path& file, const InputFiles& inputs);
+  /// The results so far stay in path(), with this marker. Throws IoError.
+  void keep_unfinished(const nlohmann::ordered_json& marker);
+  /// Writes `marker` with "complete", the contents and the field `written` set, syncs the results,
+  /// puts the added files in place, calls `put_others()`, and then replaces the target: a complete
+  /// marker there means that the other outputs are in place. If any of them fails, the results stay
+  /// in path(). Throws IoError.
+  void finish(
+      nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
 
  private:
-  Folder parent_;
-  std::string target_;
-  std::string name_;
+  friend class OutputFile;
+
+  OutputFolder(const std::filesystem::path& place, const OutputKind& kind,
+               const OutputListing& listing, const InputFiles& inputs,
+               std::optional<ResultFolder> earlier);
+  /// All bytes are on the disk before the first name changes.
+  void put_files_in_place(std::list<OutputFile>::iterator first);
+  /// Moves the folder to the target, in place of the results that are there, if any.
+  void replace_target();
+  /// Removes the folder and the results in it.
+  void remove();
+
+  Folder parent_;  // of the target
+  std::string target_, name_;
   std::optional<ResultFolder> results_;
-  nlohmann::ordered_json left_;
-  bool is_kept_ = false;
+  nlohmann::ordered_json left_;  // marker of what a killed command had left; null: nothing
+  std::optional<ResultFolder> earlier_;
+  std::list<OutputFile> files_;  // outside of the folder
+  bool is_kept_ = false;         // the folder stays as it is
 };
 
 /// A file as an output of its own, or in the folder of finished results.
@@ -267,49 +286,8 @@ class OutputFile {
   std::filesystem::path target_;
   std::optional<Folder> locked_;  // of the target
   Folder::Rename how_;
-  std::optional<PartialFolder> partial_;
+  std::unique_ptr<OutputFolder> partial_;
   const Folder* folder_ = nullptr;  // of the target
-};
-
-/// Results in a folder.
-class OutputFolder {
- public:
-  /// `listing` has all files that will be written. Throws IoError unless `target` is missing, empty
-  /// or, if `may_replace`, holds results of this kind, all of which are listed and none of which
-  /// are `inputs`; UsageError if another command uses it.
-  OutputFolder(const std::filesystem::path& target, const OutputKind& kind,
-               const OutputListing& listing, bool may_replace, const InputFiles& inputs);
-
-  /// The folder to write into.
-  const std::filesystem::path& path() const { return partial_->path(); }
-  /// Whether the results that will be replaced, or complete ones that a killed command has left
-  /// beside the target, have this text in `field` of their marker.
-  bool had(const char* field, const std::string& text) const;
-  /// kOurs if any of those results have written the file `path`, as it is now: their markers have
-  /// its content_of() in the field `written`, by its listed_target().
-  Existing owns(const std::filesystem::path& path) const;
-  /// Also writes a file outside of the folder; one of the results that are replaced is replaced,
-  /// too. Returns where to write it. Throws IoError, UsageError.
-  std::filesystem::path add(const std::filesystem::path& file, const InputFiles& inputs) {
-    return files_.emplace_back(file, owns(file), inputs).path();
-  }
-  /// The results so far stay in path(), with this marker. Throws IoError.
-  void keep_unfinished(const nlohmann::ordered_json& marker);
-  /// Writes `marker` with "complete", the contents and the field `written` set, syncs the results,
-  /// puts the added files in place, calls `put_others()`, and then replaces the target: a complete
-  /// marker there means that the other outputs are in place. If any of them fails, the results stay
-  /// in path(). Throws IoError.
-  void finish(
-      nlohmann::ordered_json marker, const std::function<void()>& put_others = [] {});
-
- private:
-  /// All bytes are on the disk before the first name changes.
-  void put_files_in_place(std::size_t first);
-
-  OutputListing listing_;
-  std::optional<ResultFolder> earlier_;
-  std::optional<PartialFolder> partial_;
-  std::deque<OutputFile> files_;  // outside of the folder
 };
 
 }  // namespace dynains::run
