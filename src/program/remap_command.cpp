@@ -1,5 +1,6 @@
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -142,61 +143,35 @@ SessionRequest session_of(const RemapOptions& options, const ResultFolder& out,
   return reposed_session(whole_path(options.update), name, fingerprint);
 }
 
-/// The map is a file of its own, or is added to the folder of the run, whose report describes it.
-class NewMap {
- public:
-  NewMap(const RemapOptions& options, ResultFolder& out, const Recording& recording,
-         const ScanRange& range, const InputFiles& inputs)
-      : out_(out), columns_(map_columns(recording, range, false)) {
-    const fs::path folder = whole_path(out.path());
-    const auto is_written = [](const fs::path& name) {
-      return is_point_file(name) && !is_las(name);
-    };
-    if (!options.map.empty() && !(is_written(options.map) && is_written(whole_path(options.map)))) {
-      throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
-    }
-    path_ = options.map.empty() ? folder / kRemappedMap : map_path(options.map, folder);
-    is_inside_ = path_.parent_path() == folder;
-    if (is_inside_ && path_.filename() != kRemappedMap) {
-      throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
-                        kRemappedMap);
-    }
-    if (is_inside_) {
-      file_.emplace(out, kRemappedMap);
-    } else {
-      file_.emplace(path_, existing_by(options.force), inputs);
-    }
+/// Where the map goes. Throws ConfigError.
+fs::path target_of(const RemapOptions& options, const fs::path& folder) {
+  const fs::path inside = folder / kRemappedMap;
+  if (options.map.empty()) return inside;
+  for (const fs::path& name : {fs::path(options.map), whole_path(options.map)}) {
+    if (is_point_file(name) && !is_las(name)) continue;
+    throw ConfigError("--map " + options.map + ": expected a name that ends in .ply or .pcd");
   }
+  fs::path path = map_path(options.map, folder);
+  if (path.parent_path() != folder || path == inside) return path;
+  throw ConfigError("--map " + options.map + ": in the folder of the run, the map is " +
+                    kRemappedMap);
+}
 
-  const fs::path& path() const { return path_; }
-
-  /// Calls `publish_more()` when all bytes are on the disk and only names are left to change.
-  template <class Publish>
-  void write(const StaticMapAccumulator& map, const Json& description, Publish&& publish_more) {
-    write_points(*file_, columns_, {}, [&](const AddPoint& add) {
-      map.for_each([&](const Eigen::Vector3d& point) { add({point}); });
-    });
-    if (!is_inside_) return file_->put_in_place(publish_more);
-    Json report = out_.marker();
-    report.erase(kField);
-    file_->put_in_place([&] {
-      out_.mark_with(report, file_->path());
-      publish_more();
-    });
-    report = out_.marker();
-    report[kField] = description;
-    out_.mark_with(report, path_);
-  }
-
- private:
-  static constexpr const char* kField = "remapped_map";
-
-  ResultFolder& out_;
-  fs::path path_;
-  bool is_inside_ = false;  // the folder of the run
-  std::optional<OutputFile> file_;
-  PointColumns columns_;
-};
+/// Puts the map in place in the folder of the run, whose report describes it. Calls
+/// `publish_more()` when all bytes are on the disk and only names are left to change.
+void add_to_run(ResultFolder& out, OutputFile& map, const Json& description,
+                const std::function<void()>& publish_more) {
+  constexpr const char* kField = "remapped_map";
+  Json report = out.marker();
+  report.erase(kField);
+  map.put_in_place([&] {
+    out.mark_with(report, map.path());
+    publish_more();
+  });
+  report = out.marker();
+  report[kField] = description;
+  out.mark_with(report, map.target());
+}
 
 /// The flags that state how the points of the run are stored.
 Json point_flags(const ResultFolder& out) {
@@ -228,7 +203,10 @@ void remap(RemapOptions& options) {
   const ScanRange range{scans.front(), scans.back()};
   InputFiles inputs(corrected);
   if (original) inputs.add(*original);
-  NewMap file(options, out, corrected, range, inputs);
+  const fs::path folder = whole_path(out.path()), target = target_of(options, folder);
+  const bool is_inside = target.parent_path() == folder;
+  OutputFile file = is_inside ? OutputFile(out, kRemappedMap)
+                              : OutputFile(target, existing_by(options.force), inputs);
 
   const InterruptGuard interrupt;
   const std::string fingerprint = pose_fingerprint(corrected, range);
@@ -241,16 +219,19 @@ void remap(RemapOptions& options) {
   const StaticMapAccumulator map =
       build_map(corrected, original ? *original : corrected, scans, out.path(), config,
                 options.quiet, session ? &*session : nullptr);
-  file.write(map,
-             {{"file", kRemappedMap},
-              {"points", map.size()},
-              {"map_voxel", map.config().map_voxel},
-              {"poses_and_times", fingerprint}},
-             [&] {
-               if (session) session->commit();
-             });
+  write_points(file, map_columns(corrected, range, false), {}, [&](const AddPoint& add) {
+    map.for_each([&](const Eigen::Vector3d& point) { add({point}); });
+  });
+  const auto commit = [&] {
+    if (session) session->commit();
+  };
+  const Json description = {{"file", kRemappedMap},
+                            {"points", map.size()},
+                            {"map_voxel", map.config().map_voxel},
+                            {"poses_and_times", fingerprint}};
+  is_inside ? add_to_run(out, file, description, commit) : file.put_in_place(commit);
   if (options.quiet) return;
-  std::cout << scans.size() << " scans, static map: " << file.path().string() << " (" << map.size()
+  std::cout << scans.size() << " scans, static map: " << target.string() << " (" << map.size()
             << " points)" << std::endl;
 }
 
