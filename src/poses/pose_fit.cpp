@@ -17,21 +17,13 @@ namespace dynains {
 namespace {
 
 /// A scan, as planes and as landmarks.
-class ChainScan {
- public:
+struct ChainScan : RegistrationScan {
   ChainScan(const Recording& recording, std::size_t i)
       : ChainScan(sampled_points(recording.read_scan(i))) {}
-
-  const SurfaceGrid& surfaces() const { return planes_.surfaces(); }
-  const std::vector<Eigen::Vector3d>& points() const { return planes_.points(); }
-  const Landmarks& landmarks() const { return landmarks_; }
-
- private:
   explicit ChainScan(const PointBuffer& points)
-      : planes_(points), landmarks_(points, estimate_mounting(points), kWayRange) {}
+      : RegistrationScan(points), landmarks(points, estimate_mounting(points), kWayRange) {}
 
-  RegistrationScan planes_;
-  Landmarks landmarks_;
+  Landmarks landmarks;
 };
 
 constexpr double kMaxFromGuess = 1.5;  // m
@@ -95,7 +87,7 @@ std::optional<RegisteredMotion> complete(const ChainScan& a, const ChainScan& b,
   double min_gap = 1.0;
   for (const Eigen::Vector3d& direction : by_planes.uncertain) {
     const auto along = [&](const Pose& T, const Eigen::Vector3d& open, double most) {
-      return register_along(a.surfaces(), b.points(), a.landmarks(), b.landmarks(), T, open, most);
+      return register_along(a.surfaces(), b.points(), a.landmarks, b.landmarks, T, open, most);
     };
     auto found = along(given, direction, kMaxFromGuess);
     const bool fits = found && is_exact(found->T_a_b, given);
@@ -107,10 +99,10 @@ std::optional<RegisteredMotion> complete(const ChainScan& a, const ChainScan& b,
         found = again;
       }
     }
-    const double gap = mean_gap(a.landmarks(), b.landmarks(), found->T_a_b);
+    const double gap = mean_gap(a.landmarks, b.landmarks, found->T_a_b);
     Pose standing = by_planes.T_a_b;
     standing.translation() -= direction.dot(standing.translation()) * direction;
-    if (gap < min_gap && gap <= mean_gap(a.landmarks(), b.landmarks(), standing)) {
+    if (gap < min_gap && gap <= mean_gap(a.landmarks, b.landmarks, standing)) {
       best = found;
       min_gap = gap;
       if (fits) break;
@@ -119,7 +111,7 @@ std::optional<RegisteredMotion> complete(const ChainScan& a, const ChainScan& b,
   if (!best) return std::nullopt;
   const Pose& found = best->T_a_b;
   const bool is_distant = (found.translation() - given.translation()).norm() > kDistinct;
-  if (is_distant && mean_gap(a.landmarks(), b.landmarks(), given) < min_gap) return std::nullopt;
+  if (is_distant && mean_gap(a.landmarks, b.landmarks, given) < min_gap) return std::nullopt;
   const Pose T_b_a = best->T_a_b.inverse();
   const Eigen::Vector3d direction = T_b_a.linear() * best->way->direction;
   const KnownTranslation way{direction, direction.dot(T_b_a.translation()), best->way->deviation};
@@ -154,7 +146,7 @@ std::optional<RegisteredMotion> register_both_ways(const ChainScan& a, const Cha
   if (!found && !(is_open && differ_along(forth->uncertain[0], forth->T_a_b, given))) {
     found = checked(forth, register_near(b.surfaces(), a.points(), forth->T_a_b.inverse()), 0.0);
   }
-  const auto gap_under = [&](const Pose& T) { return a.landmarks().compare(b.landmarks(), T).gap; };
+  const auto gap_under = [&](const Pose& T) { return a.landmarks.compare(b.landmarks, T).gap; };
   return found && gap_under(found->T_first_second) < kWorse * gap_under(given) ? found
                                                                                : std::nullopt;
 }

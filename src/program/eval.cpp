@@ -98,13 +98,6 @@ InputFiles inputs_of(const EvalOptions& options, const Recording& recording) {
   return inputs;
 }
 
-void check_are_finished(const EvalOptions& options) {
-  for (const std::string& folder : options.runs) check_run_is_finished(folder);
-  for (const std::filesystem::path map : options.maps) {
-    check_run_is_finished(map.parent_path());
-  }
-}
-
 void eval(const EvalOptions& options) {
   const EvaluationConfig config = options.config();
   if (options.runs.size() > evaluation::kMaxEstimates) {
@@ -112,7 +105,10 @@ void eval(const EvalOptions& options) {
                       " runs can be evaluated at once, not " + std::to_string(options.runs.size()));
   }
 
-  if (!options.unfinished) check_are_finished(options);
+  if (!options.unfinished) {
+    for (const std::string& folder : options.runs) check_run_is_finished(folder);
+    for (const std::filesystem::path map : options.maps) check_run_is_finished(map.parent_path());
+  }
   std::vector<VerdictFiles> runs;
   std::vector<std::string> names;
   for (const std::string& folder : options.runs) {

@@ -82,7 +82,7 @@ RunTiming process(const RunPlan& plan, const RunListener& listener, RunResults& 
   config.threads = remover_threads(plan);
   DynaInsRemover remover(config);
   RunTiming timing;
-  ReadAhead reader(recording, range.first, range.last, results.thread());
+  ReadAhead reader(recording, range.first, range.last, plan.settings.outputs.thread());
   const bool are_kept = remover.latency() <= 8 || recording.format() != ScanFormat::kBin;
   std::deque<RecordedScan> kept;  // oldest first; the last one is the pushed scan
   RecordedScan spare;

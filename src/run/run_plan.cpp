@@ -73,12 +73,6 @@ double own_body_range(const Recording& recording, const ScanRange& range, double
   return std::min(range_of_bodies, otherwise);
 }
 
-/// So that a broken file or pose is noticed before anything is written.
-void check_scans(const Recording& sequence, const ScanRange& range) {
-  count_points(sequence, range);
-  for (std::size_t i = range.first; i <= range.last; ++i) check_pose(sequence, i);
-}
-
 /// Whether `path` lies in a folder of results. Both are by whole_path().
 bool is_in_results(const fs::path& path, const fs::path& out) {
   return std::mismatch(out.begin(), out.end(), path.begin(), path.end()).first == out.end();
@@ -128,20 +122,15 @@ void complete_log_and_grid(RunOutputs& outputs) {
   outputs.grid_image = grid_image(outputs.grid);
 }
 
-/// Throws ConfigError.
-void check_passes(const RunSettings& settings) {
-  if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
-    throw ConfigError(
-        "--static last needs --passes 2: one pass does not know what is there at the end");
-  }
-}
-
 /// Outputs of the run. Throws ConfigError.
 RunOutputs outputs_of(const RunSettings& settings) {
   RunOutputs outputs = settings.outputs;
   complete_map(settings.config, outputs);
   complete_log_and_grid(outputs);
-  check_passes(settings);
+  if (settings.passes == 1 && settings.static_policy != StaticPolicy::kAlways) {
+    throw ConfigError(
+        "--static last needs --passes 2: one pass does not know what is there at the end");
+  }
   outputs.write_tracks = settings.config.objects;
   // The second pass reads the beliefs of the first one.
   if (outputs.write_page || (settings.passes > 1 && outputs.map_attributes)) {
@@ -322,7 +311,9 @@ RunPlan make_plan(const RunSettings& given, Recording sequence) {
   RunOutputs& outputs = settings.outputs;
   outputs = outputs_of(given);
   const ScanRange range = select_scans(sequence, settings.window);
-  check_scans(sequence, range);
+  // A broken file or pose is noticed before anything is written.
+  count_points(sequence, range);
+  for (std::size_t i = range.first; i <= range.last; ++i) check_pose(sequence, i);
   take_sensors(sequence, config);
   if (settings.find_own_body) {
     config.min_range = own_body_range(sequence, range, config.min_range);

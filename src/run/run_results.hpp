@@ -170,7 +170,7 @@ class RunResults {
     second_->test([] { return InterruptGuard::signal() == 0; });
     if (finished_ == 0) return;
     progress(0);
-    ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, writing_.policy());
+    ReadAhead reader(recording_, range_.first, range_.first + finished_ - 1, outputs_.thread());
     JudgedScan next;
     for (std::size_t k = 0; k < finished_; ++k) {
       next.index = range_.first + k;
@@ -193,8 +193,6 @@ class RunResults {
   }
   /// Waits for the results of the last scan. Throws IoError.
   void finish() { writing_.wait(); }
-  /// See RunOutputs::thread().
-  std::launch thread() const { return writing_.policy(); }
 
   void add_map_point(const Eigen::Vector3d& point) {
     map_->add(map_attributes_ ? map_attributes_->at(point) : FilePoint{point});

@@ -23,10 +23,9 @@ using Json = nlohmann::ordered_json;
 
 /// Scans in a row that no correct recording gives.
 struct SuspiciousScans {
-  Suspicion suspicion = Suspicion::kNone;
-  std::size_t first = 0;  // scan of the recording
+  std::size_t first;   // scan of the recording
+  Plausibility worst;  // the first window, with the largest shares of all
   std::size_t count = 0;
-  Plausibility worst;  // of the window with the largest shares
 };
 
 /// A scan that begins an epoch because its surfaces do not fit, and how far its motion lies from
@@ -68,7 +67,7 @@ std::string text_of(const std::vector<PoseJump>& jumps, const Recording& recordi
 std::string text_of(const SuspiciousScans& part, const Recording& recording) {
   const Plausibility& worst = part.worst;
   const std::string since = "suspicious since scan " + recording.name(part.first) + ": ";
-  switch (part.suspicion) {
+  switch (worst.suspicion) {
     case Suspicion::kNone:
       return {};
     case Suspicion::kUnits:
@@ -92,7 +91,7 @@ std::string text_of(const SuspiciousScans& part, const Recording& recording) {
 }
 
 Json json_of(const SuspiciousScans& part, const Recording& recording) {
-  return {{"suspicion", plain_value(part.suspicion)},
+  return {{"suspicion", plain_value(part.worst.suspicion)},
           {"first_scan", recording.name(part.first)},
           {"scans", part.count},
           {"not_judged", part.worst.not_judged},
@@ -113,11 +112,10 @@ Json json_of(const ReturnError& error, const Recording& recording) {
 void add(const Plausibility& window, std::size_t first, std::vector<SuspiciousScans>& parts) {
   if (window.suspicion == Suspicion::kNone) return;
   auto part = std::find_if(parts.begin(), parts.end(), [&](const SuspiciousScans& one) {
-    return one.suspicion == window.suspicion;
+    return one.worst.suspicion == window.suspicion;
   });
   if (part == parts.end()) {
-    parts.push_back({window.suspicion, first + static_cast<std::size_t>(window.since), 0, {}});
-    part = parts.end() - 1;
+    part = parts.insert(part, {first + static_cast<std::size_t>(window.since), window});
   }
   ++part->count;
   part->worst.raise_shares(window);
