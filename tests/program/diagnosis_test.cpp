@@ -341,7 +341,7 @@ TEST_CASE("run takes PCD scans and writes cleaned ones that can be read again") 
     const RecordedScan kept = clean.read_scan(i);
     const std::vector<std::uint32_t> labels = labels_in(folder / "out", std::to_string(i));
     REQUIRE(labels.size() == all.size());
-    const auto moving = std::count_if(labels.begin(), labels.end(), is_moving);
+    const auto moving = std::count_if(labels.begin(), labels.end(), is_removed);
     CHECK(kept.size() + static_cast<std::size_t>(moving) == all.size());
     CHECK(clean.T_world_sensor(i).isApprox(before.T_world_sensor(i), 1e-9));
     REQUIRE_FALSE(kept.ring.empty());

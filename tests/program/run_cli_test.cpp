@@ -78,7 +78,7 @@ TEST_CASE("run writes labels, causes, map, moving points, report and timing, and
     for (const std::uint32_t label : labels) {
       const std::uint32_t id = label & 0xFFFF;
       CHECK((id == 251 || id == 9 || id == 0));
-      if (is_moving(label)) ++moving;
+      if (is_removed(label)) ++moving;
     }
   }
   const nlohmann::json report = fixture.report();
@@ -512,7 +512,7 @@ TEST_CASE("run writes cleaned scans of KITTI") {
     const std::vector<std::uint32_t> labels = labels_in(fixture.out, scan_name(i));
     REQUIRE(labels.size() == all.size() / 4);
     for (std::size_t k = 0; k < labels.size(); ++k) {
-      if (is_moving(labels[k])) {
+      if (is_removed(labels[k])) {
         ++removed;
       } else {
         expected.insert(expected.end(), all.data() + 4 * k, all.data() + 4 * k + 4);

@@ -19,7 +19,8 @@ inline std::vector<std::uint32_t> labels_in(const std::filesystem::path& out,
   return read_labels(file, std::filesystem::file_size(file) / sizeof(std::uint32_t));
 }
 
-inline bool is_moving(std::uint32_t label) { return (label & 0xFFFFU) == 251; }
+/// By the label of a verdict.
+inline bool is_removed(std::uint32_t label) { return (label & 0xFFFFU) == 251; }
 
 /// Places for a recording and for results, which do not exist yet. Their names contain a blank.
 struct RunFolder {

@@ -50,7 +50,7 @@ TEST_CASE(
                after = labels_in(recording.path("two"), scan);
     REQUIRE(before.size() == after.size());
     for (std::size_t i = 0; i < after.size(); ++i) {
-      const bool did_move = is_moving(before[i]), moves = is_moving(after[i]);
+      const bool did_move = is_removed(before[i]), moves = is_removed(after[i]);
       removed += moves && !did_move ? 1 : 0;
       kept_again += did_move && !moves ? 1 : 0;
       moving += moves ? 1 : 0;

@@ -62,7 +62,7 @@ std::vector<Message> cleaned(const fs::path& log, const fs::path& out, std::size
     if (i < first) continue;
     std::vector<bool> keep;
     for (const std::uint32_t label : labels_in(out, scan_name(i)))
-      keep.push_back(!is_moving(label));
+      keep.push_back(!is_removed(label));
     CHECK(keep.size() == tiny_scan(i).size() / 4);
     message.second = cloud_of(i, points_of_scan(i, keep));
   }
@@ -170,9 +170,9 @@ TEST_CASE("A rig with a topic for each sensor is run as its merged clouds, and c
     REQUIRE(expected.size() == scan.size());
     std::vector<float> kept;
     for (std::size_t k = 0; k < scan.size(); ++k) {
-      const bool moves = is_moving(labels[k]);
+      const bool moves = is_removed(labels[k]);
       moving += moves ? 1 : 0;
-      same += moves == is_moving(expected[k]) ? 1 : 0;
+      same += moves == is_removed(expected[k]) ? 1 : 0;
       if (!moves) kept.insert(kept.end(), {scan.xyzi[4 * k], scan.xyzi[4 * k + 1]});
     }
     points += scan.size();
