@@ -36,11 +36,12 @@ struct SparseScan {
 
 constexpr float kBelief = 0.625F;
 
-FreeSpaceConfig three_quarters() {
+FreeSpaceConfig with_ratio(double ratio) {
   FreeSpaceConfig config;
-  config.dynamic_grid_ratio = 0.75;
+  config.dynamic_grid_ratio = ratio;
   return config;
 }
+FreeSpaceConfig three_quarters() { return with_ratio(0.75); }
 
 // The cause of a static point in a place where `moved` and `stayed` points were seen before.
 Verdict verdict_behind(int moved, int stayed, FreeSpaceConfig config = three_quarters(),
@@ -73,9 +74,7 @@ TEST_CASE("a cell is cleared if no scan of the lookback interval has a sample in
 
 TEST_CASE("presumed instances are not counted, and a ratio of 1 turns the grid off") {
   CHECK(verdict_behind(8, 0, three_quarters(), 1, Cause::kPresumed).cause == Cause::kOccupied);
-  FreeSpaceConfig never;
-  never.dynamic_grid_ratio = 1.0;
-  CHECK(verdict_behind(100, 0, never).cause == Cause::kOccupied);
+  CHECK(verdict_behind(100, 0, with_ratio(1.0)).cause == Cause::kOccupied);
 }
 
 TEST_CASE("a part of a large instance needs a lower ratio for a final verdict") {
@@ -119,9 +118,7 @@ TEST_CASE("a later verdict on a scan replaces the earlier one in the count") {
 }
 
 TEST_CASE("cells lie in the world frame: their counts do not depend on the pose of the sensor") {
-  FreeSpaceConfig config;
-  config.dynamic_grid_ratio = 0.5;
-  DynamicOccupancyGrid grid(config);
+  DynamicOccupancyGrid grid(with_ratio(0.5));
   const Eigen::Vector3f place(20.3F, -7.7F, 0.3F);  // the middle of a cell
   for (std::uint64_t scan = 0; scan < 10; ++scan) {
     const auto i = static_cast<double>(scan);
@@ -137,9 +134,7 @@ TEST_CASE("cells lie in the world frame: their counts do not depend on the pose 
 
 TEST_CASE("the grid equals a slow reference count") {
   Random random(11);
-  FreeSpaceConfig config;
-  config.dynamic_grid_ratio = 0.6;
-  DynamicOccupancyGrid grid(config);
+  DynamicOccupancyGrid grid(with_ratio(0.6));
   struct Counts {
     int moved = 0, stayed = 0;
   };
@@ -185,10 +180,7 @@ TEST_CASE("the grid equals a slow reference count") {
 }
 
 TEST_CASE("one sample in a dynamic cell is enough for its supervoxel") {
-  FreeSpaceConfig config;
-  config.dynamic_grid_ratio = 0.5;
-  DynamicOccupancyGrid grid(config);
-  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  DynamicOccupancyGrid grid(with_ratio(0.5));
   const std::vector<Eigen::Vector3f> passed(1, {0.15F, 0.15F, 0.15F});
   std::uint64_t scan = 0;
   for (; scan < 20; ++scan) {
@@ -209,7 +201,7 @@ TEST_CASE("one sample in a dynamic cell is enough for its supervoxel") {
     REQUIRE(samples.size() == points.size());
     std::vector<Count> counted(1, Count::kNone);
     std::vector<Verdict> verdicts(1, {Cause::kOccupied, 0.5F});
-    grid.judge(scan++, samples, T, counted, verdicts);
+    grid.judge(scan++, samples, Pose::Identity(), counted, verdicts);
     CHECK((verdicts[0].cause == Cause::kDynamicOccupancy) == is_inside);
   }
 }

@@ -8,7 +8,8 @@
 #include "dynains/evidence/reference_scans.hpp"
 #include "dynains/sensor/sensor_model.hpp"
 #include "support/catch.hpp"
-#include "support/random.hpp"
+#include "support/points.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {
@@ -112,27 +113,15 @@ std::vector<std::size_t> find_under(const GroundFootprint& footprint, const Poin
   return found;
 }
 
-void add(GroundFootprint& footprint, float x, float y, float z) {
-  PointBuffer point;
-  point.push_back(x, y, z);
-  footprint.add(point, 1);
-}
-
 TEST_CASE("a footprint gives the points that a search over all removed points gives") {
   Random random(11);
   GroundFootprint footprint(0.25, 40.0);
   // Scattered points, and small places with many points, in which whole blocks are skipped.
   PointBuffer ground;
-  for (int i = 0; i < 1001; ++i) {
-    ground.push_back(random.uniform_float(-39, 39), random.uniform_float(-39, 39),
-                     random.uniform_float(-1, 2));
-  }
+  for (int i = 0; i < 1001; ++i) add_point(ground, random.vector({-39, -39, -1}, {39, 39, 2}));
   for (int place = 0; place < 20; ++place) {
-    const float x = random.uniform_float(-39, 38), y = random.uniform_float(-39, 38);
-    for (int i = 0; i < 200; ++i) {
-      ground.push_back(x + random.uniform_float(0, 1), y + random.uniform_float(0, 1),
-                       random.uniform_float(-1, 2));
-    }
+    const Eigen::Vector3d corner = random.vector({-39, -39, 0}, {38, 38, 0});
+    for (int i = 0; i < 200; ++i) add_point(ground, corner + random.vector({0, 0, -1}, {1, 1, 2}));
   }
   // Two rounds, because the second must not depend on the first.
   for (int round = 0; round < 2; ++round) {
@@ -143,7 +132,7 @@ TEST_CASE("a footprint gives the points that a search over all removed points gi
       const float x = random.uniform_float(-39, 39), y = random.uniform_float(-39, 39);
       const float z = random.uniform_float(0, 2);
       const std::size_t way = block.size() < 64 ? random.index(3) : 0;
-      if (way == 0) add(footprint, x, y, z);
+      if (way == 0) footprint.add(buffer_of(std::vector<float>{x, y, z, 0.0F}), 1);
       if (way == 1) which |= std::uint64_t{1} << block.size();
       if (way <= 1) removed.push_back(x, y, z);
       if (way >= 1) block.push_back(x, y, z);
@@ -197,27 +186,24 @@ TEST_CASE("an instance is linked to the earlier instance with which it shares mo
   InstanceLinker linker(1.0, 18.0, 4.5, 0.25);
   const CellsOf whole = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}};
   const CellsOf parts = {{0, 1, 2}, {3, 4, 5, 6, 7, 8}, {9, 10, 11}, {40, 41}};
-  TrackedInstances before = next_scan(linker, whole), now = next_scan(linker, parts);
-  linker.link(before, now);
+  TrackedInstances before, now;
+  const auto link = [&](const CellsOf& cells_before, const CellsOf& cells_now) {
+    before = next_scan(linker, cells_before);
+    now = next_scan(linker, cells_now);
+    linker.link(before, now);
+    return now.instances[0].past.instance;
+  };
+  CHECK(link(whole, parts) == 0);
   CHECK(before.instances[0].future.instance == 1);
-  for (const std::size_t i : {0U, 1U, 2U}) CHECK(now.instances[i].past.instance == 0);
+  for (const std::size_t i : {1U, 2U}) CHECK(now.instances[i].past.instance == 0);
   CHECK(now.instances[3].past.instance == kNoCluster);
 
-  before = next_scan(linker, parts);
-  now = next_scan(linker, whole);
-  linker.link(before, now);
-  CHECK(now.instances[0].past.instance == 1);
+  CHECK(link(parts, whole) == 1);
   for (const std::size_t i : {0U, 1U, 2U}) CHECK(before.instances[i].future.instance == 0);
 
   // Two of eleven cells are less than a quarter. Earlier scans have no influence.
-  before = next_scan(linker, {{0, 1}});
-  now = next_scan(linker, {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}});
-  linker.link(before, now);
-  CHECK(now.instances[0].past.instance == kNoCluster);
-  before = next_scan(linker, {});
-  now = next_scan(linker, whole);
-  linker.link(before, now);
-  CHECK(now.instances[0].past.instance == kNoCluster);
+  CHECK(link({{0, 1}}, {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}}) == kNoCluster);
+  CHECK(link({}, whole) == kNoCluster);
 }
 
 TEST_CASE("instances without a common cell are not linked, however many cells they have") {
@@ -310,10 +296,7 @@ TEST_CASE("gaps in bands of an angle are those of the sorted angles of a quarter
 
 // Adds a point 20 m away; deg.
 void add_beam(double azimuth, double elevation, PointBuffer& points) {
-  const double around = azimuth * M_PI / 180.0, up = elevation * M_PI / 180.0;
-  points.push_back(static_cast<float>(20.0 * std::cos(up) * std::cos(around)),
-                   static_cast<float>(20.0 * std::cos(up) * std::sin(around)),
-                   static_cast<float>(20.0 * std::sin(up)));
+  add_point(points, 20.0 * ray_of(elevation * M_PI / 180.0, azimuth * M_PI / 180.0));
 }
 
 TEST_CASE("the beam spacing of a sensor is measured from one scan") {

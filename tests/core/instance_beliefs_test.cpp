@@ -351,34 +351,40 @@ GroundSplit wall(float range) {
   return split;
 }
 
-// Points straight ahead at these ranges (m), padded for packs.
-PointBuffer points_ahead(const std::vector<float>& ranges) {
-  PointBuffer points;
-  for (const float range : ranges) points.push_back(range, 0.0F, 0.0F);
-  points.grow(ranges.size() + detail::kPackWidth);
-  return points;
-}
-
-// Each reference takes six scans.
-ReferenceScans references_of_sparse_sensor() {
+// A sensor of which each reference takes six scans if the gap (deg) is 3.
+SensorModel sparse_sensor(double gap = 3.0) {
   SensorModel sensor = SensorModel::typical();
   sensor.azimuth_step = 1.0;
-  sensor.elevation_gap = sensor.elevation_gap_wide = 3.0;
+  sensor.elevation_gap = gap;
+  sensor.elevation_gap_wide = 3.0;
+  return sensor;
+}
+
+ReferenceScans references_of_sparse_sensor() {
+  const SensorModel sensor = sparse_sensor();
   ReferenceScans references{FreeSpaceConfig()};
   references.adapt({&sensor, 1});
   return references;
 }
 
+// What the newest reference tells of points straight ahead of a scan at these ranges (m).
+Visibility::Bits seen_ahead(ReferenceScans& views, std::uint64_t scan,
+                            const std::vector<float>& ranges) {
+  PointBuffer points;
+  for (const float range : ranges) points.push_back(range, 0.0F, 0.0F);
+  points.grow(ranges.size() + kPackWidth);  // padded for packs
+  Visibility memory;
+  return views.test(points, ranges.size(), scan, Pose::Identity(), views.newest(), memory)
+      .bits(0, ranges.size());
+}
+
 TEST_CASE("a scan is not tested against its own beams in a reference of several scans") {
   ReferenceScans views = references_of_sparse_sensor();
   views.add(0, 0, 0, Eigen::Isometry3d::Identity(), wall(10.0F), {});
-  const PointBuffer points = points_ahead({5.0F, 10.0F});
-  Visibility memory;
   for (const std::uint64_t scan : {0U, 1U, 2U}) {
-    const Visibility& visibility =
-        views.test(points, 2, scan, Eigen::Isometry3d::Identity(), views.newest(), memory);
-    CHECK(visibility.bits(0, 2).free == (scan < 2 ? 0U : 1U));
-    CHECK(visibility.bits(0, 2).hit == (scan < 2 ? 0U : 2U));
+    const auto seen = seen_ahead(views, scan, {5.0F, 10.0F});
+    CHECK(seen.free == (scan < 2 ? 0U : 1U));
+    CHECK(seen.hit == (scan < 2 ? 0U : 2U));
   }
 }
 
@@ -403,12 +409,9 @@ TEST_CASE("scans of a reference share an image while the sensor stays near") {
   CHECK(view.T_world_beams(0, 3) == Approx(1.06));  // of scan 10
   CHECK(view.image.grid().columns > 450);
   // The walls of all scans lie at x = 10 m.
-  const PointBuffer points = points_ahead({6.0F, 10.0F});
-  Visibility memory;
-  const Visibility& visibility =
-      views.test(points, 2, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);
-  CHECK(visibility.bits(0, 2).free == 1U);
-  CHECK(visibility.bits(0, 2).hit == 2U);
+  const auto seen = seen_ahead(views, 1000, {6.0F, 10.0F});
+  CHECK(seen.free == 1U);
+  CHECK(seen.hit == 2U);
 }
 
 TEST_CASE("a reference is found as long as scans need it, and every scan finds its references") {
@@ -424,10 +427,7 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     config.lookahead_scans = lookahead;
     ReferenceScans views(config);
     const ReferenceSpan& span = views.span();
-    SensorModel sensor = SensorModel::typical();
-    sensor.azimuth_step = 1.0;
-    sensor.elevation_gap = scans > 1 ? 3.0 : 0.5;
-    sensor.elevation_gap_wide = 3.0;
+    const SensorModel sensor = sparse_sensor(scans > 1 ? 3.0 : 0.5);
     REQUIRE(scans_to_see_things(sensor, 10) == scans);
     views.adapt({&sensor, 1});
     REQUIRE(span.step == step);
@@ -464,12 +464,9 @@ TEST_CASE("a reference is found as long as scans need it, and every scan finds i
     }
     // A beam of the last reference passes points nearer than its walls, and hits the nearest one.
     const auto nearest = 5.0F + 0.1F * static_cast<float>(views.newest().views.front().first);
-    const PointBuffer points = points_ahead({nearest - 2.0F, nearest, nearest + 2.0F});
-    detail::Visibility memory;
-    const detail::Visibility& visibility =
-        views.test(points, 3, 1000, Eigen::Isometry3d::Identity(), views.newest(), memory);
-    CHECK(visibility.bits(0, 3).free == 1);
-    CHECK(visibility.bits(0, 3).hit == 2);
+    const auto seen = seen_ahead(views, 1000, {nearest - 2.0F, nearest, nearest + 2.0F});
+    CHECK(seen.free == 1);
+    CHECK(seen.hit == 2);
     const std::uint64_t newest_scan = views.newest().scan;
     REQUIRE(views.find(newest_scan, 1) != nullptr);
     views.forget();

@@ -5,6 +5,7 @@
 
 #include "dynains/evidence/ground_samples.hpp"
 #include "support/catch.hpp"
+#include "support/points.hpp"
 #include "support/random.hpp"
 #include "support/visibility.hpp"
 
@@ -67,20 +68,16 @@ TEST_CASE("heights equal those of a fit by total least squares") {
       Eigen::Vector3d p =
           random.vector({x - reach, y - reach, -0.02}, {x + reach, y + reach, 0.02});
       p.z() += 0.08 * p.x() + (random.index(5) == 0 ? 0.2 : 0.0);
-      points.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
-                       static_cast<float>(p.z()));
-      all.emplace_back(static_cast<double>(points.x[i]), static_cast<double>(points.y[i]),
-                       static_cast<double>(points.z[i]));
+      add_point(points, p);
+      all.push_back(p.cast<float>().cast<double>());
     }
     ground.assign(points);
     for (int query = 0; query < 20; ++query) {
       const Eigen::Vector3d at =
           random.vector({x - reach, y - reach, -3.0}, {x + reach, y + reach, 3.0});
-      const auto qx = static_cast<float>(at.x()), qy = static_cast<float>(at.y()),
-                 qz = static_cast<float>(at.z());
-      const float expected = reference_height(
-          all, {static_cast<double>(qx), static_cast<double>(qy), static_cast<double>(qz)});
-      const float height = ground.height(qx, qy, qz);
+      const Eigen::Vector3f q = at.cast<float>();
+      const float expected = reference_height(all, q.cast<double>());
+      const float height = ground.height(q.x(), q.y(), q.z());
       (expected == kUnknown ? unknown : known) += 1;
       if (expected == kUnknown) {
         CHECK(height == kUnknown);

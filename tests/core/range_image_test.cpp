@@ -3,7 +3,8 @@
 
 #include "dynains/evidence/visibility.hpp"
 #include "support/catch.hpp"
-#include "support/random.hpp"
+#include "support/points.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {
@@ -213,11 +214,9 @@ TEST_CASE("an image equals its definition: near objects protect more cells aroun
       const double azimuth = random.uniform(-M_PI, M_PI);
       const double elevation = random.uniform(-14.0, 8.0) / kDegrees;
       const double range = object ? random.uniform(0.5, 40.0) : random.uniform(3.0, 300.0);
-      const auto x = static_cast<float>(range * std::cos(elevation) * std::cos(azimuth));
-      const auto y = static_cast<float>(range * std::cos(elevation) * std::sin(azimuth));
-      const auto z = static_cast<float>(range * std::sin(elevation));
-      points[object ? 1 : 0].push_back(x, y, z);
-      points[2].push_back(x, y, z);
+      const Eigen::Vector3d point = range * ray_of(elevation, azimuth);
+      add_point(points[object ? 1 : 0], point);
+      add_point(points[2], point);
       moving.push_back(object && random.index(4) == 0 ? 1 : 0);
       if (object) moving_objects.push_back(moving.back());
     }
@@ -254,9 +253,7 @@ PointBuffer coarse_wall(const RangeImageGrid& grid, double range) {
       const double azimuth = (column + 0.5) / static_cast<double>(grid.columns_per_radian);
       const double elevation =
           static_cast<double>(grid.lowest) + (row + 0.5) / static_cast<double>(grid.rows_per_level);
-      wall.push_back(static_cast<float>(range * std::cos(elevation) * std::cos(azimuth)),
-                     static_cast<float>(range * std::cos(elevation) * std::sin(azimuth)),
-                     static_cast<float>(range * std::sin(elevation)));
+      add_point(wall, range * ray_of(elevation, azimuth));
     }
   }
   return wall;
@@ -273,30 +270,25 @@ TEST_CASE("a sample is free only if a beam passes within 5 cm and 4 mm per metre
   PointBuffer samples;
   const double distances[] = {0.0, 0.10, 0.15, 0.18, 0.19, -0.15, -0.19};  // m, 30 m away: 17 cm
   for (const double distance : distances) {
-    const double angle = azimuth + distance / 30.0;
-    samples.push_back(static_cast<float>(30.0 * std::cos(angle)),
-                      static_cast<float>(30.0 * std::sin(angle)), 0.0F);
+    add_point(samples, 30.0 * ray_of(0.0, azimuth + distance / 30.0));
   }
   const std::size_t count = samples.size();
   samples.resize(count + detail::kPackWidth);
   detail::Visibility visibility;
-  detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
-                          visibility);
-  for (std::size_t i = 0; i < count; ++i) {
-    INFO("sample " << i);
-    CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17));
-    CHECK(visibility.bits(i, i + 1).hit == 0);
-  }
-  // Measured from a place aside: a beam on the side of that place crosses what is free anyway.
-  for (const double side : {1.0, -1.0}) {
-    const Eigen::Vector3d viewpoint(30.0 * (std::cos(azimuth) - side * std::sin(azimuth)),
-                                    30.0 * (std::sin(azimuth) + side * std::cos(azimuth)), 0.0);
+  // Measured from here or from a place aside: a beam on the side of that place crosses what is free
+  // anyway.
+  for (const double side : {0.0, 1.0, -1.0}) {
+    const Eigen::Vector3d viewpoint =
+        side == 0.0 ? Eigen::Vector3d(Eigen::Vector3d::Zero())
+                    : Eigen::Vector3d(30.0 * ray_of(0.0, azimuth) +
+                                      30.0 * side * ray_of(0.0, azimuth + 0.5 * M_PI));
     detail::test_visibility(image, Eigen::Isometry3d::Identity(), samples, count, 0.25F, 0.01F,
                             visibility, viewpoint.cast<float>());
     for (std::size_t i = 0; i < count; ++i) {
       INFO("sample " << i << " side " << side);
       const bool is_before = -side * distances[i] > 0.25 * 0.17;
       CHECK((visibility.bits(i, i + 1).free == 1) == (std::abs(distances[i]) < 0.17 && !is_before));
+      CHECK(visibility.bits(i, i + 1).hit == 0);
     }
   }
   // Samples of objects so thin that a beam must pass within 0.12 m.
@@ -329,7 +321,7 @@ TEST_CASE("the beam of a cell is the direction of its nearest return") {
     const auto column = static_cast<double>(100 + random.index(200));
     const auto row = static_cast<double>(20 + random.index(20));
     PointBuffer points;
-    double places[2][2], nearest = 0.0;
+    double places[2][2];
     for (auto& place : places) {
       place[0] = random.uniform(0.02, 0.98);
       place[1] = random.uniform(0.02, 0.98);
@@ -343,12 +335,7 @@ TEST_CASE("the beam of a cell is the direction of its nearest return") {
         (RangeImageGrid::level(static_cast<float>(sine)) < static_cast<float>(level) ? low : high) =
             sine;
       }
-      const double range = nearest == 0.0 ? 20.0 : 10.0;
-      nearest = range;
-      const double across = range * std::sqrt(1.0 - sine * sine);
-      points.push_back(static_cast<float>(across * std::cos(azimuth)),
-                       static_cast<float>(across * std::sin(azimuth)),
-                       static_cast<float>(range * sine));
+      add_point(points, (points.size() == 0 ? 20.0 : 10.0) * ray_of(std::asin(sine), azimuth));
     }
     build_objects(image, grid, points, scratch);
     const std::size_t cell =
@@ -379,8 +366,7 @@ TEST_CASE("bits of visibility are counted over any range") {
   for (int round = 0; round < 2000; ++round) {
     const std::size_t begin = random.index(kCount);
     const std::size_t end = begin + random.index(std::min<std::size_t>(kCount - begin, 130) + 1);
-    std::uint64_t free = 0;
-    std::uint64_t hit = 0;
+    std::uint64_t free = 0, hit = 0;
     for (std::size_t i = begin; i < end; ++i) {
       free += visibility.bits(i, i + 1).free;
       hit += visibility.bits(i, i + 1).hit;
@@ -399,8 +385,8 @@ TEST_CASE(
   for (double azimuth = -20.0; azimuth <= 20.0; azimuth += 0.2) {
     for (double elevation = -10.0; elevation <= 3.0; elevation += 0.2) {
       const double y = 20.0 * std::tan(azimuth / kDegrees);
-      wall.push_back(20.0F, static_cast<float>(y),
-                     static_cast<float>(std::hypot(20.0, y) * std::tan(elevation / kDegrees)));
+      const double z = std::hypot(20.0, y) * std::tan(elevation / kDegrees);
+      add_point(wall, Eigen::Vector3d(20.0, y, z));
     }
   }
   RangeImage image;
