@@ -209,7 +209,6 @@ class StaticMapAccumulator {
     alignas(64) std::int32_t voxel[kBatch];     // index in the block
     alignas(64) std::int32_t recent[kBatch];    // place of the block in recent_
     std::uint32_t run_end[kBatch];              // by run of points in one block
-    std::uint64_t run_voxels[kBatch];           // a bit for each voxel of the run
     std::size_t count;
 
     BlockIndex block_of(std::size_t i) const { return {block[0][i], block[1][i], block[2][i]}; }
@@ -283,16 +282,12 @@ class StaticMapAccumulator {
       // Local copies: the compiler must assume that a store changes members.
       const auto* const known = recent_.data();
       const std::int32_t* const recent = batch.recent;
-      const std::int32_t* const voxel = batch.voxel;
-      std::size_t run = 0;
+      std::uint32_t* next = batch.run_end;
       detail::for_each_run<decltype(packs)>(
           count,
           [&](std::size_t begin, std::size_t end) {
             __builtin_prefetch(known[recent[begin]]);
-            std::uint64_t voxels = 0;
-            for (std::size_t i = begin; i < end; ++i) voxels |= std::uint64_t{1} << voxel[i];
-            batch.run_voxels[run] = voxels;
-            batch.run_end[run++] = static_cast<std::uint32_t>(end);
+            *next++ = static_cast<std::uint32_t>(end);
           },
           batch.block[0], batch.block[1], batch.block[2]);
       batch.count = count;
@@ -304,18 +299,22 @@ class StaticMapAccumulator {
     detail::MapBlock** const recent = recent_.data();
     const bool keep_all = keep_all_;
     std::size_t begin = 0;
-    for (std::size_t run = 0; begin < batch.count; ++run) {
+    for (const std::uint32_t* end = batch.run_end; begin < batch.count; ++end) {
       const std::size_t first = begin;
-      begin = batch.run_end[run];
+      begin = *end;
       detail::MapBlock*& block = recent[batch.recent[first]];
       if (block == nullptr || !batch.is_in(block->index, first)) {
         if (batch.block[0][first] == kDropped) continue;
         block = &blocks_.find_or_add(batch.block_of(first));
       }
-      if (!keep_all && (batch.run_voxels[run] & ~block->occupied) == 0) continue;
-      for (std::size_t i = first; i < begin; ++i) {
-        if (keep_all || (block->occupied >> batch.voxel[i] & 1U) == 0) add(batch, i, *block);
-      }
+      const std::int32_t* voxel = batch.voxel + first;
+      const std::int32_t* const last = batch.voxel + begin;
+      std::uint64_t wanted = keep_all ? ~std::uint64_t{0} : ~block->occupied;
+      do {
+        if ((wanted >> *voxel & 1U) == 0) continue;
+        add(batch, static_cast<std::size_t>(voxel - batch.voxel), *block);
+        if (!keep_all) wanted = ~block->occupied;
+      } while (++voxel != last);
     }
   }
 
