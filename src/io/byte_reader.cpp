@@ -41,6 +41,10 @@ bool is_folder(const fs::path& path) { return fs::is_directory(status_of(path));
 
 bool is_file(const fs::path& path) { return fs::is_regular_file(status_of(path)); }
 
+std::string lower_extension(const fs::path& path) {
+  return text::lower_case(path.extension().string());
+}
+
 std::uint64_t size_of_file(const fs::path& path) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(path, error);
@@ -117,13 +121,7 @@ void ByteReader::skip(std::uint64_t count, const char* purpose) {
     position_ = size_;
     fail_here(std::string("file ends, expected ") + purpose);
   }
-  // Fewer bytes are in the buffer of the stream, mostly.
-  if (count > 4096) {
-    file_.seekg(static_cast<std::streamoff>(count), std::ios::cur);
-    if (!file_) fail_to_read(file_, path_, position_, size_);
-  } else {
-    file_.ignore(static_cast<std::streamsize>(count));
-  }
+  file_.ignore(static_cast<std::streamsize>(count));
   position_ += count;
 }
 

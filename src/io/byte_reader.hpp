@@ -22,6 +22,9 @@ bool is_there(const std::filesystem::path& path);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 
+/// The extension in lower case, such as ".pcd".
+std::string lower_extension(const std::filesystem::path& path);
+
 /// Bytes of a file. Throws IoError.
 std::uint64_t size_of_file(const std::filesystem::path& path);
 

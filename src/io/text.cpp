@@ -7,11 +7,6 @@
 #include <sstream>
 
 namespace dynains::text {
-namespace {
-
-constexpr std::string_view kBlanks = " \t\r\n\v\f";
-
-}  // namespace
 
 std::string lower_case(std::string text) {
   for (char& c : text) {
@@ -85,9 +80,9 @@ std::optional<double> parse_number(std::string_view token) {
   return value;
 }
 
-std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+std::string_view trimmed(std::string_view text, std::string_view characters) {
+  text.remove_prefix(std::min(text.find_first_not_of(characters), text.size()));
+  return text.substr(0, text.find_last_not_of(characters) + 1);
 }
 
 std::vector<std::string_view> tokens(std::string_view line) {

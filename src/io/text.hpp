@@ -20,8 +20,10 @@ std::string_view next_token(std::string_view& line);
 /// All tokens of a line.
 std::vector<std::string_view> tokens(std::string_view line);
 
-/// Without blanks at its ends.
-std::string_view trimmed(std::string_view text);
+inline constexpr std::string_view kBlanks = " \t\r\n\v\f";
+
+/// Without these characters at its ends.
+std::string_view trimmed(std::string_view text, std::string_view characters = kBlanks);
 
 /// The text with its ASCII letters in lower case.
 std::string lower_case(std::string text);

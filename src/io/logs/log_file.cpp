@@ -13,22 +13,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string extension_of(const fs::path& path) {
-  return text::lower_case(path.extension().string());
-}
-
 /// Whether the file is compressed as a whole, by its name.
 bool is_compressed_log(const fs::path& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_extension(path);
   return extension == ".zstd" || extension == ".zst";
 }
 
 /// Extension of a log by its name: ".mcap", ".bag" (also for NAME.bag.active) or ".db3"; also if
 /// the file is compressed as a whole, as NAME.mcap.zstd. Else empty.
 std::string log_extension(const fs::path& path) {
-  std::string extension = extension_of(path);
-  if (is_compressed_log(path)) extension = extension_of(path.stem());
-  if (extension == ".active") extension = extension_of(path.stem()) == ".bag" ? ".bag" : "";
+  std::string extension = lower_extension(path);
+  if (is_compressed_log(path)) extension = lower_extension(path.stem());
+  if (extension == ".active") extension = lower_extension(path.stem()) == ".bag" ? ".bag" : "";
   const bool is_log = extension == ".mcap" || extension == ".bag" || extension == ".db3";
   return is_log ? extension : std::string();
 }
@@ -36,19 +32,14 @@ std::string log_extension(const fs::path& path) {
 /// Files with a name of a log directly in a folder, by name. A compressed file beside its
 /// decompressed form is left out.
 std::vector<fs::path> logs_in_folder(const fs::path& folder) {
-  std::vector<fs::path> logs;
+  std::set<fs::path> all;
   for (const fs::path& path : paths_in(folder)) {
-    if (!log_extension(path).empty()) logs.push_back(path);
+    if (!log_extension(path).empty()) all.insert(path);
   }
-  std::sort(logs.begin(), logs.end());
-  const std::vector<fs::path> all = logs;
-  logs.erase(std::remove_if(logs.begin(), logs.end(),
-                            [&](const fs::path& log) {
-                              return is_compressed_log(log) &&
-                                     std::binary_search(all.begin(), all.end(),
-                                                        folder / log.stem());
-                            }),
-             logs.end());
+  std::vector<fs::path> logs;
+  for (const fs::path& log : all) {
+    if (!is_compressed_log(log) || all.count(folder / log.stem()) == 0) logs.push_back(log);
+  }
   return logs;
 }
 
@@ -64,17 +55,6 @@ std::string plain_name(const fs::path& path) {
   return (is_compressed_log(path) ? path.stem() : path.filename()).string();
 }
 
-std::string without_quotes(std::string_view token) {
-  constexpr std::string_view kMarks = "\"'[],";
-  while (!token.empty() && kMarks.find(token.front()) != std::string_view::npos) {
-    token.remove_prefix(1);
-  }
-  while (!token.empty() && kMarks.find(token.back()) != std::string_view::npos) {
-    token.remove_suffix(1);
-  }
-  return std::string(token);
-}
-
 /// Names below `relative_file_paths` of a metadata.yaml of rosbag2, without folders.
 std::vector<std::string> listed_files(const fs::path& metadata) {
   ByteReader reader(metadata);
@@ -88,7 +68,7 @@ std::vector<std::string> listed_files(const fs::path& metadata) {
     if (!is_begin && !is_inside) continue;
     is_inside = true;
     for (const std::string_view token : text::tokens(rest)) {
-      const std::string name = without_quotes(token);
+      const std::string_view name = text::trimmed(token, "\"'[],");
       if (!name.empty()) names.push_back(plain_name(fs::path(name).filename()));
     }
   }

@@ -20,10 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string extension_in_lower_case(const fs::path& path) {
-  return text::lower_case(path.extension().string());
-}
-
 const fs::path& checked(const fs::path& path) {
   if (!is_point_file(path)) fail(path, "expected a name that ends in .ply, .pcd or .las");
   return path;
@@ -39,7 +35,7 @@ constexpr PointFileFormat kPointFileFormats[] = {{".ply", read_ply}, {".pcd", re
                                                  {".xyz", read_xyz}, {".csv", read_xyz}};
 
 const PointFileFormat& format_to_read(const fs::path& path) {
-  const std::string extension = extension_in_lower_case(path);
+  const std::string extension = lower_extension(path);
   for (const PointFileFormat& format : kPointFileFormats) {
     if (format.extension == extension) return format;
   }
@@ -127,7 +123,7 @@ PointFileWriter::PointFileWriter(const fs::path& path, const PointColumns& colum
 /// Has the same length for every number of points: a comment is padded.
 std::string PointFileWriter::header() const {
   if (is_las_) return las_header(path_, las_, size_, least_, most_);
-  const auto text = extension_in_lower_case(path_) == ".pcd" ? pcd_header : ply_header;
+  const auto text = lower_extension(path_) == ".pcd" ? pcd_header : ply_header;
   const std::size_t most = std::numeric_limits<std::size_t>::max();
   const std::size_t length = text(most, columns_, "", viewpoint_).size();
   const std::size_t needed = text(size_, columns_, "", viewpoint_).size();
@@ -156,10 +152,10 @@ void PointFileWriter::commit(AtomicFile::Sync sync) {
   file_.commit(sync);
 }
 
-bool is_las(const fs::path& path) { return extension_in_lower_case(path) == ".las"; }
+bool is_las(const fs::path& path) { return lower_extension(path) == ".las"; }
 
 bool is_point_file(const fs::path& path) {
-  const std::string extension = extension_in_lower_case(path);
+  const std::string extension = lower_extension(path);
   return extension == ".ply" || extension == ".pcd" || extension == ".las";
 }
 
@@ -184,7 +180,7 @@ std::optional<std::string> conversion_of(const fs::path& path) {
       {"points_compact.bin",
        "a dump of GLIM holds submaps, not scans; pass the log that GLIM read, with --poses "
        "traj_lidar.txt of the dump"}};
-  const std::string extension = extension_in_lower_case(path);
+  const std::string extension = lower_extension(path);
   std::error_code error;
   for (const Conversion& conversion : kConversions) {
     if (extension == conversion.ending || fs::exists(path / conversion.ending, error)) {
@@ -208,7 +204,7 @@ PointFileHeader read_point_file_header(const fs::path& path) {
 
 void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> keep,
                  std::ostream& target) {
-  const std::string extension = extension_in_lower_case(path);
+  const std::string extension = lower_extension(path);
   if (extension == ".ply") return copy_ply(path, keep, target);
   if (extension == ".pcd") return copy_pcd(path, keep, target);
   if (extension != ".bin") fail(path, "expected a name that ends in .ply, .pcd or .bin");

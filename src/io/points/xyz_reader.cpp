@@ -11,14 +11,6 @@
 namespace dynains {
 namespace {
 
-std::string_view without_marks(std::string_view token) {
-  while (!token.empty() && (token.front() == '#' || token.front() == '/' || token.front() == '"')) {
-    token.remove_prefix(1);
-  }
-  while (!token.empty() && token.back() == '"') token.remove_suffix(1);
-  return token;
-}
-
 bool is_comment(const std::string& line) { return line[0] == '#' || line.rfind("//", 0) == 0; }
 
 /// Meanings of the columns by their names, which the first line may have, also behind a mark of a
@@ -27,7 +19,7 @@ std::vector<Role> roles_of_names(const ByteReader& reader,
                                  const std::vector<std::string_view>& tokens, PointSink& sink) {
   std::vector<Role> roles;
   for (const std::string_view token : tokens) {
-    const std::string_view name = without_marks(token);
+    const std::string_view name = text::trimmed(token, "#/\"");
     if (!name.empty()) roles.push_back(role_of(name));
   }
   if (std::find(roles.begin(), roles.end(), Role::kX) == roles.end()) return {};
