@@ -4,9 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -25,20 +23,14 @@ inline void append(double time, const Pose& pose, Trajectory& trajectory) {
 }
 /// Orders poses by time. Of several poses of one time, the first one stays.
 inline void sort_by_time(Trajectory& trajectory) {
-  const std::vector<double>& times = trajectory.times;
-  const auto is_late = [](double a, double b) { return !(a < b); };
-  if (std::adjacent_find(times.begin(), times.end(), is_late) == times.end()) return;
-  std::vector<std::size_t> order(times.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
-  Trajectory sorted;
-  sorted.order = trajectory.order;
-  for (const std::size_t i : order) {
-    if (!sorted.times.empty() && sorted.times.back() == times[i]) continue;
-    append(times[i], trajectory.poses[i], sorted);
+  std::map<double, Pose> sorted;
+  for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+    sorted.emplace_hint(sorted.end(), trajectory.times[i], trajectory.poses[i]);
   }
-  trajectory = std::move(sorted);
+  if (sorted.empty()) return;  // a static pose has no time
+  trajectory.times.clear();
+  trajectory.poses.clear();
+  for (const auto& [time, pose] : sorted) append(time, pose, trajectory);
 }
 
 /// Where transforms come from. Robots in one log may name their frames alike, each with transforms
@@ -94,20 +86,14 @@ class TransformTree {
   /// The frame above `frame` that has no parent; nothing if the frames above it form a loop
   /// or are more than kDeepest.
   std::optional<std::string> root_of(const std::string& frame) const {
-    std::string root = frame;
-    std::size_t steps = 0;
-    for (auto edge = edges_.find(root); edge != edges_.end(); edge = edges_.find(root)) {
-      if (++steps > kDeepest) return std::nullopt;
-      root = edge->second.parent;
-    }
-    return root;
+    const std::vector<std::string> frames = frames_above(frame);
+    return has(frames.back()) ? std::nullopt : std::optional(frames.back());
   }
   /// Whether a moving transform leads to `frame` from a frame above it.
   bool is_moving(const std::string& frame) const {
     const std::vector<std::string> frames = frames_above(frame);
     return std::any_of(frames.begin(), frames.end(), [this](const std::string& one) {
-      const auto edge = edges_.find(one);
-      return edge != edges_.end() && !edge->second.is_static;
+      return has(one) && !edges_.at(one).is_static;
     });
   }
   /// Frames with a moving transform to their parent.
@@ -147,17 +133,13 @@ class TransformTree {
                            double time) const {
     const std::vector<Step> from_source = climb(source, time);
     const std::vector<Step> from_target = climb(target, time);
-    auto above_source = from_source.rbegin();
-    auto above_target = from_target.rbegin();
-    if (above_source->frame != above_target->frame) return std::nullopt;
-    // From the top down to the last frame that both have.
-    while (std::next(above_source) != from_source.rend() &&
-           std::next(above_target) != from_target.rend() &&
-           std::next(above_source)->frame == std::next(above_target)->frame) {
-      ++above_source;
-      ++above_target;
+    if (from_source.back().frame != from_target.back().frame) return std::nullopt;
+    for (const Step& to : from_target) {
+      for (const Step& from : from_source) {
+        if (from.frame == to.frame) return to.T_frame_source.inverse() * from.T_frame_source;
+      }
     }
-    return above_target->T_frame_source.inverse() * above_source->T_frame_source;
+    return std::nullopt;
   }
   /// A frame between both, and two namespaces that are equally near and place it differently: which
   /// of them find() takes is chance.
