@@ -87,23 +87,23 @@ class MessageReader : public Bytes {
 };
 
 /// Serialises as ROS 1 does, or by CDR (little endian), where numbers are aligned to their size.
-class MessageWriter {
+class MessageWriter : private ByteWriter {
  public:
   explicit MessageWriter(MessageEncoding encoding) : is_ros1_(encoding == MessageEncoding::kRos1) {
-    if (!is_ros1_) bytes_.assign("\0\1\0\0", kCdrHeader);
+    if (!is_ros1_) raw(std::string("\0\1\0\0", kCdrHeader));
   }
+  using ByteWriter::bytes;
 
   template <class Number>
   MessageWriter& number(Number value) {
-    while (!is_ros1_ && (bytes_.size() - kCdrHeader) % sizeof(value) != 0) bytes_.push_back('\0');
-    append_number(value, bytes_);
+    if (!is_ros1_) zeros((kCdrHeader - bytes().size()) % sizeof(value));
+    ByteWriter::number(value);
     return *this;
   }
   MessageWriter& string(const std::string& text) {
     const std::size_t end = is_ros1_ ? 0 : 1;
     number(static_cast<std::uint32_t>(text.size() + end));
-    bytes_.append(text.c_str(), text.size() + end);
-    return *this;
+    return raw(std::string(text.c_str(), text.size() + end));
   }
   /// std_msgs/Header; `time`: ns.
   MessageWriter& header(std::uint64_t time, const std::string& frame) {
@@ -119,17 +119,18 @@ class MessageWriter {
     return *this;
   }
   MessageWriter& raw(const std::string& bytes) {
-    bytes_ += bytes;
+    ByteWriter::raw(bytes);
     return *this;
   }
-  const std::string& bytes() const { return bytes_; }
 
  private:
   bool is_ros1_;
-  std::string bytes_;
 };
 
-/// tf2_msgs/msg/TFMessage with one transform; `time`: ns.
+inline constexpr const char* kCloudTopicType = "sensor_msgs/msg/PointCloud2";
+inline constexpr const char* kTransformsTopicType = "tf2_msgs/msg/TFMessage";
+
+/// A message of kTransformsTopicType with one transform; `time`: ns.
 inline std::string transform_message(std::uint64_t time, const std::string& parent,
                                      const std::string& child, const Pose& T_parent_child) {
   MessageWriter out(MessageEncoding::kCdr);
@@ -149,32 +150,24 @@ inline std::uint8_t datatype_of(Scalar type) {
   return static_cast<std::uint8_t>(found - std::begin(kFieldTypes) + 1);
 }
 
-/// Fields of packed points.
-struct CloudLayout {
-  struct Field {
-    const char* name;
-    Scalar type;
-  };
-
-  std::vector<Field> fields;
-
-  std::uint32_t point_size() const {
-    std::size_t size = 0;
-    for (const Field& field : fields) size += size_of(field.type);
-    return static_cast<std::uint32_t>(size);
-  }
+/// A field of packed points.
+struct PackedField {
+  const char* name;
+  Scalar type;
 };
 
-/// sensor_msgs/msg/PointCloud2 with one row; `points`: packed as in the layout; `time`: ns.
+/// A message of kCloudTopicType with one row; `points`: packed; `time`: ns.
 inline std::string cloud_message(std::uint64_t time, const std::string& frame,
-                                 const CloudLayout& layout, const std::string& points) {
-  const std::uint32_t step = layout.point_size();
+                                 const std::vector<PackedField>& fields,
+                                 const std::string& points) {
+  std::uint32_t step = 0;
+  for (const PackedField& field : fields) step += static_cast<std::uint32_t>(size_of(field.type));
   const auto size = static_cast<std::uint32_t>(points.size());
   MessageWriter out(MessageEncoding::kCdr);
   out.header(time, frame).number(std::uint32_t{1}).number(size / step);  // one row
-  out.number(static_cast<std::uint32_t>(layout.fields.size()));
+  out.number(static_cast<std::uint32_t>(fields.size()));
   std::uint32_t offset = 0;
-  for (const CloudLayout::Field& field : layout.fields) {
+  for (const PackedField& field : fields) {
     out.string(field.name).number(offset).number(datatype_of(field.type)).number(std::uint32_t{1});
     offset += static_cast<std::uint32_t>(size_of(field.type));
   }
@@ -183,12 +176,10 @@ inline std::string cloud_message(std::uint64_t time, const std::string& frame,
 }
 
 /// Schema of a message of ROS 2, for example "tf2_msgs/msg/TFMessage"; with its definition if it is
-/// one of the types below.
+/// one of these two.
 std::shared_ptr<const LogSchema> ros2_schema(const std::string& name);
 
-/// A topic of sensor_msgs/msg/PointCloud2.
-LogTopic cloud_topic(const std::string& name);
-/// A topic of tf2_msgs/msg/TFMessage.
-LogTopic transforms_topic(const std::string& name);
+/// A topic of messages of ROS 2, of one of the types above.
+LogTopic ros2_topic(const std::string& name, const std::string& type);
 
 }  // namespace dynains

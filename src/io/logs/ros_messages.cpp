@@ -28,9 +28,6 @@ StampedPose read_stamped(MessageReader& in, bool has_child) {
   return {header.time, header.frame, std::move(child), read_pose(in)};
 }
 
-constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
-constexpr const char* kTransformsType = "tf2_msgs/msg/TFMessage";
-
 /// The definition of a type within that of another one.
 std::string part(const char* type, const char* fields) {
   return std::string(80, '=') + "\nMSG: " + type + '\n' + fields;
@@ -61,16 +58,6 @@ std::string transforms_definition() {
          part("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n") +
          part("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n") +
          header();
-}
-
-LogTopic ros2_topic(const std::string& name, const char* type) {
-  LogTopic topic;
-  topic.name = name;
-  topic.type = plain_type(type);
-  topic.encoding = MessageEncoding::kCdr;
-  topic.message_encoding = "cdr";
-  topic.schema = ros2_schema(type);
-  return topic;
 }
 
 }  // namespace
@@ -169,14 +156,21 @@ std::vector<StampedPose> read_poses(const std::string& type, const SerialisedMes
 }
 
 std::shared_ptr<const LogSchema> ros2_schema(const std::string& name) {
-  const std::string definition = name == kCloudType        ? cloud_definition()
-                                 : name == kTransformsType ? transforms_definition()
-                                                           : std::string();
+  const std::string definition = name == kCloudTopicType        ? cloud_definition()
+                                 : name == kTransformsTopicType ? transforms_definition()
+                                                                : std::string();
   return std::make_shared<LogSchema>(
       LogSchema{name, definition.empty() ? "" : "ros2msg", definition});
 }
 
-LogTopic cloud_topic(const std::string& name) { return ros2_topic(name, kCloudType); }
-LogTopic transforms_topic(const std::string& name) { return ros2_topic(name, kTransformsType); }
+LogTopic ros2_topic(const std::string& name, const std::string& type) {
+  LogTopic topic;
+  topic.name = name;
+  topic.type = plain_type(type);
+  topic.encoding = MessageEncoding::kCdr;
+  topic.message_encoding = "cdr";
+  topic.schema = ros2_schema(type);
+  return topic;
+}
 
 }  // namespace dynains
