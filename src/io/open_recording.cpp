@@ -76,8 +76,11 @@ void check_names(const RecordingContents& r) {
 void list_scans(RecordingContents& r) {
   const std::vector<fs::path> files = scan_files(r.scan_folder);
   if (files.empty()) {
-    const auto conversion = conversion_of_scans(r.scan_folder);
-    fail(r.scan_folder, conversion ? *conversion : std::string("has no scans; ") + kAccepted);
+    for (const fs::path& path : paths_in(r.scan_folder)) {
+      const auto conversion = conversion_of(path);
+      if (conversion) fail(r.scan_folder, path.filename().string() + ": " + *conversion);
+    }
+    fail(r.scan_folder, std::string("has no scans; ") + kAccepted);
   }
   r.files = files;
   r.format = *scan_format_of(files.front());

@@ -313,16 +313,4 @@ std::vector<double> Recording::point_offsets(std::size_t i, const RecordedScan& 
   return offsets;
 }
 
-void Recording::take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor) {
-  dynains::take_poses(contents_, first, T_world_sensor);
-}
-
-std::optional<Pose> Recording::pose_under(const PoseConvention& convention, std::size_t i) const {
-  return dynains::pose_under(contents_, convention, contents_.scans.at(i).index);
-}
-
-std::optional<Pose> Recording::pose_after(std::size_t i, double offset) const {
-  return dynains::pose_at(contents_, contents_.scans.at(i).time + offset);
-}
-
 }  // namespace dynains

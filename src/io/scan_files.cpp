@@ -22,31 +22,22 @@ bool is_for_scans_only(ScanFormat format) {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Compares runs of digits by value: scan2 comes before scan10.
-bool is_before(const std::string& a, const std::string& b) {
-  std::size_t i = 0;
-  std::size_t k = 0;
-  while (i < a.size() && k < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[k])) {
-      if (a[i] != b[k]) return a[i] < b[k];
-      ++i;
-      ++k;
+/// Orders names with runs of digits by value: scan2 comes before scan10. A run becomes a digit, the
+/// number of its digits without leading zeros, and these.
+std::string order_of(const std::string& name) {
+  std::string order;
+  for (std::size_t i = 0; i < name.size();) {
+    if (!is_digit(name[i])) {
+      order += name[i++];
       continue;
     }
-    const auto run = [](const std::string& text, std::size_t& at) {
-      while (at < text.size() && text[at] == '0') ++at;
-      const std::size_t begin = at;
-      while (at < text.size() && is_digit(text[at])) ++at;
-      return std::string_view(text).substr(begin, at - begin);
-    };
-    const std::string_view x = run(a, i);
-    const std::string_view y = run(b, k);
-    if (x.size() != y.size()) return x.size() < y.size();
-    if (x != y) return x < y;
+    while (i < name.size() && name[i] == '0') ++i;
+    const std::size_t begin = i;
+    while (i < name.size() && is_digit(name[i])) ++i;
+    order += {'0', static_cast<char>(i - begin)};
+    order.append(name, begin, i - begin);
   }
-  const bool a_ends = i == a.size();
-  const bool b_ends = k == b.size();
-  return a_ends == b_ends ? a < b : a_ends;
+  return order;
 }
 
 bool are_digits(std::string_view text) {
@@ -114,7 +105,7 @@ std::vector<double> times_of(const std::vector<SecondsName>& names) {
 }  // namespace
 
 std::optional<ScanFormat> scan_format_of(const fs::path& path) {
-  const std::string extension = text::lower_case(path.extension().string());
+  const std::string extension = lower_extension(path);
   if (extension == ".bin" && path.stem().extension() == ".pcd") return ScanFormat::kNuScenes;
   if (extension == ".bin") return ScanFormat::kBin;
   if (extension == ".pcd") return ScanFormat::kPcd;
@@ -142,7 +133,8 @@ std::vector<fs::path> scan_files(const fs::path& folder) {
     files.erase(std::stable_partition(files.begin(), files.end(), is_scan), files.end());
   }
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-    return is_before(a.filename().string(), b.filename().string());
+    const std::string x = a.filename().string(), y = b.filename().string();
+    return std::pair(order_of(x), x) < std::pair(order_of(y), y);
   });
   return files;
 }
@@ -152,30 +144,22 @@ std::string name_of_scan(const fs::path& file) {
   return scan_format_of(file) == ScanFormat::kNuScenes ? stem.stem().string() : stem.string();
 }
 
-std::optional<std::string> conversion_of_scans(const fs::path& folder) {
-  for (const fs::path& path : paths_in(folder)) {
-    const auto conversion = conversion_of(path);
-    if (conversion) return path.filename().string() + ": " + *conversion;
-  }
-  return std::nullopt;
-}
-
 bool is_number(const std::string& name) {
   const std::size_t zeros = std::min(name.find_first_not_of('0'), name.size());
   return name.size() - zeros <= 9 && std::all_of(name.begin(), name.end(), is_digit);
 }
 
-std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names) {
+std::optional<std::vector<double>> times_of_names(const std::vector<ScanEntry>& scans) {
   std::vector<SecondsName> of_two_numbers;
   std::vector<double> times;
-  for (const std::string& name : names) {
-    const auto parts = seconds_name(name);
-    const auto time = parts ? std::nullopt : time_of_digits(name);
+  for (const ScanEntry& scan : scans) {
+    const auto parts = seconds_name(scan.name);
+    const auto time = parts ? std::nullopt : time_of_digits(scan.name);
     if (parts) of_two_numbers.push_back(*parts);
     if (time) times.push_back(*time);
   }
-  if (of_two_numbers.size() == names.size()) return times_of(of_two_numbers);
-  if (times.size() == names.size()) return times;
+  if (of_two_numbers.size() == scans.size()) return times_of(of_two_numbers);
+  if (times.size() == scans.size()) return times;
   return std::nullopt;
 }
 

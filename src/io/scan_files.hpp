@@ -29,12 +29,10 @@ std::string name_of_scan(const std::filesystem::path& file);
 /// Whether a name is a number, of at most 9 digits behind leading zeros.
 bool is_number(const std::string& name);
 
-/// Times in seconds of names that all are times: seconds with a decimal point; at least 10 digits:
-/// s, ms, us or ns since 1970; SECONDS_NANOSECONDS, also of us or ms. Digits behind a decimal point
-/// count ns, us or ms if times are more even then, as some recorders write no leading zeros.
-std::optional<std::vector<double>> times_of_names(const std::vector<std::string>& names);
-
-/// For a folder whose only scans are in known formats that are not read: how to convert them.
-std::optional<std::string> conversion_of_scans(const std::filesystem::path& folder);
+/// Times in seconds of scans whose names all are times: seconds with a decimal point; at least 10
+/// digits: s, ms, us or ns since 1970; SECONDS_NANOSECONDS, also of us or ms. Digits behind a
+/// decimal point count ns, us or ms if times are more even then, as some recorders write no leading
+/// zeros.
+std::optional<std::vector<double>> times_of_names(const std::vector<ScanEntry>& scans);
 
 }  // namespace dynains

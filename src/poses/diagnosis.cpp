@@ -307,7 +307,7 @@ struct Evidence {
   /// poses, its unit or scale no more than turns alone, or if landmarks meet better under the given
   /// poses.
   double misfit_of(const Reading& reading) const {
-    const PoseConvention &given = recording.convention(), &other = reading.convention;
+    const PoseConvention &given = recording.options().convention, &other = reading.convention;
     const bool mirrors = other.left_handed != given.left_handed;
     const bool changes_ways = other.unit != given.unit || other.scale != given.scale;
     const BodyMotion motion = motion_under(recording, reading);
@@ -484,7 +484,7 @@ void judge_by_motions(const Evidence& evidence, Diagnosis& d) {
 Diagnosis diagnose_as_opened(const Recording& recording, std::size_t pairs) {
   Diagnosis d;
   d.scan_files = recording.scan_file_count();
-  d.pose_rows = recording.pose_count();
+  d.pose_rows = recording.trajectory().poses.size();
   d.scans = recording.size();
   d.proposal = recording.options();
   const double extent = describe_motion(recording, d);

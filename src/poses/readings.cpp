@@ -19,14 +19,14 @@ using Motions = std::vector<RegisteredMotion>;
 /// The order of quaternions that is not in use: other than the given one, or than the order of the
 /// format if none is given. kNone without quaternions.
 QuaternionOrder other_order(const Recording& recording) {
-  if (!recording.has_quaternions()) return QuaternionOrder::kNone;
-  QuaternionOrder order = recording.convention().quaternion;
-  if (order == QuaternionOrder::kNone) order = recording.quaternion_order();
+  if (recording.trajectory().order == QuaternionOrder::kNone) return QuaternionOrder::kNone;
+  QuaternionOrder order = recording.options().convention.quaternion;
+  if (order == QuaternionOrder::kNone) order = recording.trajectory().order;
   return order == QuaternionOrder::kXyzw ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
 }
 
 Reading given_reading(const Recording& recording) {
-  return {recording.convention(), recording.time_offset(), 0};
+  return {recording.options().convention, recording.options().time_offset, 0};
 }
 
 /// Factor of the ways under which most motions agree; empty without motion.
@@ -61,14 +61,14 @@ std::optional<Reading> fit_offset(const Recording& recording, const Motions& mot
   double least = error_at_points(motions, motion_under(recording, result));
   const auto steps = static_cast<int>(kMaxOffset / kStep);
   for (int k = -steps; k <= steps; ++k) {
-    result.time_offset = recording.time_offset() + kStep * k;
+    result.time_offset = recording.options().time_offset + kStep * k;
     const MotionError error = motion_error(motions, motion_under(recording, result));
     if (2 * error.pairs < motions.size() || !(error.at_points < least)) continue;
     least = error.at_points;
     best = kStep * k;
   }
   if (best == 0.0 || !(std::abs(best) < kMaxOffset - 4.0 * kStep)) return std::nullopt;
-  return Reading{recording.convention(), recording.time_offset() + best, 1};
+  return Reading{recording.options().convention, recording.options().time_offset + best, 1};
 }
 
 /// Without parts that explain nothing: a rotation or translation near 0, or one that the motions do
@@ -123,7 +123,7 @@ Eigen::Vector3d middle_in_file(const Recording& recording, std::size_t i) {
 }  // namespace
 
 BodyMotion motion_under(const Recording& recording, const Reading& reading) {
-  const double offset = reading.time_offset - recording.time_offset();
+  const double offset = reading.time_offset - recording.options().time_offset;
   return [&recording, convention = reading.convention, offset](
              std::size_t first, std::size_t second) -> std::optional<Pose> {
     const auto pose_of = [&](std::size_t i) {
@@ -140,7 +140,7 @@ bool is_much_smaller(double error, double other) {
 }
 
 std::vector<Reading> usual_readings(const Recording& recording) {
-  const PoseConvention& given = recording.convention();
+  const PoseConvention& given = recording.options().convention;
   std::vector<Reading> all = {given_reading(recording)};
   using Change = std::function<void(PoseConvention&)>;
   const auto combine = [&](const std::vector<Change>& alternatives) {
@@ -161,7 +161,7 @@ std::vector<Reading> usual_readings(const Recording& recording) {
   combine({[](PoseConvention& c) { c.left_handed = !c.left_handed; }});
   const bool is_camera = given.frame == PoseFrame::kCamera ||
                          (given.frame == PoseFrame::kAuto && recording.has_calibration() &&
-                          !recording.has_quaternions());
+                          recording.trajectory().order == QuaternionOrder::kNone);
   combine({[is_camera](PoseConvention& c) {
     c.frame = is_camera ? PoseFrame::kLidar : PoseFrame::kCamera;
   }});
@@ -171,7 +171,7 @@ std::vector<Reading> usual_readings(const Recording& recording) {
   }
   combine(units);
   for (const int shift : {1, -1, 2, -2}) {
-    all.push_back({given, recording.time_offset(), 1});
+    all.push_back({given, recording.options().time_offset, 1});
     all.back().convention.shift += shift;
   }
   all.erase(all.begin());  // the given one

@@ -25,7 +25,8 @@ struct Reading {
 BodyMotion motion_under(const Recording& recording, const Reading& reading);
 /// That under the given meaning.
 inline BodyMotion given_motion(const Recording& recording) {
-  return motion_under(recording, {recording.convention(), recording.time_offset(), 0});
+  return motion_under(recording,
+                      {recording.options().convention, recording.options().time_offset, 0});
 }
 
 /// Whether an error (m) of points 10 m from the sensor is clearly smaller than another one.

@@ -133,8 +133,7 @@ struct RecordingContents {
   bool is_numbered = false;  ///< all names are numbers
   bool has_times = true;     ///< times of scans are measured; else scans count as 0.1 s apart
   bool has_viewpoints = false;
-  bool has_calibration = false;
-  Pose Tr = Pose::Identity();                           ///< of calib.txt
+  std::optional<Pose> T_camera_sensor;                  ///< of calib.txt
   Trajectory trajectory;                                ///< rows of the poses as in their file
   std::vector<std::optional<TrajectoryMatch>> matches;  ///< rows for each cloud or file of a scan
   Trajectory motion;                                    ///< T_world_sensor, for de-skewing
@@ -245,19 +244,15 @@ class Recording {
 
   // Members for comparisons with other conventions.
   const RecordingOptions& options() const { return contents_.options; }
-  const PoseConvention& convention() const { return contents_.options.convention; }
-  double time_offset() const { return contents_.options.time_offset; }
   /// Pose of scan i under another convention; empty if its shift leads out of the trajectory.
   std::optional<Pose> pose_under(const PoseConvention& convention, std::size_t i) const;
   /// Pose of the sensor at `offset` (s) after the pose of scan i, by the times of the poses; empty
   /// without times and outside of the trajectory.
   std::optional<Pose> pose_after(std::size_t i, double offset) const;
-  /// Whether the rows of the pose file are quaternions; their order; whether there is a calib.txt.
-  bool has_quaternions() const { return contents_.trajectory.order != QuaternionOrder::kNone; }
-  QuaternionOrder quaternion_order() const { return contents_.trajectory.order; }
-  bool has_calibration() const { return contents_.has_calibration; }
-  /// Number of rows of the pose file.
-  std::size_t pose_count() const { return contents_.trajectory.poses.size(); }
+  /// Rows of the poses, as in their file.
+  const Trajectory& trajectory() const { return contents_.trajectory; }
+  /// Whether there is a calib.txt.
+  bool has_calibration() const { return contents_.T_camera_sensor.has_value(); }
   /// Number of clouds of the log or files of scans, with and without a pose.
   std::size_t scan_file_count() const { return contents_.matches.size(); }
   /// Number of scans that were excluded for lack of a pose.

@@ -57,10 +57,10 @@ Pose to_sensor_pose(const RecordingContents& r, const PoseConvention& convention
                     const Pose& pose) {
   const bool is_matrix = r.trajectory.order == QuaternionOrder::kNone;
   const bool is_camera = convention.frame == PoseFrame::kCamera ||
-                         (convention.frame == PoseFrame::kAuto && r.has_calibration && is_matrix);
+                         (convention.frame == PoseFrame::kAuto && r.T_camera_sensor && is_matrix);
   Pose T_world_sensor = pose * convention.T_body_sensor;
   if (is_camera) {
-    const Pose T_camera_sensor = r.has_calibration ? r.Tr : camera_axes();
+    const Pose T_camera_sensor = r.T_camera_sensor.value_or(camera_axes());
     T_world_sensor = T_camera_sensor.inverse() * pose * T_camera_sensor * convention.T_body_sensor;
   }
   if (!r.options.sensor_origin.isZero(0.0)) T_world_sensor.translate(r.options.sensor_origin);
@@ -76,10 +76,16 @@ Pose pose_of(const RecordingContents& r, const PoseConvention& convention,
                   apply(convention, r.trajectory.poses[match.after], order), match.share));
 }
 
-/// The first existing file of `names` in `folders`; empty if there is none.
-template <class Names>
-fs::path first_file(const std::vector<fs::path>& folders, const Names& names) {
-  for (const fs::path& folder : folders) {
+/// The folder of a file of poses; without one, that of the recording.
+fs::path folder_of(const RecordingContents& r, const fs::path& poses_file) {
+  return poses_file.empty() ? r.folder : poses_file.parent_path();
+}
+
+/// The first existing file of `names` in the folder of the recording or in another one; empty if
+/// there is none.
+fs::path first_file(const RecordingContents& r, const fs::path& other,
+                    const std::vector<const char*>& names) {
+  for (const fs::path& folder : {r.folder, other}) {
     for (const char* name : names) {
       if (is_file(folder / name)) return folder / name;
     }
@@ -91,7 +97,7 @@ fs::path find_poses(const RecordingContents& r) {
   if (!r.options.poses.empty()) return r.options.poses;
   const fs::path other =
       r.scan_folder == r.folder ? fs::absolute(r.folder).lexically_normal() / ".." : r.scan_folder;
-  const fs::path file = first_file({r.folder, other}, kPoseFiles);
+  const fs::path file = first_file(r, other, {kPoseFiles.begin(), kPoseFiles.end()});
   if (!file.empty()) return file.lexically_normal();
   fail(r.folder / "poses.txt",
        "not found: expected a pose for each scan, there (12 numbers a row, or time x y z qx qy qz "
@@ -114,24 +120,15 @@ void read_viewpoints(RecordingContents& r) {
   if (r.has_viewpoints) r.trajectory = std::move(viewpoints);
 }
 
-/// The first existing file of `names` in the folder or beside the poses; empty if there is none.
-fs::path find_beside(const RecordingContents& r, const fs::path& poses_file,
-                     const std::vector<const char*>& names) {
-  std::vector<fs::path> folders = {r.folder};
-  if (!poses_file.empty()) folders.push_back(poses_file.parent_path());
-  return first_file(folders, names);
-}
-
 /// Reads calib.txt, which poses of a camera need.
 void read_calibration(RecordingContents& r, const fs::path& poses_file) {
-  const fs::path file = find_beside(r, poses_file, {"calib.txt"});
+  const fs::path file = first_file(r, folder_of(r, poses_file), {"calib.txt"});
   if (file.empty()) return;
   r.files.push_back(file);
   const PoseFrame frame = r.options.convention.frame;
   const bool is_matrix = r.trajectory.order == QuaternionOrder::kNone;
   try {
-    r.Tr = read_kitti_calib(file);
-    r.has_calibration = true;
+    r.T_camera_sensor = read_kitti_calib(file);
   } catch (const IoError& error) {
     if (frame == PoseFrame::kCamera || (frame == PoseFrame::kAuto && is_matrix)) throw;
     r.notes.push_back(std::string("not used: ") + error.what());
@@ -161,18 +158,12 @@ std::vector<std::size_t> rows_of_scans(const RecordingContents& r, const fs::pat
   return result;
 }
 
-std::optional<std::vector<double>> times_of_names(const RecordingContents& r) {
-  std::vector<std::string> names;
-  for (const ScanEntry& scan : r.scans) names.push_back(scan.name);
-  return dynains::times_of_names(names);
-}
-
 /// Times of the scan files from a file of times or from their names.
 std::optional<std::vector<double>> find_times(RecordingContents& r, const fs::path& poses_file) {
-  const fs::path file = r.options.times.empty()
-                            ? find_beside(r, poses_file, {"times.txt", "timestamps.txt"})
-                            : r.options.times;
-  if (file.empty()) return times_of_names(r);
+  const fs::path file = r.options.times.empty() ? first_file(r, folder_of(r, poses_file),
+                                                             {"times.txt", "timestamps.txt"})
+                                                : r.options.times;
+  if (file.empty()) return times_of_names(r.scans);
   r.files.push_back(file);
   std::vector<double> rows = read_kitti_times(file);
   for (double& time : rows) time = to_seconds(time);
@@ -182,7 +173,7 @@ std::optional<std::vector<double>> find_times(RecordingContents& r, const fs::pa
   if (!is_ours && !has_all_numbers) {
     r.notes.push_back("not used: " + shown(file, r.folder) + " has " + std::to_string(rows.size()) +
                       " rows for " + std::to_string(r.scans.size()) + " scans");
-    return times_of_names(r);
+    return times_of_names(r.scans);
   }
   std::vector<double> times;
   for (const std::size_t row : rows_of_scans(r, file, rows.size(), ",")) times.push_back(rows[row]);
@@ -233,22 +224,20 @@ bool match_indices(RecordingContents& r) {
   const auto is_index = [](double time) { return time >= 0.0 && time == std::floor(time); };
   if (!std::all_of(indices.begin(), indices.end(), is_index)) return false;
   std::size_t found = 0;
-  r.matches.clear();
+  std::vector<std::optional<TrajectoryMatch>> matches;
   for (const ScanEntry& scan : r.scans) {
     const auto number = static_cast<double>(scan.number);
     const auto row = std::lower_bound(indices.begin(), indices.end(), number);
     if (row == indices.end() || *row != number) {
-      r.matches.emplace_back();
+      matches.emplace_back();
       continue;
     }
     const auto at = static_cast<std::size_t>(row - indices.begin());
-    r.matches.push_back(TrajectoryMatch{at, at, 0.0});
+    matches.push_back(TrajectoryMatch{at, at, 0.0});
     ++found;
   }
-  if (2 * found < r.scans.size()) {
-    r.matches.clear();
-    return false;
-  }
+  if (2 * found < r.scans.size()) return false;
+  r.matches = std::move(matches);
   for (double& time : r.trajectory.times) time *= kKittiPeriod;
   for (ScanEntry& scan : r.scans) scan.time = kKittiPeriod * static_cast<double>(scan.number);
   r.has_times = false;
@@ -282,15 +271,6 @@ void note_rows(RecordingContents& r, const fs::path& file) {
   }
 }
 
-/// Matches scans to the times of their rows plus the offset.
-void shift_times(RecordingContents& r, const fs::path& file) {
-  if (r.trajectory.times.empty()) {
-    fail(file, "has no times, which an offset of the time needs; expected rows with times");
-  }
-  r.matches.clear();
-  match_times(r, file);
-}
-
 void match_scans(RecordingContents& r, const fs::path& file) {
   // Times beside a file of --poses may belong to another recording.
   const std::optional<std::vector<double>> times =
@@ -314,7 +294,22 @@ void match_scans(RecordingContents& r, const fs::path& file) {
     r.has_times = false;
     r.notes.push_back("no times: 0.1 s from scan to scan");
   }
-  if (r.options.time_offset != 0.0) shift_times(r, file);
+  if (r.options.time_offset == 0.0) return;
+  if (r.trajectory.times.empty()) {
+    fail(file, "has no times, which an offset of the time needs; expected rows with times");
+  }
+  r.matches.clear();
+  match_times(r, file);
+}
+
+/// Pose of the scan of that index (see ScanEntry) under a convention; empty if it has none.
+std::optional<Pose> pose_under(const RecordingContents& r, const PoseConvention& convention,
+                               std::size_t index) {
+  const auto at = static_cast<std::ptrdiff_t>(index) + convention.shift;
+  if (at < 0 || at >= static_cast<std::ptrdiff_t>(r.matches.size())) return std::nullopt;
+  const std::optional<TrajectoryMatch>& match = r.matches[static_cast<std::size_t>(at)];
+  if (!match) return std::nullopt;
+  return pose_of(r, convention, *match);
 }
 
 /// Sets the poses of scans and leaves out scans without one. `poses`: their file or folder.
@@ -360,19 +355,16 @@ void find_point_clock(RecordingContents& r, const ScanReader& reader) {
 
 }  // namespace
 
-std::optional<Pose> pose_under(const RecordingContents& r, const PoseConvention& convention,
-                               std::size_t index) {
-  const auto at = static_cast<std::ptrdiff_t>(index) + convention.shift;
-  if (at < 0 || at >= static_cast<std::ptrdiff_t>(r.matches.size())) return std::nullopt;
-  const std::optional<TrajectoryMatch>& match = r.matches[static_cast<std::size_t>(at)];
-  if (!match) return std::nullopt;
-  return pose_of(r, convention, *match);
+std::optional<Pose> Recording::pose_under(const PoseConvention& convention, std::size_t i) const {
+  return dynains::pose_under(contents_, convention, contents_.scans.at(i).index);
 }
 
-std::optional<Pose> pose_at(const RecordingContents& r, double time) {
-  const auto match = match_time(r.trajectory, time + r.options.time_offset, r.options.pose_gap);
+std::optional<Pose> Recording::pose_after(std::size_t i, double offset) const {
+  const RecordingOptions& options = contents_.options;
+  const double time = contents_.scans.at(i).time + offset + options.time_offset;
+  const auto match = match_time(contents_.trajectory, time, options.pose_gap);
   if (!match) return std::nullopt;
-  return pose_of(r, r.options.convention, *match);
+  return pose_of(contents_, options.convention, *match);
 }
 
 void leave_unplaced(RecordingContents& r) {
@@ -460,7 +452,8 @@ void prepare_deskewing(RecordingContents& r, const ScanReader& reader) {
   r.motion = std::move(motion);
 }
 
-void take_poses(RecordingContents& r, std::size_t first, const std::vector<Pose>& T_world_sensor) {
+void Recording::take_poses(std::size_t first, const std::vector<Pose>& T_world_sensor) {
+  RecordingContents& r = contents_;
   if (!r.options.without_poses || T_world_sensor.empty() || first >= r.scans.size() ||
       T_world_sensor.size() > r.scans.size() - first) {
     throw UsageError("a recording without poses takes at most one for each scan");
