@@ -110,17 +110,14 @@ class ChunkedLog : public LogFile {
   // For take_record().
   /// Begins a chunk, named by the byte of its record. Throws for sizes that cannot be.
   void add_chunk(std::uint64_t position, Chunk header) {
-    if (header.compressed_size > file_.size() - header.content) {
+    const auto check = [&](std::uint64_t size, std::uint64_t most) {
+      if (size <= most) return;
       fail_at_byte(path_, position,
-                   "expected a chunk of at most " + std::to_string(file_.size() - header.content) +
-                       " bytes, found the size " + std::to_string(header.compressed_size));
-    }
-    if (header.uncompressed_size > max_decompressed(header.compressed_size)) {
-      fail_at_byte(path_, position,
-                   "expected a chunk of at most " +
-                       std::to_string(max_decompressed(header.compressed_size)) +
-                       " bytes, found the size " + std::to_string(header.uncompressed_size));
-    }
+                   "expected a chunk of at most " + std::to_string(most) +
+                       " bytes, found the size " + std::to_string(size));
+    };
+    check(header.compressed_size, file_.size() - header.content);
+    check(header.uncompressed_size, max_decompressed(header.compressed_size));
     chunks_[position] = std::move(header);
     last_chunk_ = position;
     first_of_last_ = entries_.size();

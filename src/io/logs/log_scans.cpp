@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
 #include <iterator>
+#include <numeric>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include "../failure.hpp"
@@ -39,16 +38,17 @@ Topics filter(const LogFile& log, Condition&& is_wanted) {
 std::string text_of(const LogTopic& topic) {
   return topic.name + " (" + topic.type + ", " + std::to_string(topic.message_count) + " messages)";
 }
-std::string list(const LogFile& log) {
-  std::string text;
-  for (const LogTopic& topic : log.topics()) text += (text.empty() ? "" : ", ") + text_of(topic);
-  return text.empty() ? "no topic" : text;
-}
 std::string list(const LogFile& log, const Topics& topics) {
   std::string text;
-  for (const std::uint32_t i : topics)
+  for (const std::uint32_t i : topics) {
     text += (text.empty() ? "" : ", ") + text_of(log.topics()[i]);
-  return text;
+  }
+  return text.empty() ? "no topic" : text;
+}
+std::string list(const LogFile& log) {
+  Topics all(log.topics().size());
+  std::iota(all.begin(), all.end(), 0U);
+  return list(log, all);
 }
 
 /// Whether messages hold what a sensor sent, as a driver records it.
@@ -277,9 +277,9 @@ class LogOpener {
     }
     for (auto& [time, clouds] : scans) {
       const std::size_t number = r_.scans.size();
-      std::ostringstream name;
-      text::exact(name) << std::setw(6) << std::setfill('0') << number;
-      r_.scans.push_back({r_.folder, name.str(), number, time});
+      const std::string digits = std::to_string(number);
+      const std::string zeros(digits.size() < 6 ? 6 - digits.size() : 0, '0');
+      r_.scans.push_back({r_.folder, zeros + digits, number, time});
       scans_->scans_.push_back(std::move(clouds));
     }
     cloud_frame_ = sources_.front().frame;
