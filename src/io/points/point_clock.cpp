@@ -17,33 +17,19 @@ namespace {
 constexpr double kUnits[] = {1.0, 1e-3, 1e-6, 1e-9};
 constexpr double kNoGap = 0.125;  // s; scans that are farther apart may be some of all scans
 
-/// Finite times of the points with a return.
-std::vector<double> times_with_return(const RecordedScan& scan) {
-  std::vector<double> times;
-  times.reserve(scan.time.size());
+/// Calls `take(xyz, time)` for the points with a return and a finite time, in their order.
+template <class Take>
+void for_each_time(const RecordedScan& scan, Take&& take) {
   for (std::size_t k = 0; k < scan.time.size(); ++k) {
-    if (std::isfinite(scan.time[k]) && is_measured(scan.xyzi.data() + 4 * k)) {
-      times.push_back(scan.time[k]);
-    }
+    const float* const xyz = scan.xyzi.data() + 4 * k;
+    if (std::isfinite(scan.time[k]) && is_measured(xyz)) take(xyz, scan.time[k]);
   }
-  return times;
 }
 
 struct DirectedTime {
   float azimuth;  // rad
   double time;
 };
-
-/// The finite times of the points with a return, in the order of the points.
-std::vector<DirectedTime> directed_times(const RecordedScan& scan) {
-  std::vector<DirectedTime> times;
-  for (std::size_t k = 0; k < scan.time.size(); ++k) {
-    const float* const xyz = scan.xyzi.data() + 4 * k;
-    if (!std::isfinite(scan.time[k]) || !is_measured(xyz)) continue;
-    times.push_back({std::atan2(xyz[1], xyz[0]), scan.time[k]});
-  }
-  return times;
-}
 
 /// Whether most neighbours are more than a tenth of `span` apart: 0.8 of them if times are random.
 bool do_leap(const std::vector<DirectedTime>& times, double span) {
@@ -83,11 +69,15 @@ class PointClockSearch {
   PointClockSearch(double period, double unit) : period_(period), unit_(unit) {}
 
   void add(const RecordedScan& scan) {
-    Sample sample{times_with_return(scan)};
-    if (sample.times.empty()) return;
+    Sample sample;
+    std::vector<DirectedTime> times;
+    for_each_time(scan, [&](const float* xyz, double time) {
+      sample.times.push_back(time);
+      times.push_back({std::atan2(xyz[1], xyz[0]), time});
+    });
+    if (times.empty()) return;
     std::sort(sample.times.begin(), sample.times.end());
     const double span = sample.quantile(0.95) - sample.quantile(0.05);
-    std::vector<DirectedTime> times = directed_times(scan);
     const bool do_points_leap = do_leap(times, span);
     std::sort(times.begin(), times.end(),
               [](const DirectedTime& a, const DirectedTime& b) { return a.azimuth < b.azimuth; });
@@ -267,7 +257,8 @@ PointTimes times_of_scan(const RecordedScan& scan, const PointClock& clock) {
   const double longest = clock.longest_scan / clock.unit;
   const PointTimes all = range_of(scan.time, -finite, finite);
   if (all.is_empty() || all.last - all.first <= longest) return all;
-  const std::vector<double> times = times_with_return(scan);
+  std::vector<double> times;
+  for_each_time(scan, [&](const float*, double time) { times.push_back(time); });
   if (times.empty()) return {};
   const double middle = median(times);
   return range_of(times, middle - longest, middle + longest);
