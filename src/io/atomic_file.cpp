@@ -1,13 +1,11 @@
 #include "dynains/io/atomic_file.hpp"
 
 #include <fcntl.h>
-#include <sys/random.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstddef>
-#include <cstdint>
+#include <random>
 #include <streambuf>
 #include <string>
 #include <string_view>
@@ -112,12 +110,9 @@ constexpr std::string_view kTemporaryEnd = ".tmp";
 constexpr std::size_t kRandomDigits = 16;
 
 std::string random_digits() {
-  std::array<std::uint8_t, kRandomDigits> random{};
-  if (::getrandom(random.data(), random.size(), 0) != static_cast<ssize_t>(random.size())) {
-    throw std::system_error(errno, std::generic_category(), "getrandom");
-  }
+  std::random_device random;
   std::string digits;
-  for (const std::uint8_t number : random) digits += kHexDigits[number % kHexDigits.size()];
+  while (digits.size() < kRandomDigits) digits += kHexDigits[random() % kHexDigits.size()];
   return digits;
 }
 
