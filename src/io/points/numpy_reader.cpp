@@ -36,13 +36,6 @@ struct NpyArray {
   bool is_column_major = false;
   std::size_t item_size = 0;     ///< bytes
   std::uint64_t data_begin = 0;  ///< byte of the first item
-
-  /// Product of the shape.
-  std::uint64_t item_count() const {
-    std::uint64_t count = 1;
-    for (const std::uint64_t length : shape) count *= length;
-    return count;
-  }
 };
 
 /// Parses the literal of Python in which a header describes its array.
@@ -210,7 +203,8 @@ NpyArray parse_npy_header(Bytes in, std::uint64_t size) {
 std::uint64_t find_points(const Bytes& place, NpyArray& array, PointSink& sink,
                           std::uint64_t& stride) {
   const std::vector<std::uint64_t>& shape = array.shape;
-  std::uint64_t points = array.item_count();
+  std::uint64_t points = 1;
+  for (const std::uint64_t length : shape) points *= length;
   stride = array.item_size;
   if (!array.columns.front().name.empty()) {
     for (NpyColumn& column : array.columns) column.role = role_of(column.name);

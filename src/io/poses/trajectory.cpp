@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -333,16 +332,11 @@ std::string extrinsic_text(const Pose& T_body_sensor) {
   const Eigen::Vector3d t = T_body_sensor.translation();
   detail::Quaternion q(T_body_sensor.linear());
   if (q.w() < 0.0) q.coeffs() *= -1.0;
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::fixed;
-  text.precision(6);
-  const char* separator = "";
+  std::string text;
   for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) {
-    text << separator << (std::abs(value) < 5e-7 ? 0.0 : value);
-    separator = " ";
+    text += (text.empty() ? "" : " ") + text::fixed(std::abs(value) < 5e-7 ? 0.0 : value, 6);
   }
-  return text.str();
+  return text;
 }
 
 }  // namespace dynains
