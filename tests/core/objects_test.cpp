@@ -183,6 +183,7 @@ TEST_CASE("parts that later scans know as one van are one object in final verdic
     CHECK(objects[0].id == 1);
     const double centre = 4.1 + 0.8 * static_cast<double>(i - 10);
     CHECK(objects[0].centre.x() == Approx(centre).margin(0.5));
+    CHECK(objects[0].velocity.x() == Approx(8.0).margin(0.8));
   }
 }
 

@@ -61,6 +61,7 @@ class ObjectTracks {
  private:
   static constexpr double kMaxUnseen = 1.0;     // s
   static constexpr double kError = 0.2;         // m, standard deviation of a measured centre
+  static constexpr double kSettling = 1.0;      // s, until a track has a certain motion
   static constexpr double kAcceleration = 2.0;  // m/s^2, standard deviation
   static constexpr double kSpeed = 15.0;        // m/s, standard deviation before it is measured
   static constexpr double kDeviations = 2.0;    // of usual errors
@@ -72,9 +73,17 @@ class ObjectTracks {
   static constexpr float kGapOfInstance = 0.2F;  // m, added for points of an instance of the object
   static constexpr float kAtSide = 0.1F;  // m: points nearer to a side of a box count equally
 
+  // Of constant velocity.
+  struct Motion {
+    double time = kNever;                                // s
+    Eigen::Vector2d centre = Eigen::Vector2d::Zero();    // m
+    Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  // m/s
+  };
+
   struct Track {
     MovingObject object;
-    double seen = 0.0;                    // s, time of its last scan
+    double begun = 0.0, seen = 0.0;  // s, times of its first and last scan
+    Motion early;  // the last one with a direction before it is settled, or the first one
     double pp = 0.0, pv = 0.0, vv = 0.0;  // covariance of position and velocity, per axis
     bool is_directed = false;             // its motion is certain, and so is its yaw
     double yaw = 0.0, yaw_variance = M_PI * M_PI;
@@ -259,17 +268,35 @@ class ObjectTracks {
     std::uint32_t& last_id = later_ != nullptr ? later_->last_id_ : last_id_;
     track.object.id = known != nullptr ? id : ++last_id;
     track.object.first_scan = scan.scan;
+    track.begun = scan.time;
     track.pp = kError * kError;
     track.vv = kSpeed * kSpeed;
     if (known != nullptr && known->is_directed && later_->time_ > time_) {
-      track.object.length = known->object.length;
-      track.object.width = known->object.width;
-      const double duration = later_->time_ - time_;
-      track.object.velocity = (known->object.centre - object.centre).head<2>() / duration;
-      track.vv = 2.0 * kError * kError / (duration * duration);
-      turn(track);
+      lead_back(*known, track);
     }
     tracks_.push_back(track);
+  }
+
+  // Begins a track with the size of later scans. This scan may show a part alone: the box that
+  // holds it is nearest to where the motion leads back to.
+  void lead_back(const Track& known, Track& track) const {
+    const Eigen::Vector2d later = known.object.centre.head<2>();
+    const Motion latest{later_->time_, later, known.object.velocity};
+    const Motion& motion = known.early.time > time_ ? known.early : latest;
+    const double ahead = motion.time - time_, duration = latest.time - time_;
+    MovingObject& object = track.object;
+    const Eigen::Matrix2d axes = axes_of(known.object.yaw);
+    const Eigen::Vector2d part = axes.transpose().cwiseAbs() * size_of(object);
+    const Eigen::Vector2d slack = 0.5 * (size_of(known.object) - part).cwiseMax(0.0);
+    const Eigen::Vector2d place = motion.centre - ahead * motion.velocity;
+    const Eigen::Vector2d offset = axes.transpose() * (place - object.centre.head<2>());
+    object.length = known.object.length;
+    object.width = known.object.width;
+    object.centre.head<2>() += axes * offset.cwiseMax(-slack).cwiseMin(slack);
+    object.velocity = (later - object.centre.head<2>()) / duration;
+    track.pp += std::pow(0.5 * kAcceleration * ahead * ahead, 2);
+    track.vv = 2.0 * kError * kError / (duration * duration);
+    turn(track);
   }
 
   // The place of an instance in named_, or the place behind it.
@@ -359,9 +386,10 @@ class ObjectTracks {
       return;
     }
     const Eigen::Vector2d size = size_of(object);
-    const Eigen::Vector2d centre = measure_centre(extent, track);
+    const Eigen::Vector2d centre = measure_centre(scan.scan, extent, track);
     if (object.first_scan == scan.scan) {
       object.centre.head<2>() = centre;
+      track.pp = kError * kError;
     } else {
       // Without a direction, what a box grows at one side is as well a motion.
       const double growth = track.is_directed ? 0.0 : 0.5 * (size_of(object) - size).norm();
@@ -373,12 +401,17 @@ class ObjectTracks {
     object.last_scan = scan.scan;
     track.seen = scan.time;
     turn(track);
+    const bool is_early = track.early.time == kNever || scan.time - track.begun <= kSettling;
+    if (track.is_directed && is_early) {
+      track.early = {scan.time, object.centre.head<2>(), object.velocity};
+    }
   }
 
   // The measured centre, by the side towards the sensor and the size: a far side may be hidden.
   // The size is nearly the largest one that was seen, until the object is directed the last one:
   // before, the box may have other axes.
-  Eigen::Vector2d measure_centre(const Eigen::AlignedBox2f& extent, Track& track) const {
+  Eigen::Vector2d measure_centre(std::uint64_t scan, const Eigen::AlignedBox2f& extent,
+                                 Track& track) const {
     constexpr double kGrowth = 0.5, kShrinkage = 0.2;  // of the difference, in each scan
     MovingObject& object = track.object;
     const Eigen::Matrix2d axes = axes_of(object.yaw);
@@ -394,14 +427,17 @@ class ObjectTracks {
       const double gain = difference > 0.0 ? kGrowth : kShrinkage * view[1 - k];
       const double growth = (track.is_directed ? gain : 1.0) * difference;
       size += growth;
-      const double hidden = 0.5 * (growth - difference);
+      const double hidden = 0.5 * (growth - difference), slack = std::abs(hidden);
+      const double nearest = std::clamp(expected[k], middle - slack, middle + slack);
       if (std::abs(expected[k]) <= 0.5 * size) {  // both ends are equally far away
-        const double slack = std::abs(hidden);
-        centre += std::clamp(expected[k], middle - slack, middle + slack) * axes.col(k);
+        centre += nearest * axes.col(k);
         continue;
       }
-      const double away = expected[k] > 0.0 ? 1.0 : -1.0;
-      centre += (middle + away * hidden) * axes.col(k);
+      const double away = expected[k] > 0.0 ? 1.0 : -1.0, hidden_far = middle + away * hidden;
+      // A track that later scans know has an expected place from the beginning.
+      const bool begins = track.is_directed && object.first_scan == scan;
+      const double trust = begins ? slack * slack / (slack * slack + track.pp) : 0.0;
+      centre += (hidden_far + trust * (nearest - hidden_far)) * axes.col(k);
       object.centre.head<2>() += 0.5 * away * growth * axes.col(k);
     }
     return centre;
