@@ -108,16 +108,15 @@ Epochs epochs_of(const std::vector<SimulatedScan>& scans) {
       kept += is_static(verdict.labels[i]) ? 1.0 : 0.0;
     }
   };
-  for (std::size_t i = 0; i < scans.size(); ++i) {
-    const RawPoints<float> points{scans[i].xyzi.data(), scans[i].labels.size(), 4};
-    const FrameResult frame = remover.push(points, scans[i].T_world_sensor, scans[i].time);
-    if (frame.finished) count(*frame.finished);
-    if (!frame.began_epoch || i == 0) continue;
+  std::size_t pushed = 0;
+  const auto look = [&](const FrameResult& frame) {
+    const std::size_t i = pushed++;
+    if (!frame.began_epoch || i == 0) return;
     epochs.scans.push_back(i);
     epochs.reasons.push_back(frame.began_epoch);
     CHECK_FALSE(frame.pose_residual);
-  }
-  remover.flush(count);
+  };
+  push_all(remover, scans, look, count);
   epochs.static_share = kept / still;
   return epochs;
 }
@@ -184,9 +183,8 @@ TEST_CASE("a push tells why it begins an epoch") {
   double time = 0.0;
   const auto push = [&](std::size_t i, double pause, double shift) {
     time += pause;
-    const RawPoints<float> points{street()[i].xyzi.data(), street()[i].labels.size(), 4};
     const Eigen::Isometry3d T = Eigen::Translation3d(shift, 0.0, 0.0) * street()[i].T_world_sensor;
-    return remover.push(points, T, time).began_epoch;
+    return remover.push(points_of(street()[i]), T, time).began_epoch;
   };
   CHECK(push(0, 0.1, 0.0) == EpochReason::kStart);
   CHECK_FALSE(push(1, 0.1, 0.0));

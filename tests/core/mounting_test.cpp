@@ -2,12 +2,11 @@
 
 #include "dynains/compiled_remover.hpp"
 #include "dynains/io/recording.hpp"
-#include "simulation/simulator.hpp"
 #include "support/catch.hpp"
 #include "support/drive_of.hpp"
 #include "support/points.hpp"
-#include "support/random.hpp"
 #include "support/recordings.hpp"
+#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {
@@ -23,8 +22,7 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 PointBuffer street(double height, const Eigen::Matrix3d& R_level_sensor) {
   PointBuffer points;
   const auto add = [&](double x, double y, double z) {
-    const Eigen::Vector3f p = (R_level_sensor.transpose() * Eigen::Vector3d(x, y, z)).cast<float>();
-    points.push_back(p.x(), p.y(), p.z());
+    add_point(points, R_level_sensor.transpose() * Eigen::Vector3d(x, y, z));
   };
   for (double a = -15.0; a < 15.0; a += 0.23) {
     for (double b = -15.0; b < 15.0; b += 0.23) add(a, b, -height);
@@ -37,8 +35,7 @@ TEST_CASE("a heading turns with the points and runs along the scene, to its end 
   Random random(11);
   PointBuffer scan;
   for (int i = 0; i < 2000; ++i) {
-    scan.push_back(static_cast<float>(random.uniform(-30.0, 50.0)),
-                   static_cast<float>(random.uniform(-9.0, 9.0)), 0.0F);
+    add_point(scan, random.vector({-30.0, -9.0, 0.0}, {50.0, 9.0, 0.0}));
   }
   CHECK(std::abs(estimate_heading(scan)) < 0.05);
   const double plain = estimate_heading(scan);
@@ -47,8 +44,7 @@ TEST_CASE("a heading turns with the points and runs along the scene, to its end 
     const Eigen::Matrix3f R = R_headed(-angle).cast<float>();
     PointBuffer turned;
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Eigen::Vector3f p = R * Eigen::Vector3f(scan.x[i], scan.y[i], scan.z[i]);
-      turned.push_back(p.x(), p.y(), p.z());
+      add_point(turned, R * Eigen::Vector3f(scan.x[i], scan.y[i], scan.z[i]));
     }
     const double off = estimate_heading(turned) - plain - angle;
     CHECK(std::abs(std::remainder(off, 2.0 * M_PI)) < 1e-5);
@@ -60,10 +56,7 @@ TEST_CASE("A plane and a wall give exact height and tilt") {
   for (const double height : {0.5, 1.2, 1.73, 2.5, 4.0}) {
     for (const double pitch : {-30.0, 0.0, 20.0}) {
       for (const double roll : {0.0, 30.0, 170.0}) {
-        const Eigen::Matrix3d R_level_sensor =
-            (Eigen::AngleAxisd(pitch * kRadians, Eigen::Vector3d::UnitY()) *
-             Eigen::AngleAxisd(roll * kRadians, Eigen::Vector3d::UnitX()))
-                .toRotationMatrix();
+        const Eigen::Matrix3d R_level_sensor = slant(pitch, roll);
         const Mounting mounting = estimate_mounting(street(height, R_level_sensor));
         CAPTURE(height, pitch, roll, mounting.height, mounting.up_sensor.transpose());
         REQUIRE(mounting.known);
@@ -107,9 +100,8 @@ TEST_CASE("A roof of the own vehicle and points that are not finite change nothi
       points.push_back(static_cast<float>(a), static_cast<float>(b), -0.4F);
     }
   }
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  points.push_back(kNan, 0.0F, 0.0F);
+  points.push_back(std::nanf(""), 0.0F, 0.0F);
   points.push_back(1.0F, kInfinity, 0.0F);
   points.push_back(0.0F, 0.0F, -kInfinity);
   const Mounting mounting = estimate_mounting(points);
@@ -133,9 +125,7 @@ TEST_CASE("Without ground, the mounting is not known") {
   Random random(5);
   PointBuffer cloud;
   for (int i = 0; i < 20000; ++i) {
-    const auto coordinate = [&] { return static_cast<float>(random.uniform(-15.0, 15.0)); };
-    const float x = coordinate(), y = coordinate();
-    cloud.push_back(x, y, coordinate());
+    add_point(cloud, random.vector({-15.0, -15.0, -15.0}, {15.0, 15.0, 15.0}));
   }
   CHECK_FALSE(estimate_mounting(cloud).known);
 }
@@ -173,14 +163,13 @@ TEST_CASE("A plane is no ground if more points are below it than on it, or if it
       for (float b = -2.5F; b < 2.5F; b += 0.23F) points.push_back(a, b, -1.0F);
     }
     Random random(7);
-    const auto scatter = [&](std::size_t count, float low, float high) {
+    const auto scatter = [&](std::size_t count, double low, double high) {
       for (std::size_t i = 0; i < count; ++i) {
-        const float x = random.uniform_float(-9.0, 9.0), y = random.uniform_float(-9.0, 9.0);
-        points.push_back(x, y, random.uniform_float(low, high));
+        add_point(points, random.vector({-9.0, -9.0, low}, {9.0, 9.0, high}));
       }
     };
-    scatter(below, -9.0F, -1.6F);
-    scatter(above, 0.0F, 14.0F);
+    scatter(below, -9.0, -1.6);
+    scatter(above, 0.0, 14.0);
     return estimate_mounting(points).known;
   };
   CHECK(is_known(0, 0));
@@ -209,10 +198,7 @@ TEST_CASE("Height and tilt of every sensor in every simulated scene") {
     config.ego_points = i % 2 == 0;
     const Mounting mounting = estimate_mounting(buffer_of(sim::Simulator(config).scan(0).xyzi));
 
-    Eigen::Matrix3d R_body_sensor =
-        (Eigen::AngleAxisd(mount.pitch * kRadians, Eigen::Vector3d::UnitY()) *
-         Eigen::AngleAxisd(mount.roll * kRadians, Eigen::Vector3d::UnitX()))
-            .toRotationMatrix();
+    Eigen::Matrix3d R_body_sensor = slant(mount.pitch, mount.roll);
     if (config.sensor == sim::Sensor::kPandar64) {
       R_body_sensor = R_body_sensor * Eigen::AngleAxisd(90 * kRadians, Eigen::Vector3d::UnitZ());
     }

@@ -118,8 +118,8 @@ TEST_CASE("right poses of a drive are plausible, inverse and turned ones are not
   const auto first_doubt = [&](auto&& pose_of) {
     DynaInsRemover remover;
     for (const simulation::SimulatedScan& scan : scans) {
-      const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-      const FrameResult frame = remover.push(points, pose_of(scan.T_world_sensor), scan.time);
+      const FrameResult frame =
+          remover.push(points_of(scan), pose_of(scan.T_world_sensor), scan.time);
       if (frame.plausibility.suspicion != Suspicion::kNone) return frame.plausibility.suspicion;
     }
     return Suspicion::kNone;

@@ -24,8 +24,7 @@ constexpr double kDegrees = M_PI / 180.0;
 PoseCorrection new_correction() { return PoseCorrection(kTolerance); }
 
 std::vector<SimulatedScan> drive(Scene scene, Sensor sensor, int scans) {
-  const simulation::Config config = drive_of(scene, sensor, scans, 31);
-  return simulate(config);
+  return simulate(drive_of(scene, sensor, scans, 31));
 }
 
 GroundSplit split_of(const SimulatedScan& scan) { return test::split_of(buffer_of(scan.xyzi)); }
@@ -183,8 +182,8 @@ TEST_CASE("the covariance of the best fit explains its errors") {
   double largest_deviation = 0.0;
   for (int trial = 0; trial < 20; ++trial) {
     const auto draw = [&](double most) {
-      return Eigen::Vector3d(random.uniform(-most, most), random.uniform(-most, most),
-                             random.uniform(-most, most));
+      const Eigen::Vector3d high = Eigen::Vector3d::Constant(most);
+      return random.vector(-high, high);
     };
     PoseCorrection correction = after_all_but_last(scans);
     const Eigen::Vector3d metres = draw(0.1), turn = draw(0.2);
@@ -336,8 +335,6 @@ TEST_CASE("a scan of another place is lost, and a scan without points has no res
   CHECK((T.matrix() - scans.back().T_world_sensor.matrix()).norm() == 0.0);
 }
 
-namespace {
-
 // Number of `points` that lie on the planes which they make.
 std::size_t points_on_planes(const std::vector<Eigen::Vector3d>& points) {
   VoxelPlanes planes;
@@ -380,8 +377,6 @@ std::vector<Eigen::Vector3d> level_square(double z) {
   }
   return points;
 }
-
-}  // namespace
 
 TEST_CASE("noise along a beam makes no plane, ground of two beams does") {
   CHECK(points_on_planes(ground_of_beams(0.0)) == 0);

@@ -3,12 +3,9 @@
 // DYNAINS_ENDURANCE_SCANS=100000 test_reliability "[endurance]" is the long run.
 #include <unistd.h>
 
-#include "dynains/compiled_remover.hpp"
 #include "dynains/median.hpp"
 #include "support/catch.hpp"
-#include "support/random.hpp"
 #include "support/runs.hpp"
-#include "support/scene.hpp"
 
 namespace dynains::test {
 namespace {
@@ -40,8 +37,7 @@ std::vector<Scan> small_round(std::size_t count) {
 
 double resident_megabytes() {
   std::ifstream statm("/proc/self/statm");
-  double size = 0.0;
-  double resident = 0.0;
+  double size = 0.0, resident = 0.0;
   statm >> size >> resident;
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
@@ -58,8 +54,7 @@ TEST_CASE("a long run needs constant memory and time, and old scans have no infl
   };
 
   DynaInsRemover remover(config);
-  std::vector<double> first_times;
-  std::vector<double> last_times;
+  std::vector<double> first_times, last_times;
   double memory_before = 0.0;
   std::size_t map_before = 0;
   for (std::size_t i = 0; i + 1 < count; ++i) {
@@ -102,8 +97,7 @@ std::vector<Eigen::Vector3f> passing_street(double x) {
     const double elevation = (2.0 * ring - 15.0) * M_PI / 180.0;
     for (int column = 0; column < 120; ++column) {
       const double azimuth = 2.0 * M_PI * column / 120.0;
-      const Eigen::Vector3d ray(std::cos(azimuth) * std::cos(elevation),
-                                std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+      const Eigen::Vector3d ray = ray_of(elevation, azimuth);
       double range = ray.z() < 0.0 ? -1.7 / ray.z() : 40.0;
       const double to_wall = 8.0 / std::max(std::abs(ray.y()), 1e-9);
       const auto place = static_cast<std::uint32_t>(

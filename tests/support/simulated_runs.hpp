@@ -39,10 +39,8 @@ struct StaticByVerdict {
   StaticPoints newest, final;
 };
 
-/// All poses are multiplied by `T_moved_world` from the left.
-inline StaticByVerdict static_points(
-    const std::vector<simulation::SimulatedScan>& scans, const DynaInsRemover::Config& config = {},
-    const Eigen::Isometry3d& T_moved_world = Eigen::Isometry3d::Identity()) {
+inline StaticByVerdict static_points(const std::vector<simulation::SimulatedScan>& scans,
+                                     const DynaInsRemover::Config& config = {}) {
   StaticByVerdict result{StaticPoints(scans.size()), StaticPoints(scans.size())};
   const auto keep = [](const ScanVerdict& verdict, StaticPoints& points) {
     for (const PointLabel label : verdict.labels) {
@@ -50,13 +48,9 @@ inline StaticByVerdict static_points(
     }
   };
   DynaInsRemover remover(config);
-  for (const simulation::SimulatedScan& scan : scans) {
-    const RawPoints<float> points{scan.xyzi.data(), scan.xyzi.size() / 4, 4};
-    const FrameResult frame = remover.push(points, T_moved_world * scan.T_world_sensor, scan.time);
-    keep(frame.newest(), result.newest);
-    if (frame.finished) keep(*frame.finished, result.final);
-  }
-  remover.flush([&](const ScanVerdict& verdict) { keep(verdict, result.final); });
+  push_all(
+      remover, scans, [&](const FrameResult& frame) { keep(frame.newest(), result.newest); },
+      [&](const ScanVerdict& verdict) { keep(verdict, result.final); });
   return result;
 }
 
