@@ -177,9 +177,20 @@ TEST_CASE("an object on the ground may begin higher above it where beams are far
 // Result of a reference for a ground point at x.
 using Reference = std::function<BeamResult(float x)>;
 
+// For a sensor with this gap (deg) between two beams.
+MovedGround moved_ground_of(double gap) {
+  MovedGround moved{FreeSpaceConfig()};
+  SensorModel sensor = SensorModel::typical();
+  sensor.elevation_gap_wide = gap;
+  moved.adapt(sensor);
+  return moved;
+}
+
 // Indices of the ground points beside a removed box that are removed by the results of references.
+// `gap`: deg, between two beams.
 std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
-                                         const std::vector<Reference>& references) {
+                                         const std::vector<Reference>& references,
+                                         double gap = 0.1) {
   GroundSamples samples = samples_of(FreeSpaceConfig(), ground);
   for (const Reference& reference : references) {
     std::vector<BeamResult> seen;
@@ -188,7 +199,7 @@ std::set<std::uint32_t> ground_seen_free(const PointBuffer& ground,
     }
     samples.add(visibility_of(seen));
   }
-  return removed_with_box(MovedGround(FreeSpaceConfig()), ground, samples, Cause::kFreeSpace);
+  return removed_with_box(moved_ground_of(gap), ground, samples, Cause::kFreeSpace);
 }
 
 TEST_CASE("ground is removed if it is free in two references, however many hit it") {
@@ -206,6 +217,10 @@ TEST_CASE("ground is removed if it is free in two references, however many hit i
   CHECK(ground_seen_free(ground, {free}).empty());
   CHECK(ground_seen_free(ground, {free, free}) == all);
   CHECK(ground_seen_free(ground, {free, hit, hit, hit, hit, hit, hit, hit, free}) == all);
+  // Where beams are far apart, one reference is sufficient without a hit.
+  CHECK(ground_seen_free(ground, {free}, 2.0) == all);
+  CHECK(ground_seen_free(ground, {free, hit}, 2.0).empty());
+  CHECK(ground_seen_free(ground, {free, hit, free}, 2.0) == all);
   const Reference near_free = [](float x) {
     return x < 22.8F ? BeamResult::kFree : BeamResult::kUnknown;
   };
@@ -236,11 +251,7 @@ TEST_CASE("a pavement that references hit stays under a removed person") {
     for (const BeamResult result : references) {
       samples.add(visibility_of(std::vector<BeamResult>(samples.size(), result)));
     }
-    MovedGround moved{FreeSpaceConfig()};
-    SensorModel sensor = SensorModel::typical();
-    sensor.elevation_gap_wide = gap;
-    moved.adapt(sensor);
-    return removed_with_box(std::move(moved), ground, samples, Cause::kUnderInstance, person);
+    return removed_with_box(moved_ground_of(gap), ground, samples, Cause::kUnderInstance, person);
   };
   constexpr BeamResult kHit = BeamResult::kHit;
   CHECK(removed({}, 0.6) == all);

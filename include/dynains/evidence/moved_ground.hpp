@@ -181,13 +181,15 @@ class MovedGround {
     around_.assign(PointsView(around_points_).subview(0, count));
   }
 
-  // Sets `seen_` by GroundSamples::group_of; returns whether any voxel has moved.
+  // Sets `seen_` by GroundSamples::group_of; returns whether any voxel has moved. Where beams are
+  // far apart, few references have a beam near a sample: one is sufficient if no other one hit it.
   bool judge_samples(const GroundSamples& samples) {
     bool any = false;
     seen_.assign(samples.size() + 2, Seen::kUnknown);
     for (std::size_t sample = 0; sample < samples.size(); ++sample) {
       const std::uint8_t free = samples.free[sample], hit = samples.hit[sample];
-      if (free >= kMinFree) {
+      if (free >= kMinFree ||
+          (free > 0 && hit == 0 && !is_dense(samples.points.x[sample], samples.points.y[sample]))) {
         seen_[sample + 1] = Seen::kMoved;
         any = true;
       } else if (free == 0 && hit >= kMinHit) {
@@ -240,11 +242,15 @@ class MovedGround {
   std::uint64_t find_seen(PointsView block, std::uint64_t which, float z) const {
     std::uint64_t bits = 0;
     for_each_bit(which, [&](std::size_t k) {
-      const float range = std::sqrt(block.x[k] * block.x[k] + block.y[k] * block.y[k]);
-      const bool is_seen = range * clearance_.slope < kMaxGap && block.z[k] < z + rise_;
+      const bool is_seen = is_dense(block.x[k], block.y[k]) && block.z[k] < z + rise_;
       bits |= std::uint64_t{is_seen} << k;
     });
     return bits;
+  }
+
+  // Whether the gap between two beams is small at a horizontal place.
+  bool is_dense(float x, float y) const {
+    return std::sqrt(x * x + y * y) * clearance_.slope < kMaxGap;
   }
 
   static std::uint64_t all_of(PointsView block) {
