@@ -29,7 +29,7 @@ bool can_have_labels(const std::string& type);
 /// The cloud without the points whose `keep` is 0, in their order, with all their fields. A
 /// PointCloud2 gets one row. Throws IoError that begins with the place of the message, also if
 /// `keep` has not one value for each point.
-std::string without_points(const std::string& type, const SerialisedMessage& cloud,
+std::string without_points(const std::string& type, const SerialisedMessage& message,
                            Span<const std::uint8_t> keep);
 
 /// A PointCloud2 with `labels` as its last field, `label` of type uint8. A point takes four more
