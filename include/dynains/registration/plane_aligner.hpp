@@ -40,10 +40,12 @@ void visit_some(const GroundSplit& split, std::size_t wanted, Visit&& visit) {
 
 /// At most 3,000 points of a scan for an alignment, m, sensor frame.
 inline void select_points(const GroundSplit& split, PointBuffer& points) {
-  points.clear();
-  visit_some(split, 3000, [&](std::size_t i, double, double, double) {
-    points.push_back(split.points.x[i], split.points.y[i], split.points.z[i]);
-  });
+  constexpr std::size_t kSelected = 3000;
+  points.resize(kSelected);
+  std::size_t count = 0;
+  visit_some(split, kSelected,
+             [&](std::size_t i, double, double, double) { points.set(count++, split.points, i); });
+  points.resize(count);
 }
 
 /// Result of an alignment.

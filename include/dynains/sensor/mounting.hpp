@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -118,11 +119,30 @@ class MountingEstimator {
  private:
   static constexpr GroundSearch kSearch{};
 
-  static bool is_near(PointsView points, std::size_t i) {
-    const float x = points.x[i], y = points.y[i], z = points.z[i];
-    const float range = std::sqrt(x * x + (y * y + z * z));
-    return range > kSearch.min_distance && range < kSearch.max_distance;
-  }
+  // Up to kWordBits points: bits of those between the distances of kSearch, and the cells of all.
+  struct Block {
+    std::uint64_t near = 0;
+    std::array<std::array<std::int32_t, kWordBits + kPackWidth>, 3> cell;
+
+    explicit Block(PointsView points) {
+      static constexpr PackConstant kPerMetre(static_cast<float>(1.0 / kSearch.cell)),
+          kMin(static_cast<float>(kSearch.min_distance)),
+          kMax(static_cast<float>(kSearch.max_distance));
+      with_packs([&](auto packs) {
+        for_slices<decltype(packs)>(0, points.size(), [&](const auto& at) {
+          const auto x = at.load(points.x.data());
+          const auto y = at.load(points.y.data());
+          const auto z = at.load(points.z.data());
+          const auto range = sqrt(x * x + (y * y + z * z));
+          near |= std::uint64_t{((range > kMin) & (range < kMax)).bits()} << at.begin;
+          floor(x * kPerMetre).store(&cell[0][at.begin]);
+          floor(y * kPerMetre).store(&cell[1][at.begin]);
+          floor(z * kPerMetre).store(&cell[2][at.begin]);
+        });
+      });
+      if (points.size() < kWordBits) near &= (std::uint64_t{1} << points.size()) - 1;
+    }
+  };
 
   // Mean of the points in each occupied cell, in random order, so that any subrange is a random
   // sample.
@@ -135,16 +155,19 @@ class MountingEstimator {
     VoxelHashTable<> number;  // by cell
     std::vector<Sum> sums;
     std::uint32_t at = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!is_near(points, i)) continue;
-      const double p[3] = {points.x[i], points.y[i], points.z[i]};
-      const VoxelKey cell = voxel_at(p, kSearch.cell);
-      if (at >= sums.size() || sums[at].cell != cell) at = number.insert(cell);
-      if (at == sums.size()) sums.push_back({cell, 0.0, 0.0, 0.0, 0.0});
-      sums[at].x += p[0];
-      sums[at].y += p[1];
-      sums[at].z += p[2];
-      sums[at].count += 1.0;
+    for (std::size_t begin = 0; begin < points.size(); begin += kWordBits) {
+      const PointsView some = points.subview(begin, std::min(kWordBits, points.size() - begin));
+      const Block block(some);
+      for_each_bit(block.near, [&](std::size_t i) {
+        const VoxelKey cell = voxel_key(block.cell[0][i], block.cell[1][i], block.cell[2][i]);
+        if (at >= sums.size() || sums[at].cell != cell) at = number.insert(cell);
+        if (at == sums.size()) sums.push_back({cell, 0.0, 0.0, 0.0, 0.0});
+        Sum& sum = sums[at];
+        sum.x += static_cast<double>(some.x[i]);
+        sum.y += static_cast<double>(some.y[i]);
+        sum.z += static_cast<double>(some.z[i]);
+        sum.count += 1.0;
+      });
     }
     // Makes the result independent of the order of the points.
     std::sort(sums.begin(), sums.end(), [](const Sum& a, const Sum& b) { return a.cell < b.cell; });
@@ -183,8 +206,10 @@ class MountingEstimator {
   }
 
   // Score of a plane: the weighted number of cells on it, minus half the number of cells below it.
-  // For a plane that cannot reach `best` some number that is no larger.
+  // For a plane that cannot reach `best`, or by the cells so far does so with a probability below
+  // 1e-9 (Hoeffding, J. Am. Stat. Assoc. 58(301), 1963), some number that is no larger.
   float score(const GroundHypothesis& ground, float best) const {
+    constexpr float kDeviation = 4.83F;  // 1.5 sqrt(ln(1e9) / 2): of scores in [-0.5, 1]
     // Ignores the cells of the last, incomplete pack.
     const std::size_t count = scored_.size() / kPackWidth * kPackWidth;
     float found = 0.0F;
@@ -209,6 +234,10 @@ class MountingEstimator {
         }
         found = sum(total);
         if (found + static_cast<float>(count - end) <= best) return;
+        const auto tested = static_cast<float>(end);
+        if (found + kDeviation * std::sqrt(tested) <= best / static_cast<float>(count) * tested) {
+          return;
+        }
       }
     });
     return found;
