@@ -3,7 +3,6 @@
 // requires no library and supports custom stages.
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <limits>
 #include <memory>

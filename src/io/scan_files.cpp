@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "byte_reader.hpp"
-#include "dynains/io/point_file.hpp"
 #include "dynains/median.hpp"
 #include "text.hpp"
 

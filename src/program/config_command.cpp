@@ -4,7 +4,6 @@
 
 #include "command.hpp"
 #include "dynains/compiled_remover.hpp"
-#include "parameter_flags.hpp"
 #include "run/run_settings.hpp"
 
 namespace dynains::program {

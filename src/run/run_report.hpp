@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "dynains/verdict.hpp"
-#include "run/output/output_folder.hpp"
 #include "run_plan.hpp"
 #include "run_timing.hpp"
 

@@ -7,8 +7,8 @@
 #include "dynains/errors.hpp"
 #include "dynains/io/kitti.hpp"
 #include "dynains/simd/pack_loops.hpp"
+#include "io/folder.hpp"
 #include "io/points/finite_points.hpp"
-#include "run/output/output_folder.hpp"
 
 namespace dynains::run {
 

@@ -1,6 +1,5 @@
 #include "write_view.hpp"
 
-#include <algorithm>
 #include <limits>
 #include <set>
 #include <string>

@@ -1,7 +1,6 @@
 // A map of many sessions in a folder: the contributions of all sessions.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <string>

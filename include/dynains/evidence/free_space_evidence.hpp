@@ -4,7 +4,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

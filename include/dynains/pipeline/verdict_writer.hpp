@@ -2,7 +2,6 @@
 // determines the label and the keep flag.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -1,7 +1,6 @@
 // A list of numbers of 32 bits in about half of its memory.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

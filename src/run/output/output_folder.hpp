@@ -16,7 +16,6 @@
 #include <ostream>
 #include <set>
 #include <string>
-#include <type_traits>
 #include <utility>
 
 #include "dynains/errors.hpp"
