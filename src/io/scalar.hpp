@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 
 namespace dynains {
@@ -23,6 +24,8 @@ inline float to_float(double value) {
 }
 
 enum class Scalar : std::uint8_t {
+  kFloat,
+  kDouble,
   kInt8,
   kUint8,
   kInt16,
@@ -30,41 +33,19 @@ enum class Scalar : std::uint8_t {
   kInt32,
   kUint32,
   kInt64,
-  kUint64,
-  kFloat,
-  kDouble
+  kUint64
 };
-
-inline constexpr Scalar kScalars[] = {
-    Scalar::kInt8,   Scalar::kUint8, Scalar::kInt16,  Scalar::kUint16, Scalar::kInt32,
-    Scalar::kUint32, Scalar::kInt64, Scalar::kUint64, Scalar::kFloat,  Scalar::kDouble};
+/// In the order of Scalar.
+using Scalars = std::tuple<float, double, std::int8_t, std::uint8_t, std::int16_t, std::uint16_t,
+                           std::int32_t, std::uint32_t, std::int64_t, std::uint64_t>;
 
 /// Calls `use(zero)` with a zero of the type.
-template <class Use>
+template <std::size_t kNumber = 0, class Use>
 auto with_type(Scalar type, Use&& use) {
-  switch (type) {
-    case Scalar::kInt8:
-      return use(std::int8_t{});
-    case Scalar::kUint8:
-      return use(std::uint8_t{});
-    case Scalar::kInt16:
-      return use(std::int16_t{});
-    case Scalar::kUint16:
-      return use(std::uint16_t{});
-    case Scalar::kInt32:
-      return use(std::int32_t{});
-    case Scalar::kUint32:
-      return use(std::uint32_t{});
-    case Scalar::kInt64:
-      return use(std::int64_t{});
-    case Scalar::kUint64:
-      return use(std::uint64_t{});
-    case Scalar::kFloat:
-      return use(float{});
-    case Scalar::kDouble:
-      break;
+  if constexpr (kNumber + 1 < std::tuple_size_v<Scalars>) {
+    if (static_cast<std::size_t>(type) != kNumber) return with_type<kNumber + 1>(type, use);
   }
-  return use(double{});
+  return use(std::tuple_element_t<kNumber, Scalars>());
 }
 
 inline std::size_t size_of(Scalar type) {
@@ -74,7 +55,8 @@ inline std::size_t size_of(Scalar type) {
 /// The type of that kind, 'i' for signed, 'u' for unsigned and 'f' for floating-point numbers, and
 /// size in bytes; nothing if there is none.
 inline std::optional<Scalar> scalar_of(char kind, std::size_t size) {
-  for (const Scalar type : kScalars) {
+  for (std::size_t i = 0; i < std::tuple_size_v<Scalars>; ++i) {
+    const auto type = static_cast<Scalar>(i);
     const char its_kind = with_type(type, [](auto zero) {
       using Number = decltype(zero);
       if (std::is_floating_point_v<Number>) return 'f';
