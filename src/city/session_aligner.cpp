@@ -8,7 +8,6 @@
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "dynains/surfaces/motion_size.hpp"
 #include "dynains/surfaces/scan_registration.hpp"
 #include "io/text.hpp"
 

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "dynains/surfaces/motion_size.hpp"
-
 namespace dynains {
 namespace {
 

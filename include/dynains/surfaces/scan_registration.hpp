@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -17,6 +18,18 @@ namespace dynains {
 // Not aligned, since the alignment of the types of Eigen depends on flags.
 using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
+
+using detail::kLever;
+
+/// Angle of a rotation, rad, [0, pi].
+inline double angle_of(const Eigen::Matrix3d& R) {
+  return std::abs(Eigen::AngleAxisd(detail::Quaternion(R)).angle());
+}
+
+/// Size of a motion, m, for points kLever away.
+inline double extent_of(const Pose& T) {
+  return std::hypot(T.translation().norm(), kLever * angle_of(T.linear()));
+}
 
 /// One scan as a reference and as a source of a registration.
 class RegistrationScan {

@@ -8,7 +8,6 @@
 
 #include "dynains/pose.hpp"
 #include "dynains/sensor/plane_fit.hpp"
-#include "dynains/surfaces/motion_size.hpp"
 #include "dynains/voxels/voxel_hash_table.hpp"
 
 namespace dynains {
@@ -60,7 +59,7 @@ class SurfaceGrid {
 
   bool empty() const { return levels_.back().cells.empty(); }
   /// Distance (m) at which a turn moves points as far as is usual in the scene.
-  double lever() const { return scale_ * kLever; }
+  double lever() const { return scale_ * detail::kLever; }
   /// Least eigenvalue of normal equations whose direction is determined, in points whose distance
   /// changes as much as the motion. Clutter determines every direction a little.
   double min_determined() const { return with_clutter_ ? 2.0 : 0.01; }

@@ -7,12 +7,11 @@
 #include <optional>
 #include <ostream>
 
-#include "dynains/errors.hpp"
 #include "dynains/evidence/free_space_config.hpp"
 #include "dynains/parameters.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/surfaces/landmarks.hpp"
-#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/surfaces/scan_registration.hpp"
 #include "io/text.hpp"
 #include "run/recorded_scans.hpp"
 
