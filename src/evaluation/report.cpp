@@ -1,5 +1,3 @@
-#include "dynains/evaluation/report.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dynains/evaluation/evaluate.hpp"
 #include "dynains/evaluation/scores.hpp"
 
 namespace dynains::evaluation {

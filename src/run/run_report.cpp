@@ -9,7 +9,7 @@
 #include <locale>
 #include <map>
 
-#include "dynains/evaluation/report.hpp"
+#include "dynains/evaluation/evaluate.hpp"
 #include "dynains/io/atomic_file.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "run_results.hpp"

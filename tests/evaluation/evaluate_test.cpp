@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "dynains/errors.hpp"
-#include "dynains/evaluation/report.hpp"
 #include "evaluation/point_protocol.hpp"
 #include "reference.hpp"
 #include "scenes.hpp"

@@ -4,7 +4,6 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/evaluation/evaluate.hpp"
-#include "dynains/evaluation/report.hpp"
 #include "reference.hpp"
 #include "scenes.hpp"
 #include "support/catch.hpp"
