@@ -1,16 +1,16 @@
-// Occupancy grids: where a robot can drive, seen from above.
+// Occupancy grids: where a robot can drive, seen from above. Their files.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <vector>
 
 #include "dynains/parameters.hpp"
 #include "dynains/points.hpp"
-#include "grid/columns.hpp"
 #include "grid/floors.hpp"
 
 namespace dynains::grid {
@@ -96,5 +96,11 @@ class GridMaker {
   std::vector<Cell> cells_;
   std::vector<std::int32_t> begun_;  // by azimuth and range: free from here on, minus from here not
 };
+
+/// Writes an image (PGM) and its description (YAML), mode `trinary`, as the map server of nav2
+/// reads them, each whole or not at all. `origin`: m, world frame, of the positions of the grid.
+/// Throws IoError.
+void write_grid(const std::filesystem::path& image, const std::filesystem::path& description,
+                const OccupancyGrid& grid, const Eigen::Vector2d& origin);
 
 }  // namespace dynains::grid

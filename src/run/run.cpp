@@ -16,7 +16,6 @@
 #include "dynains/compiled_remover.hpp"
 #include "dynains/errors.hpp"
 #include "estimate_poses.hpp"
-#include "grid/grid_file.hpp"
 #include "interrupt.hpp"
 #include "log_output.hpp"
 #include "recorded_scans.hpp"

@@ -1,5 +1,4 @@
-#include "grid/grid_file.hpp"
-
+#include "grid/grid_maker.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 
