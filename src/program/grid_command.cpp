@@ -7,9 +7,8 @@
 
 #include "command.hpp"
 #include "dynains/errors.hpp"
-#include "grid/grid_file.hpp"
 #include "parameter_flags.hpp"
-#include "progress.hpp"
+#include "program.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/verdict_files.hpp"

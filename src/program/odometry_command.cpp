@@ -5,7 +5,7 @@
 #include "command.hpp"
 #include "dynains/compiled_remover.hpp"
 #include "parameter_flags.hpp"
-#include "progress.hpp"
+#include "program.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/remarks/recording_check.hpp"
 #include "run/remarks/run_doubts.hpp"

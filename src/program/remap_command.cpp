@@ -13,7 +13,7 @@
 #include "dynains/map/static_map_accumulator.hpp"
 #include "dynains/pose.hpp"
 #include "parameter_flags.hpp"
-#include "progress.hpp"
+#include "program.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/output_folder.hpp"
 #include "run/recorded_scans.hpp"

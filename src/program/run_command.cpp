@@ -7,7 +7,7 @@
 
 #include "command.hpp"
 #include "parameter_flags.hpp"
-#include "progress.hpp"
+#include "program.hpp"
 #include "run/interrupt.hpp"
 #include "run/run.hpp"
 #include "run/run_plan.hpp"

@@ -1,8 +1,7 @@
 #include "command.hpp"
 #include "dynains/errors.hpp"
 #include "parameter_flags.hpp"
-#include "progress.hpp"
-#include "run/run_settings.hpp"
+#include "program.hpp"
 
 namespace dynains::program {
 

@@ -6,7 +6,6 @@
 #include "dynains/errors.hpp"
 #include "program/parameter_flags.hpp"
 #include "program/program.hpp"
-#include "program/progress.hpp"
 #include "run/interrupt.hpp"
 #include "run/output/output_folder.hpp"
 #include "simulation/simulator.hpp"

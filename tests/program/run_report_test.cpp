@@ -1,6 +1,6 @@
 #include "run/run_report.hpp"
 
-#include "program/progress.hpp"
+#include "program/program.hpp"
 #include "run/verdict_files.hpp"
 #include "support/catch.hpp"
 
