@@ -1,5 +1,3 @@
-#include "recording.hpp"
-
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 

@@ -10,7 +10,6 @@
 #include <string>
 
 #include "dynains/errors.hpp"
-#include "recording.hpp"
 #include "run/run_plan.hpp"
 #include "run/write_view.hpp"
 #include "settings.hpp"

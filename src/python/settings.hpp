@@ -1,13 +1,16 @@
 // Parameters and settings by name, from the one list of fields of each: keyword arguments have the
-// names of the flags of the program, with underscores. A value may be the text of the flag.
+// names of the flags of the program, with underscores. A value may be the text of the flag. Also
+// the recording that keyword arguments open.
 #pragma once
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <memory>
 #include <string>
 
 #include "dynains/errors.hpp"
+#include "dynains/io/recording.hpp"
 #include "dynains/parameters.hpp"
 #include "run/settings/parameter_values.hpp"
 #include "run/settings/recording_settings.hpp"
@@ -88,5 +91,26 @@ void add_properties(Class& bound) {
 /// Settings with the keyword arguments `values`. Throws ConfigError, also for an unknown name,
 /// IoError for a file of an extrinsic calibration.
 run::RecordingSettings to_recording_settings(const py::dict& values);
+
+struct SharedRecording {
+  const Recording recording;  ///< several threads may read
+  const py::dict options;     ///< keyword arguments that it was opened with
+  const run::RecordingSettings settings;
+
+  /// Calls `work` with the recording, without the interpreter's lock.
+  template <class Work>
+  auto read(Work&& work) const {
+    const py::gil_scoped_release release;
+    return work(recording);
+  }
+};
+
+/// Opens a recording with keyword arguments, or takes an open one, to which none may be given.
+std::shared_ptr<SharedRecording> to_recording(const py::object& recording, const py::dict& options);
+
+/// A RuntimeWarning; throws if the caller has made an error of it.
+void warn(const std::string& text);
+/// Recording::warnings() as such.
+void show_warnings(const Recording& recording);
 
 }  // namespace dynains::python

@@ -13,7 +13,7 @@
 #include "interrupt.hpp"
 #include "io/logs/log_copy.hpp"
 #include "io/logs/log_scans.hpp"
-#include "io/points/point_file_copy.hpp"
+#include "io/points/point_sink.hpp"
 
 namespace dynains::run {
 namespace {

@@ -1,7 +1,6 @@
 // Copies of point files keep every byte of the points that stay.
-#include "io/points/point_file_copy.hpp"
-
 #include "io/files.hpp"
+#include "io/points/point_sink.hpp"
 #include "support/catch.hpp"
 
 using namespace dynains;

@@ -1,6 +1,5 @@
 #include "dynains/io/trajectory.hpp"
 
-#include "dynains/io/pose_convention.hpp"
 #include "io/files.hpp"
 #include "support/catch.hpp"
 

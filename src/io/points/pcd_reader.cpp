@@ -9,7 +9,6 @@
 #include "../scalar.hpp"
 #include "../text.hpp"
 #include "lzf.hpp"
-#include "point_file_copy.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

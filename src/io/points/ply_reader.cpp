@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,7 +9,6 @@
 #include "../failure.hpp"
 #include "../scalar.hpp"
 #include "../text.hpp"
-#include "point_file_copy.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

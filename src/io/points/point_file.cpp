@@ -12,7 +12,6 @@
 #include "../failure.hpp"
 #include "../scalar.hpp"
 #include "../text.hpp"
-#include "point_file_copy.hpp"
 #include "point_sink.hpp"
 
 namespace dynains {

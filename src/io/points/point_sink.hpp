@@ -1,11 +1,14 @@
-// The readers of point files, one for each format, what they store values in, and the parts of LAS.
+// The readers of point files, one for each format, what they store values in, the parts of LAS, and
+// copies of point files without some of their points.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,8 +16,11 @@
 #include "../scalar.hpp"
 #include "../text.hpp"
 #include "dynains/io/point_file.hpp"
+#include "dynains/points.hpp"
 
 namespace dynains {
+
+class ByteReader;
 
 /// Meaning of a column.
 enum class Role : std::uint8_t { kX, kY, kZ, kIntensity, kRing, kTime, kLabel, kSensor, kNone };
@@ -152,5 +158,28 @@ std::string las_header(const std::filesystem::path& path, const LasOptions& opti
 /// The bytes of a point, which widens the limits. Throws IoError.
 std::string las_record(const std::filesystem::path& path, const LasOptions& options,
                        const FilePoint& point, LasSteps& least, LasSteps& most);
+
+/// Writes the PLY, PCD or raw file (.bin) `path` to `target` without some of its points. All
+/// columns and comments stay as they are; compressed points of PCD become binary ones. `keep`: for
+/// each point of read_points(), 0 if it is left out. Throws IoError, also for a PLY file that has
+/// more than points, such as faces.
+void copy_points(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+                 std::ostream& target);
+
+/// Writes the first `size` bytes of `path`, lines of text, with `edit` applied to each of them.
+void copy_lines(const std::filesystem::path& path, std::uint64_t size, std::ostream& target,
+                const std::function<std::string(const std::string&)>& edit);
+
+/// Copies the records that `keep` names from where `reader` is: lines if `size` is 0, else `size`
+/// bytes each. `record`: the name of one in errors, for example "a point".
+void copy_records(ByteReader& reader, std::size_t size, const char* record,
+                  Span<const std::uint8_t> keep, std::ostream& target);
+/// Number of records that `keep` names.
+std::size_t kept_count(Span<const std::uint8_t> keep);
+
+void copy_ply(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target);
+void copy_pcd(const std::filesystem::path& path, Span<const std::uint8_t> keep,
+              std::ostream& target);
 
 }  // namespace dynains
