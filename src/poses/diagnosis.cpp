@@ -10,16 +10,12 @@
 
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
-#include "dynains/poses/ray_origin.hpp"
-#include "dynains/poses/turns.hpp"
 #include "dynains/surfaces/landmarks.hpp"
-#include "dynains/surfaces/motion_size.hpp"
 #include "dynains/surfaces/scan_registration.hpp"
 #include "dynains/surfaces/surface_grid.hpp"
 #include "dynains/threads/in_two_threads.hpp"
 #include "io/points/finite_points.hpp"
 #include "pose_fit.hpp"
-#include "readings.hpp"
 
 namespace dynains {
 namespace {

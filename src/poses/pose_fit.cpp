@@ -8,7 +8,6 @@
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
 #include "dynains/surfaces/landmarks.hpp"
-#include "dynains/surfaces/motion_size.hpp"
 #include "dynains/surfaces/way_search.hpp"
 #include "dynains/threads/in_two_threads.hpp"
 #include "io/points/finite_points.hpp"

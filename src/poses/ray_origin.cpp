@@ -1,8 +1,7 @@
-#include "dynains/poses/ray_origin.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 

@@ -1,5 +1,3 @@
-#include "readings.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +8,7 @@
 
 #include "dynains/median.hpp"
 #include "io/points/finite_points.hpp"
+#include "pose_fit.hpp"
 
 namespace dynains {
 namespace {

@@ -1,9 +1,7 @@
-#include "dynains/poses/sensor_agreement.hpp"
-
 #include <algorithm>
 #include <cstddef>
 
-#include "dynains/surfaces/motion_size.hpp"
+#include "dynains/poses/diagnosis.hpp"
 #include "dynains/surfaces/scan_registration.hpp"
 #include "dynains/surfaces/surface_grid.hpp"
 

@@ -1,5 +1,3 @@
-#include "dynains/poses/turns.hpp"
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "dynains/median.hpp"
+#include "dynains/poses/diagnosis.hpp"
 
 namespace dynains {
 namespace {

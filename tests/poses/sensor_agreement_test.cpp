@@ -1,8 +1,7 @@
 // Sensors of a rig agree under their exact poses; a wrong pose of one is reported.
-#include "dynains/poses/sensor_agreement.hpp"
-
 #include "dynains/io/kitti.hpp"
 #include "dynains/io/recording.hpp"
+#include "dynains/poses/diagnosis.hpp"
 #include "io/files.hpp"
 #include "simulation/simulator.hpp"
 #include "simulation/write_sequence.hpp"

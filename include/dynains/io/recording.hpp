@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "dynains/io/point_file.hpp"
-#include "dynains/io/pose_convention.hpp"
 #include "dynains/io/trajectory.hpp"
 #include "dynains/pose.hpp"
 

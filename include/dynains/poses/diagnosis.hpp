@@ -1,12 +1,17 @@
 // Check of the poses of a recording: do its scans agree under them, under which others would they,
-// and how inexact are they?
+// and how inexact are they? Also of what else its clouds mean: where their beams begin, how far
+// these go around, and whether several sensors agree.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <optional>
+#include <vector>
 
 #include "dynains/io/recording.hpp"
+#include "dynains/pose.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/surfaces/landmarks.hpp"
 
@@ -79,5 +84,35 @@ bool are_poses_exact(const Recording& recording);
 /// options. `pairs`: number of registered pairs of neighbours after which it stops if nearly all
 /// are exact. Throws IoError.
 Diagnosis diagnose(const Recording& recording, std::size_t pairs = 6);
+
+/// Position (m, frame of the clouds in the files) at which the beams of a spinning sensor begin, if
+/// it lies elsewhere than the recording says: points of one beam have one elevation (a ring is a
+/// cone) from there, and clearly not from the origin of the scans. Scans at three places have to
+/// agree about it. Empty if the origin is right, or if the pattern or the scene do not determine
+/// it. Throws IoError.
+std::optional<Eigen::Vector3d> other_ray_origin(const Recording& recording);
+
+/// Ratio of a turn by which the clouds of the scans `first` to `last` are more than one, so that
+/// both ends show one place at two times; 0 if less than 1.5 deg, if they are de-skewed or of
+/// several sensors, or if their points are not in the order of a turn. Throws IoError.
+double overlap_of_turns(const Recording& recording, std::size_t first, std::size_t last);
+
+/// Findings on one sensor of several.
+struct SensorAgreement {
+  double points = 0.0;         ///< returns of a scan
+  double fit_of_scans = 0.0;   ///< of its points at its surfaces in other scans, as in Registration
+  double fit_of_others = 0.0;  ///< of its points at the surfaces of the other sensors
+  /// Its pose in the frame of the clouds by a registration to the surfaces of the other sensors.
+  /// Along directions that they do not determine, that of the recording stays.
+  Pose T_cloud_sensor = Pose::Identity();
+  double distance = 0.0;  ///< m, from the pose of the recording
+  double angle = 0.0;     ///< rad
+
+  /// Whether the pose of the recording is off by more than 3 cm or 0.3 deg.
+  bool is_off() const { return distance > 0.03 || angle > 0.3 * M_PI / 180.0; }
+};
+
+/// By sensor of the recording; empty for one alone. Reads a sample of the scans. Throws IoError.
+std::vector<SensorAgreement> compare_sensors(const Recording& recording);
 
 }  // namespace dynains

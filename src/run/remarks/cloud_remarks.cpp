@@ -14,7 +14,6 @@
 #include "dynains/errors.hpp"
 #include "dynains/median.hpp"
 #include "dynains/poses/diagnosis.hpp"
-#include "dynains/poses/turns.hpp"
 #include "dynains/sensor/mounting.hpp"
 #include "dynains/surfaces/landmarks.hpp"
 #include "dynains/threads/in_two_threads.hpp"

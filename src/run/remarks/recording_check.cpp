@@ -10,8 +10,6 @@
 
 #include "cloud_remarks.hpp"
 #include "dynains/io/trajectory.hpp"
-#include "dynains/poses/ray_origin.hpp"
-#include "dynains/poses/sensor_agreement.hpp"
 #include "io/text.hpp"
 #include "run/settings/parameter_values.hpp"
 #include "run/settings/recording_settings.hpp"
