@@ -138,6 +138,16 @@ TEST_CASE("Labels become the last field of a cloud, and all others are as they w
   }
 }
 
+TEST_CASE("A cloud with labels of another name gets none, for readers take the first ones") {
+  for (const std::string name : {"LABEL", "class", "scalar_label"}) {
+    CAPTURE(name);
+    const std::string cloud =
+        cloud_message(MessageEncoding::kCdr, 1.5, "lidar", xyz_and({{name, 12, 4}}), 14, point(0));
+    const auto message = serialised(cloud, MessageEncoding::kCdr);
+    CHECK_THROWS_AS(marked_with(kCloud, message, Values{9}), IoError);
+  }
+}
+
 TEST_CASE("A message of Livox without some points is as if it never had them") {
   for (const auto encoding : {MessageEncoding::kRos1, MessageEncoding::kCdr}) {
     const std::string all = livox_message(encoding, {0, 1, 2, 3});

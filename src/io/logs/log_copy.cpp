@@ -1,6 +1,5 @@
 #include "log_copy.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <limits>
@@ -85,9 +84,8 @@ std::string with_labels(const std::string& type, const SerialisedMessage& messag
   }
   const MessageCloud cloud(type, message);
   check_count(cloud, labels.size());
-  const std::vector<std::string>& names = cloud.field_names();
-  if (std::find(names.begin(), names.end(), kLabelField) != names.end()) {
-    cloud.fail("expected no field \"label\", which is to be added");
+  if (cloud.field(Role::kLabel).is_there) {
+    cloud.fail("expected no field \"label\", nor labels by another name, as one is to be added");
   }
   std::string points;
   for (std::size_t i = 0; i < labels.size(); ++i) {
@@ -102,7 +100,7 @@ std::string with_labels(const std::string& type, const SerialisedMessage& messag
   const std::size_t begin = field.bytes().size();
   field.string(kLabelField).number(cloud.point_size()).number(datatype_of(Scalar::kUint8));
   field.number(std::uint32_t{1});
-  put(cloud.places().height + 8, static_cast<std::uint32_t>(names.size() + 1), result);
+  put(cloud.places().height + 8, cloud.field_count() + 1, result);
   return result.insert(cloud.places().fields_end, field.bytes(), begin);
 }
 

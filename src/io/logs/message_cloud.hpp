@@ -7,7 +7,6 @@
 #include <iterator>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "../points/point_sink.hpp"
 #include "../scalar.hpp"
@@ -70,8 +69,8 @@ class MessageCloud {
     std::size_t data = 0, data_end = 0;  ///< steps and sizes lie before them
   };
   const Places& places() const { return places_; }
-  /// The names of all fields of a PointCloud2, in the order of the message.
-  const std::vector<std::string>& field_names() const { return field_names_; }
+  /// Number of all fields of a PointCloud2.
+  std::uint32_t field_count() const { return field_count_; }
 
   /// By its name.
   const Field& field(Role role) const { return fields_[static_cast<std::size_t>(role)]; }
@@ -120,9 +119,9 @@ class MessageCloud {
   }
   void read_fields() {
     // Each has 13 bytes or more: length of the name, offset, datatype, count.
-    field_names_.resize(in_.length(13, "fields"));
-    for (std::string& name : field_names_) {
-      name = in_.string("a field name");
+    field_count_ = in_.length(13, "fields");
+    for (std::uint32_t i = 0; i < field_count_; ++i) {
+      const std::string name = in_.string("a field name");
       const auto offset = in_.number<std::uint32_t>("a field offset");
       const auto datatype = in_.number<std::uint8_t>("a field datatype");
       in_.number<std::uint32_t>("a field count");
@@ -165,7 +164,7 @@ class MessageCloud {
   std::uint64_t point_size_ = 0, point_step_ = 0, row_step_ = 0;  // bytes
   std::optional<std::uint8_t> sensor_;
   const std::uint8_t* data_ = nullptr;
-  std::vector<std::string> field_names_;
+  std::uint32_t field_count_ = 0;
   Places places_;
 };
 
