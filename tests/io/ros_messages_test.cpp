@@ -76,6 +76,16 @@ TEST_CASE("Clouds may be big-endian, and their row step may be that of another c
              ContainsSubstring("expected 2 rows of 4000 bytes, found 52 bytes"));
 }
 
+TEST_CASE("Coordinates beyond the range of float become infinite") {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::vector<CloudField> fields = {{"x", 0, 8}, {"y", 8, 8}, {"z", 16, 8}};
+  const std::string message =
+      cloud_message(MessageEncoding::kCdr, 1.0, "l", fields, 24, packed(1e300, -1e300, kInfinity));
+  const auto infinite = static_cast<float>(kInfinity);
+  CHECK(decode(message, MessageEncoding::kCdr).xyzi ==
+        std::vector<float>{infinite, -infinite, infinite, 0.0F});
+}
+
 TEST_CASE("Livox messages are read as clouds") {
   for (const MessageEncoding encoding : kBoth) {
     MessageWriter out(encoding);

@@ -102,7 +102,7 @@ void read_cloud(const std::string& type, const SerialisedMessage& message, Recor
     float* const xyzi = scan.xyzi.data() + 4 * i;
     for (std::size_t k = 0; k < std::size(kUsualRoles); ++k) {
       const MessageCloud::Field& field = cloud.field(kUsualRoles[k]);
-      xyzi[k] = field.is_there ? static_cast<float>(field.value(point)) : 0.0F;
+      xyzi[k] = field.is_there ? to_float(field.value(point)) : 0.0F;
     }
     if (ring.is_there) scan.ring[i] = ring_number(ring.value(point));
     if (time.is_there) scan.time[i] = time.value(point);

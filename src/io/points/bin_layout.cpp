@@ -161,7 +161,7 @@ void read_bin_points(const std::filesystem::path& file, const BinLayout& layout,
   xyzi.assign(4 * static_cast<std::size_t>(count), 0.0F);
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t column = 0; column < columns; ++column) {
-      xyzi[4 * i + column] = static_cast<float>(value_at(bytes, layout, i, column));
+      xyzi[4 * i + column] = to_float(value_at(bytes, layout, i, column));
     }
     if (ring != nullptr) ring->push_back(ring_number(value_at(bytes, layout, i, columns)));
   }
