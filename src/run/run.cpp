@@ -231,7 +231,6 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
     session.emplace(City::open_or_make(request.city, request.grid), request.info);
   }
 
-  const InterruptGuard interrupt(listener.second_signal);
   const RunOutputs& outputs = settings.outputs;
   std::optional<viewer::Page> page;
   PointStore labels(outputs.folder);  // final ones, for what reads the recording again
@@ -293,6 +292,7 @@ RunOutcome write_results(const RunPlan& plan, const RunSettings& settings,
 
 RunOutcome run(const RunSettings& settings, Recording recording, const RunListener& listener) {
   const RunPlan plan = make_plan(settings, std::move(recording));
+  const InterruptGuard interrupt(listener.second_signal);
   OutputFolder out(plan.settings.outputs.folder, kRunOutput, plan.listing, settings.force,
                    plan.inputs);
   return write_results(plan, begin_outputs(plan, out), listener, out);

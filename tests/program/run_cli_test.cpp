@@ -16,10 +16,10 @@ struct Fixture : RunFolder {
   explicit Fixture(std::size_t scans = 12) { write_tiny_sequence(seq, scans); }
   std::size_t labels() const { return count_entries(out + "/labels"); }
   std::string scan_file(std::size_t i) const { return seq + "/velodyne/" + scan_name(i) + ".bin"; }
-  void await_first_scan() const {
-    for (int i = 0; i < 60000 && !fs::exists(out + ".partial/labels/000000.label"); ++i) {
-      ::usleep(1000);
-    }
+  void await_first_scan() const { await("labels/000000.label"); }
+  /// Waits for a file of a run that has begun.
+  void await(const std::string& file) const {
+    for (int i = 0; i < 60000 && !fs::exists(out + ".partial/" + file); ++i) ::usleep(1000);
   }
 };
 
@@ -470,6 +470,21 @@ TEST_CASE("Ctrl-C: run finishes the current scan, keeps the results so far, exit
   CHECK(read_points(fixture.out + "/static_map.ply").positions.size() ==
         report["static_map"]["points"]);
   CHECK(count_entries(fixture.out) == 7);
+}
+
+TEST_CASE("Ctrl-C during the checks of a run leaves what it leaves during the scans") {
+  Fixture fixture(400);
+  const std::string map = fixture.folder / "map.ply";
+  Process process({"run", fixture.seq, "--out", fixture.out, "--map", map});
+  fixture.await("report.json");
+  ::kill(process.id(), SIGINT);
+  const Outcome outcome = process.wait();
+  CHECK(outcome.code == 130);
+  CHECK_THAT(outcome.err, ContainsSubstring("interrupted; the results of"));
+  CHECK_FALSE(fs::exists(fixture.out));
+  CHECK_FALSE(fs::exists(map + ".partial"));
+  fixture.out += ".partial";
+  CHECK(fixture.report()["complete"] == false);
 }
 
 TEST_CASE("A signal that is ignored at the start does not end a run") {
