@@ -192,6 +192,9 @@ void remap(RemapOptions& options) {
   ParameterValues values;
   if (!options.map_voxel.empty()) values.set("map-voxel", options.map_voxel, "--map-voxel");
   values.apply(config);
+  if (options.update.empty() && !options.session.empty()) {
+    throw ConfigError("--session needs --update CITY");
+  }
   options.sequence.settings.complete(point_flags(out));
   RecordingOptions with_new_poses = options.sequence.settings.checked();
   with_new_poses.frame = has_points_in_world ? PointFrame::kWorld : PointFrame::kSensor;

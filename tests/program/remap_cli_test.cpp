@@ -279,6 +279,7 @@ TEST_CASE("remap refuses what does not belong together, and writes nothing then"
   check_unchanged(made, {"--map", made.out + "/static_map.ply"}, 2,
                   "in the folder of the run, the map is static_map_remapped.ply");
   check_unchanged(made, {"--map-voxel", "0.001"}, 2, "map_voxel = 0.001");
+  check_unchanged(made, {"--session", "monday"}, 2, "--session needs --update CITY");
   const Folder folder(made.out);
   folder.lock();
   check_unchanged(made, {}, 2, "is in use");
