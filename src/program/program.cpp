@@ -99,6 +99,17 @@ class HelpFormatter : public CLI::Formatter {
     if (!more.empty()) text += "\nMore options by --help-all: " + more + '\n';
     return text + '\n' + make_footer(app);
   }
+  /// A command within another one comes behind what that one takes.
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    std::string before;
+    if (const CLI::App* const outer = app->get_parent()) {
+      for (const CLI::Option* const option : outer->get_options()) {
+        if (option->get_positional()) before += make_option_usage(option) + ' ';
+      }
+    }
+    name.insert(name.size() - app->get_name().size(), before);
+    return CLI::Formatter::make_usage(app, name);
+  }
 
  private:
   static constexpr const char* kMainGroup = "Options";  // of options without another one
@@ -145,6 +156,18 @@ std::string place_of(const CLI::App& app) {
   return {};
 }
 
+/// The command that was given, whose help has its arguments: for example `dynains map CITY at`.
+std::string command_of(const CLI::App& app) {
+  std::string text = app.get_name();
+  for (const CLI::App* const command : app.get_subcommands()) {
+    for (const CLI::Option* const option : app.get_options()) {
+      if (option->get_positional() && option->count() > 0) text += ' ' + option->results().front();
+    }
+    return text + ' ' + command_of(*command);
+  }
+  return text;
+}
+
 }  // namespace
 
 Program::Program(const std::string& description, const std::string& name)
@@ -183,9 +206,9 @@ int Program::run(int argc, char** argv) {
     return print_help(success);
   } catch (const CLI::ExtrasError&) {  // whose own text has them in reverse order
     return fail(kExitUsage, "not known here: " + CLI::detail::join(remaining(true), " ") +
-                                " (see " + get_name() + " --help-all)");
+                                " (see " + command_of(*this) + " --help-all)");
   } catch (const CLI::ParseError& error) {
-    return fail(kExitUsage, error.what() + std::string(" (see ") + get_name() + " --help)");
+    return fail(kExitUsage, error.what() + std::string(" (see ") + command_of(*this) + " --help)");
   } catch (const ConfigError& error) {
     return fail(kExitUsage, error.what());
   } catch (const UsageError& error) {

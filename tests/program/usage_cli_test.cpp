@@ -17,6 +17,8 @@ TEST_CASE("Flags --version and --help") {
     CHECK_THAT(help.out, ContainsSubstring(command));
     CHECK(start({command, "--help"}).code == 0);
   }
+  CHECK_THAT(start({"map", "city", "at", "--help"}).out,
+             ContainsSubstring("Usage: dynains map CITY at [OPTIONS] SESSION FILE\n"));
 }
 
 TEST_CASE("run --help shows the options that matter, --help-all the rest too") {
@@ -42,12 +44,14 @@ TEST_CASE("Wrong usage is one line on standard error and exit code 2") {
   const std::vector<Case> cases = {
       {{}, "expected a command"},
       {{"walk"}, "walk"},
-      {{"run"}, "SEQ is required"},
+      {{"run"}, "SEQ is required (see dynains run --help)"},
       {{"run", "seq"}, "--out is required"},
       {{"run", "seq", "--out"}, "--out"},
       {{"config", "--preset", "best"}, "best not in"},
       {{"eval"}, "required"},
-      {{"config", "--preste"}, "--preste"},
+      {{"config", "--preste"}, "--preste (see dynains config --help-all)"},
+      {{"map", "city"}, "required (see dynains map --help)"},
+      {{"map", "city", "at", "may"}, "FILE is required (see dynains map city at --help)"},
   };
   for (const Case& wrong : cases) {
     check_one_error(start(wrong.arguments), 2, wrong.expected);
