@@ -264,7 +264,7 @@ void clean(CleanOptions& options) {
   const Recording recording =
       options.sequence.open_of_run(out, "dynains clean " + map + ' ' + options.run.value);
   InputFiles inputs(recording, map);
-  inputs.add_results(out.path());
+  inputs.add_results(out);
   OutputFile cleaned(target, existing_by(options.force), inputs);
   const std::vector<Eigen::Vector3d> positions = read_points(map).positions;
 

@@ -69,7 +69,7 @@ void write(GridOptions& options) {
     run.emplace(open_finished_run(source));
     recording.emplace(options.sequence.open_of_run(*run, "dynains grid " + source));
     inputs = InputFiles(*recording);
-    inputs.add_results(run->path());
+    inputs.add_results(*run);
   } else if (options.keep_moving) {
     throw ConfigError(
         "--keep-moving needs a folder of `dynains run`: a map has nothing that moves");

@@ -133,5 +133,7 @@ TEST_CASE("clean refuses a map or a recording that does not belong to the run") 
     CHECK(read_text(f.map) == CleanFixture::header(f.points) + f.all);
     CHECK_THAT(f.clean({"--map", f.out + "/static_map.ply", "--force"}).err,
                ContainsSubstring("which this command reads"));
+    CHECK_THAT(f.clean({"--map", f.out + "/cleaned.ply"}).err,
+               ContainsSubstring("cleaned.ply: would be a part of"));
   }
 }

@@ -18,6 +18,7 @@ TEST_CASE("a run, its results and its map give grids, whole or not at all") {
   CHECK(fs::exists(folder / "c.pgm"));
 
   check_refused(start({"grid", out, "-o", folder / "b.yaml"}), 1, "exists");
+  check_refused(start({"grid", out, "-o", out + "/b.yaml"}), 1, "b.pgm: would be a part of");
   succeed(start({"grid", out, "-o", folder / "b.yaml", "--force", "--keep-moving"}));
   CHECK((read_text(folder / "a.pgm") != read_text(folder / "b.pgm")));
   // The results that are replaced have written that grid.

@@ -125,13 +125,15 @@ void InputFiles::add(const Recording& recording) {
   const fs::path& folder = recording.folder();
   const bool has_scans =
       recording.format() != ScanFormat::kLog && recording.scan_folder() == folder;
-  add_owner(folder, has_scans);
+  add_owner(folder, has_scans ? Takes::kNoScans : Takes::kAny);
   if (!has_scans) add(recording.scan_folder());
   add(folder / "labels");
 }
 
-void InputFiles::add_results(const fs::path& out) {
-  add_owner(out, false);
+void InputFiles::add_results(const ResultFolder& out) { add_results(out.path(), Takes::kNone); }
+
+void InputFiles::add_results(const fs::path& out, Takes takes) {
+  add_owner(out, takes);
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(out, error)) {
     if (entry.is_directory(error)) add(entry.path());
@@ -148,16 +150,17 @@ void InputFiles::refuse(const FileIdentity& identity, const fs::path& output) co
 void InputFiles::refuse_part(const Folder& folder, const std::string& name, bool is_there) const {
   const auto owner = owners_.find(folder.identity());
   if (owner == owners_.end()) return;
-  const auto& [place, has_scans] = owner->second;
-  if (!is_there && !(has_scans && scan_format_of(name))) return;
+  const auto& [place, takes] = owner->second;
+  const bool would_be_scan = takes == Takes::kNoScans && scan_format_of(name);
+  if (!is_there && !would_be_scan && takes != Takes::kNone) return;
   throw IoError((folder.path() / name).string() + (is_there ? ": is" : ": would be") +
                 " a part of " + place.string() +
                 ", which this command reads; choose another place to write to");
 }
 
-void InputFiles::add_owner(const fs::path& folder, bool has_scans) {
+void InputFiles::add_owner(const fs::path& folder, Takes takes) {
   if (const auto identity = identity_of(folder))
-    owners_.emplace(*identity, std::pair(folder, has_scans));
+    owners_.emplace(*identity, std::pair(folder, takes));
 }
 
 std::string listed_name(const std::string& name) {

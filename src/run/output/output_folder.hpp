@@ -57,6 +57,8 @@ T required_json_field(const std::filesystem::path& path, const nlohmann::ordered
   throw IoError(path.string() + ": " + pointer + ": not found; expected a value");
 }
 
+class ResultFolder;
+
 /// The files that a command reads, and the recordings and results that it is given. It changes none
 /// of them.
 class InputFiles {
@@ -73,7 +75,9 @@ class InputFiles {
   /// and the one above them keeps the files that it has.
   void add(const Recording& recording);
   /// The folder OUT of a run.
-  void add_results(const std::filesystem::path& out);
+  void add_results(const std::filesystem::path& out) { add_results(out, Takes::kAny); }
+  /// One that this command has locked, also for its own outputs: it takes none.
+  void add_results(const ResultFolder& out);
   /// A file, or a folder that takes no files as outputs. A path that leads nowhere is left out.
   void add(const std::filesystem::path& path) {
     if (const auto identity = identity_of(path)) paths_.emplace(*identity, path);
@@ -91,11 +95,15 @@ class InputFiles {
   void refuse_part(const Folder& folder, const std::string& name, bool is_there) const;
 
  private:
-  void add_owner(const std::filesystem::path& folder, bool has_scans);
+  /// The new files that a folder takes.
+  enum class Takes { kAny, kNoScans, kNone };
+
+  void add_results(const std::filesystem::path& out, Takes takes);
+  void add_owner(const std::filesystem::path& folder, Takes takes);
 
   std::map<FileIdentity, std::filesystem::path> paths_;
-  // Folders that keep their files, and whether a file with the extension of a scan would be one.
-  std::map<FileIdentity, std::pair<std::filesystem::path, bool>> owners_;
+  // Folders that keep their files.
+  std::map<FileIdentity, std::pair<std::filesystem::path, Takes>> owners_;
 };
 
 /// The name in printable ASCII: other bytes, and `%`, become `%XX`. Names need not be UTF-8.
