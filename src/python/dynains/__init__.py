@@ -1,5 +1,5 @@
 import html as _html
-from pathlib import Path as _Path
+import pathlib as _pathlib
 
 from . import _dynains
 from ._dynains import *  # noqa: F403
@@ -12,7 +12,7 @@ class View:
     """Page that shows the results of a run: in a notebook the page itself, elsewhere its path."""
 
     def __init__(self, path, height=600):
-        self._path = _Path(path)
+        self._path = _pathlib.Path(path)
         self._height = height
 
     @property
