@@ -389,35 +389,6 @@ TEST_CASE("points of one beam make no plane at any depth, ground at a small angl
   CHECK(points_on_planes(level_square(-0.95)) == 100);
 }
 
-// Scans of level ground, `first` and `second` points at heights of 0 and 0.1 m: the distance of the
-// former from the plane of all.
-double height_of_plane(int first, int second) {
-  VoxelPlanes planes;
-  const auto add_scan = [&](int count, double z) {
-    planes.begin_scan(Pose::Identity());
-    Random random(9);
-    for (int k = 0; k < count; ++k) {
-      VoxelPlanes::Block block;
-      block.push_back(5.0 + random.uniform(0.0, 1.0), random.uniform(0.0, 1.0), z - 1.95);
-      planes.add(block);
-    }
-  };
-  add_scan(first, 0.0);
-  add_scan(second, 0.1);
-  double height = NAN;
-  VoxelPlanes::Block block;
-  block.push_back(5.5, 0.5, -1.95);
-  planes.find(Pose::Identity(), block, [&](std::size_t i, const auto& plane, const auto& at) {
-    height = -plane.distance(at.point(i));
-  });
-  return height;
-}
-
-TEST_CASE("a plane of enough points stays, one of fewer takes all points of a scan") {
-  CHECK(height_of_plane(160, 1000) == Approx(0.0).margin(1e-9));
-  CHECK(height_of_plane(159, 1000) > 0.08);
-}
-
 TEST_CASE("a block of points makes the planes of its single points") {
   const std::vector<Eigen::Vector3d> points = ground_of_beams(0.5);  // with runs in one voxel
   const auto planes_of = [&](std::size_t points_per_block) {

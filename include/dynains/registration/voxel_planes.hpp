@@ -97,7 +97,7 @@ class VoxelPlanes {
     if (size() > kMaxVoxels / 4 * 3) forget_oldest();
   }
 
-  /// Adds points of the current scan to the voxels that need them, and empties the block.
+  /// Adds points of the current scan, and empties the block.
   void add(Block& block) {
     Placed placed;
     place(T_map_sensor_, block, placed);
@@ -109,7 +109,7 @@ class VoxelPlanes {
     for (std::size_t i = 0; i < block.count;) {
       std::size_t end = i + 1;
       while (end < block.count && numbers[end] == numbers[i]) ++end;
-      if (numbers[i] != kNoIndex && takes_points(numbers[i])) add(placed, i, end, numbers[i]);
+      if (numbers[i] != kNoIndex) add(placed, i, end, numbers[i]);
       i = end;
     }
     block.count = 0;
@@ -140,10 +140,6 @@ class VoxelPlanes {
  private:
   // Fewer points lie on a plane by chance, for example in foliage.
   static constexpr double kMinPoints = 12.0;
-  // The points of a scan in one plane weigh at most as much as PlaneAligner::kMaxCount points in
-  // alignments, so that the error of a mean of so many points adds at most 1/20 to the variance of
-  // their distances, and 2.5 % to the error of a pose.
-  static constexpr double kMaxPoints = 20.0 * 8.0;
   static constexpr double kMaxThickness = 0.06;  // standard deviation along the normal / edge
 
   // The points of a voxel, relative to its centre.
@@ -151,7 +147,6 @@ class VoxelPlanes {
     PlaneMoments sums;
     SensorErrors<float> errors = {};  // sums
     std::uint32_t last_scan = 0;
-    bool is_open = true;  // whether it takes points of that scan
   };
 
   double centre(VoxelKey key, int axis) const {
@@ -193,11 +188,8 @@ class VoxelPlanes {
 
   // Number of a voxel, which may be new; kNoIndex if the map is full. Prefetches its moments.
   std::uint32_t number_for(VoxelKey key) {
-    const std::uint32_t hash = voxel_hash(key);
-    const auto& first = table_.first_slot(hash);
-    const bool is_first = first.key == key && first.number != kNoIndex;
-    if (!is_first && size() == kMaxVoxels && table_.find(key) == kNoIndex) return kNoIndex;
-    const std::uint32_t number = is_first ? first.number : table_.insert(key, hash);
+    if (size() == kMaxVoxels && table_.find(key) == kNoIndex) return kNoIndex;
+    const std::uint32_t number = table_.insert(key);
     if (number == size()) {
       keys_.push_back(key);
       moments_.emplace_back();
@@ -205,17 +197,6 @@ class VoxelPlanes {
     }
     __builtin_prefetch(&moments_[number]);
     return number;
-  }
-
-  // Whether a voxel that receives a point of the current scan takes it: all points of a scan or
-  // none, since some would all be of one beam.
-  bool takes_points(std::uint32_t number) {
-    Moments& moments = moments_[number];
-    if (moments.last_scan != scans_) {
-      moments.last_scan = scans_;
-      moments.is_open = moments.sums.count < kMaxPoints;
-    }
-    return moments.is_open;
   }
 
   // Adds the points [begin, end) of a block to their voxel.
@@ -231,6 +212,7 @@ class VoxelPlanes {
         }
       }
     }
+    moments.last_scan = scans_;
     moments_[number] = moments;
     planes_[number].is_fitted = false;
   }
